@@ -1,0 +1,3 @@
+//! The `rayfold` command.
+
+fn main() {}

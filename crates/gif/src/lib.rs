@@ -1,0 +1,1 @@
+//! Ordered images to an animated GIF, streaming.
