@@ -1,3 +1,19 @@
 //! The `rayfold` command.
+//!
+//! One module a subcommand, each with its flags (`Args`) and a `run` that takes them together with the [`Console`],
+//! which holds what the global flags and the environment resolved to. Data goes to standard output, everything for
+//! people to standard error. Exit codes: see [`outcome`].
 
-fn main() {}
+#![allow(dead_code, reason = "render, the next subcommand, uses the rest")]
+
+use std::process::ExitCode;
+
+mod app;
+mod completions;
+mod console;
+mod interrupt;
+mod outcome;
+
+fn main() -> ExitCode {
+    app::run(std::env::args_os())
+}

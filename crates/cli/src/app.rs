@@ -1,0 +1,73 @@
+//! The command line: its flags, and which module answers which subcommand.
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::console::{Color, Console};
+use crate::outcome::{Outcome, exit_code};
+use crate::{completions, interrupt};
+
+/// Ray-traced animations from a folder of scene scripts.
+#[derive(Debug, Parser)]
+#[command(
+    name = "rayfold",
+    version,
+    max_term_width = 100,
+    subcommand_required = true,
+    arg_required_else_help = true,
+    after_help = "\
+Exit codes: 0 done, 1 the input or the rendering failed, 2 wrong usage, 130 interrupted."
+)]
+pub(crate) struct App {
+    #[command(flatten)]
+    global: Global,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, clap::Args)]
+struct Global {
+    /// Say nothing but errors
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    /// When to write in colour
+    #[arg(long, global = true, value_name = "WHEN", default_value = "auto", hide_possible_values = true)]
+    color: Color,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Completions(completions::Args),
+}
+
+impl Command {
+    fn run(self, console: &Console) -> anyhow::Result<Outcome> {
+        match self {
+            Self::Completions(args) => completions::run(&args, console),
+        }
+    }
+}
+
+/// Parses, runs, and says what went wrong.
+pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let app = match App::try_parse_from(args) {
+        Ok(app) => app,
+        Err(e) => {
+            // Help and version go to standard output and are no failure; nobody is left to tell if that is closed.
+            let _ = e.print();
+            return ExitCode::from(if e.use_stderr() { 2 } else { 0 });
+        }
+    };
+    let console = Console::resolve(app.global.quiet, app.global.color);
+    let result = interrupt::listen().map_err(anyhow::Error::new).and_then(|()| app.command.run(&console));
+    match result {
+        Ok(outcome) => outcome.into(),
+        Err(_) if interrupt::requested() => Outcome::Interrupted.into(),
+        Err(error) => {
+            console.error(&error);
+            exit_code(&error)
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! `rayfold completions`: scripts that make a shell complete rayfold's command line.
+
+use clap::CommandFactory;
+use clap_complete::Shell;
+
+use crate::app::App;
+use crate::console::Console;
+use crate::outcome::Outcome;
+
+/// Print a completion script for a shell
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  rayfold completions bash > ~/.local/share/bash-completion/completions/rayfold
+  rayfold completions zsh > ~/.zfunc/_rayfold
+  rayfold completions fish > ~/.config/fish/completions/rayfold.fish")]
+pub(crate) struct Args {
+    /// The shell to complete in
+    shell: Shell,
+}
+
+pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut App::command(), "rayfold", &mut script);
+    console.print(&script)?;
+    Ok(Outcome::Done)
+}

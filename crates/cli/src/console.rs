@@ -1,0 +1,78 @@
+//! Where the program speaks: standard output for data, standard error for people.
+//!
+//! Knows what the global flags and the environment say about colour, progress and silence, so that no subcommand asks
+//! again. Errors are never silenced.
+
+use std::io::{IsTerminal, Write};
+
+use clap::ValueEnum;
+
+/// When to write in colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Color {
+    /// On a terminal, unless NO_COLOR is set
+    #[default]
+    Auto,
+    /// Always
+    Always,
+    /// Never
+    Never,
+}
+
+/// Resolved once from the flags, the environment and what the streams are attached to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Console {
+    /// No progress and no remarks.
+    pub(crate) quiet: bool,
+    /// Standard error takes colour.
+    pub(crate) color: bool,
+    /// Standard error is a terminal that shows a moving bar.
+    pub(crate) animate: bool,
+}
+
+impl Console {
+    /// Looks at the environment; the only place that does.
+    pub(crate) fn resolve(quiet: bool, color: Color) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
+        let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+        let color = match color {
+            Color::Always => true,
+            Color::Never => false,
+            Color::Auto => terminal && !dumb && !no_color,
+        };
+        Self { quiet, color, animate: terminal && !dumb && !quiet }
+    }
+
+    /// Writes data to standard output. A reader that has had enough (`| head`) is no error.
+    ///
+    /// # Errors
+    /// When standard output cannot be written to.
+    pub(crate) fn print(&self, data: impl AsRef<[u8]>) -> anyhow::Result<()> {
+        let mut out = std::io::stdout().lock();
+        match out.write_all(data.as_ref()).and_then(|()| out.flush()) {
+            Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+                Err(anyhow::Error::new(e).context("cannot write to standard output"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// A remark for people, unless they asked for quiet.
+    pub(crate) fn note(&self, text: impl std::fmt::Display) {
+        if !self.quiet {
+            self.say(text);
+        }
+    }
+
+    /// An error and its causes, on one line: `error: cannot read a.txt: permission denied`.
+    pub(crate) fn error(&self, error: &anyhow::Error) {
+        let label = if self.color { "\x1b[1;31merror\x1b[0m" } else { "error" };
+        self.say(format_args!("{label}: {error:#}"));
+    }
+
+    /// Diagnostics and other text that must be seen. There is nowhere left to report that standard error is gone.
+    pub(crate) fn say(&self, text: impl std::fmt::Display) {
+        let _ = writeln!(std::io::stderr().lock(), "{text}");
+    }
+}

@@ -1,0 +1,37 @@
+//! How a run ends.
+//!
+//! 0: done. 1: the input or the rendering failed, and standard error says why. 2: the command line is wrong.
+//! 130: interrupted by the user or the system; nothing half-written is left behind.
+
+use std::process::ExitCode;
+
+/// The end of a subcommand that has said all there is to say; what it has not said yet it returns as an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// It did what it was asked to.
+    Done,
+    /// It could not, and has told why.
+    Failed,
+    /// It was told to stop.
+    Interrupted,
+}
+
+impl From<Outcome> for ExitCode {
+    fn from(outcome: Outcome) -> Self {
+        match outcome {
+            Outcome::Done => Self::SUCCESS,
+            Outcome::Failed => Self::from(1),
+            Outcome::Interrupted => Self::from(130),
+        }
+    }
+}
+
+/// A combination of flags that clap cannot rule out by itself; ends the run with exit code 2.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct Usage(pub(crate) String);
+
+/// Exit code of an error that nobody handled.
+pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
+    if error.is::<Usage>() { ExitCode::from(2) } else { Outcome::Failed.into() }
+}
