@@ -1,5 +1,7 @@
 //! Holds what ARCHITECTURE.md promises about the crates, and the tidy rules that no compiler knows.
 
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
