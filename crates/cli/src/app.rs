@@ -64,7 +64,7 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let result = interrupt::listen().map_err(anyhow::Error::new).and_then(|()| app.command.run(&console));
     match result {
         Ok(outcome) => outcome.into(),
-        Err(_) if interrupt::requested() => Outcome::Interrupted.into(),
+        Err(_) if interrupt::signalled() => Outcome::Interrupted.into(),
         Err(error) => {
             console.error(&error);
             exit_code(&error)

@@ -1,38 +1,68 @@
-//! Stopping when told to (Ctrl-C, SIGTERM, SIGHUP): the first time in order, the second time at once.
+//! Stopping when told to (Ctrl-C, SIGTERM): the first time in order, the second time at once.
 //!
-//! In order means that long work looks at [`requested`] (or polls [`flag`]), comes back early, and drops its temporary
-//! files on the way out. At once means that only the files [`protect`]ed at that moment are removed.
+//! In order means that long work polls [`flag`] (or asks [`stopping`]), comes back early, and drops its temporary files
+//! on the way out. At once means that only the files [`protect`]ed at that moment are removed.
+//! SIGHUP keeps its default, so that `nohup` works.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-static REQUESTED: AtomicBool = AtomicBool::new(false);
+static STOPPING: AtomicBool = AtomicBool::new(false);
+static SIGNAL: AtomicI32 = AtomicI32::new(0);
 static TEMPORARY: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Starts listening.
+/// Starts listening. A write beyond a file size limit becomes an error instead of the program's death.
 ///
 /// # Errors
 /// When the system refuses a handler.
-pub(crate) fn listen() -> Result<(), ctrlc::Error> {
-    ctrlc::set_handler(|| {
-        if REQUESTED.swap(true, Ordering::SeqCst) {
-            for path in &*temporary() {
-                let _ = std::fs::remove_file(path);
+#[cfg(unix)]
+pub(crate) fn listen() -> std::io::Result<()> {
+    use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
+    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGXFSZ])?;
+    std::thread::Builder::new().name("signals".into()).spawn(move || {
+        for signal in signals.forever().filter(|signal| *signal != SIGXFSZ) {
+            if SIGNAL.swap(signal, Ordering::SeqCst) != 0 {
+                for path in &*temporary() {
+                    let _ = std::fs::remove_file(path);
+                }
+                std::process::exit(exit_code());
             }
-            std::process::exit(130);
+            stop();
         }
-    })
+    })?;
+    Ok(())
 }
 
-/// The run was told to stop.
-pub(crate) fn requested() -> bool {
-    REQUESTED.load(Ordering::SeqCst)
+/// Elsewhere Ctrl-C keeps its default, which ends the program at once.
+#[cfg(not(unix))]
+pub(crate) fn listen() -> std::io::Result<()> {
+    Ok(())
 }
 
-/// Turns true when the run is told to stop, for those who take a flag to poll.
+/// Has all work come back early: the run has failed.
+pub(crate) fn stop() {
+    STOPPING.store(true, Ordering::SeqCst);
+}
+
+/// Work is to come back early, because of a signal or of a failure elsewhere.
+pub(crate) fn stopping() -> bool {
+    STOPPING.load(Ordering::SeqCst)
+}
+
+/// The same for those who take a flag to poll.
 pub(crate) fn flag() -> &'static AtomicBool {
-    &REQUESTED
+    &STOPPING
+}
+
+/// A signal told the run to stop.
+pub(crate) fn signalled() -> bool {
+    SIGNAL.load(Ordering::SeqCst) != 0
+}
+
+/// As shells count: 128 and the signal's number.
+pub(crate) fn exit_code() -> i32 {
+    128 + SIGNAL.load(Ordering::SeqCst)
 }
 
 /// A file that must not outlive the run, until this guard is dropped.

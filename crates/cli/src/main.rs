@@ -13,6 +13,7 @@ mod completions;
 mod console;
 mod interrupt;
 mod outcome;
+mod output;
 
 fn main() -> ExitCode {
     app::run(std::env::args_os())

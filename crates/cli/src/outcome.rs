@@ -1,9 +1,12 @@
 //! How a run ends.
 //!
 //! 0: done. 1: the input or the rendering failed, and standard error says why. 2: the command line is wrong.
-//! 130: interrupted by the user or the system; nothing half-written is left behind.
+//! 128 and the
+//! number of the signal (130, 143): interrupted; nothing half-written is left behind.
 
 use std::process::ExitCode;
+
+use crate::interrupt;
 
 /// The end of a subcommand that has said all there is to say; what it has not said yet it returns as an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +24,7 @@ impl From<Outcome> for ExitCode {
         match outcome {
             Outcome::Done => Self::SUCCESS,
             Outcome::Failed => Self::from(1),
-            Outcome::Interrupted => Self::from(130),
+            Outcome::Interrupted => Self::from(u8::try_from(interrupt::exit_code()).unwrap_or(130)),
         }
     }
 }
