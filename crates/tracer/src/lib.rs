@@ -1,1 +1,63 @@
 //! Scenes to images, deterministically.
+//!
+//! What a pixel shows is decided by the scene language's rules of seeing and shading alone: the same scene gives the
+//! same image for any number of threads. The crate knows the typed scene and nothing of text, files or clocks.
+//!
+//! Invariants: no length is compared with an absolute epsilon, what keeps a ray off the surface that it leaves is a
+//! bound on the rounding error there; of hits at the same distance the object that comes first wins; a direction in
+//! here is a unit vector.
+//!
+//! ```
+//! use rayfold_scene::{Camera, Scene, Screen};
+//!
+//! let scene = Scene::new(Screen::new(4, 3)?, Camera::Orthographic);
+//! let image = rayfold_tracer::render(&scene, &rayfold_tracer::RenderOptions::default())?;
+//! assert_eq!(image.dimensions(), (4, 3));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod camera;
+mod parallel;
+pub mod reference;
+
+use std::sync::atomic::AtomicBool;
+
+use image::RgbImage;
+use rayfold_scene::Scene;
+
+/// Raised whenever any scene's pixels change, so that a picture can be known to be out of date.
+pub const PIXEL_VERSION: u32 = 1;
+
+/// How often light is mirrored before the mirror term is dropped.
+pub const MAX_BOUNCES: u32 = 5;
+
+/// How to render; the default renders to the end.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RenderOptions<'a> {
+    /// Stops the rendering soon after it turns true.
+    pub cancel: Option<&'a AtomicBool>,
+}
+
+/// Why there is no image.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// The flag of [`RenderOptions::cancel`] was raised.
+    #[error("rendering was cancelled")]
+    Cancelled,
+    /// The image does not fit into this machine's address space.
+    #[error("an image of {width} x {height} pixels does not fit into memory")]
+    TooLarge {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+}
+
+/// Draws a scene, its first row at the top, on the current rayon pool.
+///
+/// # Errors
+/// When the rendering was cancelled or the image cannot be held in memory.
+pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
+    reference::render(scene, options)
+}

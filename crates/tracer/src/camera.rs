@@ -1,0 +1,94 @@
+//! From pixel to ray.
+//!
+//! The only place that knows how the language numbers its pixels (i from the left, j from the bottom, samples on the
+//! window's corners) and where their rays start.
+
+use glam::DVec3;
+use rayfold_scene::{Camera, Screen};
+
+/// A half-line; its direction is a unit vector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Ray {
+    pub(crate) origin: DVec3,
+    pub(crate) direction: DVec3,
+}
+
+/// The rays of a camera's pixels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Rays {
+    Parallel,
+    /// `direction = corner + i·right + j·up`, not of unit length.
+    Pinhole {
+        eye: DVec3,
+        corner: DVec3,
+        right: DVec3,
+        up: DVec3,
+    },
+}
+
+impl Rays {
+    pub(crate) fn new(camera: &Camera, screen: Screen) -> Self {
+        let Camera::Pinhole(pinhole) = camera else { return Self::Parallel };
+        let (u, v, w) = pinhole.basis();
+        // Only the window's shape matters, so it is brought to the distance of 1: no product can overflow then.
+        let a = pinhole.lower_left() / pinhole.distance();
+        let b = pinhole.upper_right() / pinhole.distance();
+        let axis = |from: f64, to: f64, samples: u32| {
+            if samples == 1 {
+                (0.5 * from + 0.5 * to, 0.0)
+            } else {
+                (from, (to - from) / f64::from(samples - 1))
+            }
+        };
+        let (u0, du) = axis(a.x, b.x, screen.width());
+        let (v0, dv) = axis(a.y, b.y, screen.height());
+        Self::Pinhole { eye: pinhole.eye(), corner: u0 * u + v0 * v - w, right: du * u, up: dv * v }
+    }
+
+    /// The ray of column `i` from the left and row `j` from the bottom.
+    pub(crate) fn ray(&self, i: u32, j: u32) -> Ray {
+        let (i, j) = (f64::from(i), f64::from(j));
+        match *self {
+            Self::Parallel => Ray { origin: DVec3::new(i, j, 0.0), direction: DVec3::NEG_Z },
+            Self::Pinhole { eye, corner, right, up } => {
+                Ray { origin: eye, direction: (corner + i * right + j * up).normalize() }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+    use rayfold_scene::Pinhole;
+
+    use super::*;
+
+    fn pinhole(lower_left: DVec2, upper_right: DVec2) -> Camera {
+        let camera = Pinhole::new(DVec3::Z, DVec3::NEG_Z, DVec3::Y, 1.0, lower_left, upper_right);
+        Camera::Pinhole(camera.unwrap())
+    }
+
+    #[test]
+    fn samples_sit_on_the_corners_of_the_window() {
+        let screen = Screen::new(3, 2).unwrap();
+        let rays = Rays::new(&pinhole(DVec2::new(-1.0, -2.0), DVec2::new(1.0, 2.0)), screen);
+        assert_eq!(rays.ray(0, 0).direction, DVec3::new(-1.0, -2.0, -1.0).normalize());
+        assert_eq!(rays.ray(2, 1).direction, DVec3::new(1.0, 2.0, -1.0).normalize());
+        assert_eq!(rays.ray(1, 1).direction, DVec3::new(0.0, 2.0, -1.0).normalize());
+    }
+
+    #[test]
+    fn a_single_sample_is_the_middle() {
+        let rays =
+            Rays::new(&pinhole(DVec2::new(1.0, 3.0), DVec2::new(2.0, 5.0)), Screen::new(1, 1).unwrap());
+        assert_eq!(rays.ray(0, 0).direction, DVec3::new(1.5, 4.0, -1.0).normalize());
+    }
+
+    #[test]
+    fn swapped_corners_mirror_the_image() {
+        let screen = Screen::new(2, 2).unwrap();
+        let rays = Rays::new(&pinhole(DVec2::new(1.0, -1.0), DVec2::new(-1.0, 1.0)), screen);
+        assert!(rays.ray(0, 0).direction.x > 0.0 && rays.ray(1, 0).direction.x < 0.0);
+    }
+}

@@ -1,0 +1,41 @@
+//! Work on bands of an image, side by side.
+//!
+//! Knows nothing of what is drawn: it hands each worker rows that are its own and looks at the cancel flag between
+//! them. Which worker draws a band cannot be seen in the picture.
+
+use std::sync::atomic::Ordering;
+
+use image::RgbImage;
+use rayfold_scene::Screen;
+use rayon::prelude::*;
+
+use crate::{RenderError, RenderOptions};
+
+/// Bytes of an RGB pixel.
+pub(crate) const CHANNELS: usize = 3;
+
+/// Draws an image in bands of `rows` rows; `draw` gets the first row of its band, counted from the top, and the
+/// band's bytes.
+pub(crate) fn bands(
+    screen: Screen,
+    rows: u32,
+    options: &RenderOptions,
+    draw: impl Fn(u32, &mut [u8]) + Sync,
+) -> Result<RgbImage, RenderError> {
+    let (width, height) = (screen.width(), screen.height());
+    let too_large = || RenderError::TooLarge { width, height };
+    let pixels = usize::try_from(screen.pixels()).map_err(|_| too_large())?;
+    let bytes = pixels.checked_mul(CHANNELS).ok_or_else(too_large)?;
+    let mut buffer = Vec::new();
+    buffer.try_reserve_exact(bytes).map_err(|_| too_large())?;
+    buffer.resize(bytes, 0);
+    let band = (width as usize).saturating_mul(rows as usize).saturating_mul(CHANNELS);
+    buffer.par_chunks_mut(band).enumerate().try_for_each(|(index, band)| {
+        if options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+            return Err(RenderError::Cancelled);
+        }
+        draw(index as u32 * rows, band);
+        Ok(())
+    })?;
+    RgbImage::from_raw(width, height, buffer).ok_or_else(too_large)
+}

@@ -1,0 +1,182 @@
+//! The plain tracer, by which everything faster is judged.
+//!
+//! One ray after another, every object for every ray, all in `f64`, in the words of the scene language. It is written
+//! to be read and to be right, and knows nothing of packets, tiles or trees. Its own rounding errors are bounded where
+//! they arise ([`Surface::offset`]), relative to the numbers at hand.
+//!
+//! ```
+//! use glam::DVec3;
+//! use rayfold_scene::{Material, Object, Sphere};
+//! use rayfold_tracer::reference::nearest;
+//!
+//! let sphere = Object::Sphere(Sphere::new(1.0, DVec3::ZERO, Material::default())?);
+//! let hit = nearest(&[sphere], DVec3::new(0.0, 0.0, 5.0), DVec3::NEG_Z).ok_or("missed")?;
+//! assert_eq!((hit.object, hit.distance, hit.surface.normal), (0, 4.0, DVec3::Z));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod intersect;
+
+use glam::DVec3;
+use image::RgbImage;
+use rayfold_scene::{Light, Object, Scene, model::unit};
+
+pub use intersect::Surface;
+
+use crate::camera::{Ray, Rays};
+use crate::parallel::{CHANNELS, bands};
+use crate::{MAX_BOUNCES, RenderError, RenderOptions};
+
+/// Where a ray meets an object first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Position of the object in the script, from 0.
+    pub object: usize,
+    /// Distance from the ray's origin, in world units, greater than zero.
+    pub distance: f64,
+    /// The surface there.
+    pub surface: Surface,
+}
+
+/// Draws a scene with the plain tracer.
+///
+/// # Errors
+/// Those of [`crate::render`].
+pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
+    let rays = Rays::new(&scene.camera, scene.screen);
+    bands(scene.screen, 1, options, |row, band| {
+        let j = scene.screen.height() - 1 - row;
+        for (pixel, i) in band.chunks_exact_mut(CHANNELS).zip(0u32..) {
+            pixel.copy_from_slice(&levels(color_along(scene, rays.ray(i, j), 0)));
+        }
+    })
+}
+
+/// The colour of a pixel, unclamped; `i` counts from the left, `j` from the bottom.
+pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
+    color_along(scene, Rays::new(&scene.camera, scene.screen).ray(i, j), 0)
+}
+
+/// The nearest hit of a ray; of hits at the same distance, that of the object which comes first.
+///
+/// `direction` is of unit length.
+pub fn nearest(objects: &[Object], origin: DVec3, direction: DVec3) -> Option<Hit> {
+    let ray = Ray { origin, direction };
+    let mut best: Option<(usize, f64)> = None;
+    for (index, object) in objects.iter().enumerate() {
+        if let Some(distance) = intersect::distance(object, ray)
+            && best.is_none_or(|(_, least)| distance < least)
+        {
+            best = Some((index, distance));
+        }
+    }
+    let (object, distance) = best?;
+    Some(Hit { object, distance, surface: intersect::surface(&objects[object], ray, distance) })
+}
+
+fn color_along(scene: &Scene, ray: Ray, bounces: u32) -> DVec3 {
+    let Some(hit) = nearest(&scene.objects, ray.origin, ray.direction) else {
+        return scene.background();
+    };
+    let material = scene.objects[hit.object].material();
+    let normal = hit.surface.normal;
+    let start = hit.surface.point + hit.surface.offset * normal;
+    let mut color = material.ambient();
+    for Light::Directional(light) in scene.lights.iter() {
+        let towards = -unit(light.direction());
+        let cosine = normal.dot(towards);
+        let lit = cosine > 0.0
+            && !scene.objects.iter().any(|object| {
+                intersect::distance(object, Ray { origin: start, direction: towards }).is_some()
+            });
+        if lit {
+            color += light.color() * material.diffuse() * cosine;
+        }
+    }
+    if bounces < MAX_BOUNCES && material.mirror() != DVec3::ZERO {
+        // The normal faces the ray; where rounding says otherwise, the ray grazes.
+        let towards_surface = ray.direction.dot(normal).min(0.0);
+        let direction = (ray.direction - 2.0 * towards_surface * normal).normalize();
+        color += material.mirror() * color_along(scene, Ray { origin: start, direction }, bounces + 1);
+    }
+    color
+}
+
+/// Display values to the levels of a channel.
+fn levels(color: DVec3) -> [u8; CHANNELS] {
+    color.to_array().map(|channel| (255.0 * channel.clamp(0.0, 1.0)).round() as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
+
+    use rayfold_scene::{Camera, Cuboid, DirectionalLight, Material, Screen, Sphere};
+
+    use super::*;
+
+    fn material(ambient: f64, diffuse: f64, mirror: f64) -> Material {
+        Material::new(DVec3::splat(ambient), DVec3::splat(diffuse), DVec3::splat(mirror)).unwrap()
+    }
+
+    fn one_pixel(objects: Vec<Object>, light: Option<DVec3>) -> Scene {
+        let mut scene = Scene::new(Screen::new(1, 1).unwrap(), Camera::Orthographic);
+        scene.set_background(DVec3::new(0.0, 0.25, 1.0)).unwrap();
+        scene.objects = Arc::new(objects);
+        scene.lights = Arc::new(
+            light
+                .map(|d| Light::Directional(DirectionalLight::new(DVec3::ONE, d).unwrap()))
+                .into_iter()
+                .collect(),
+        );
+        scene
+    }
+
+    fn sphere(radius: f64, z: f64, material: Material) -> Object {
+        Object::Sphere(Sphere::new(radius, DVec3::new(0.0, 0.0, z), material).unwrap())
+    }
+
+    #[test]
+    fn a_lit_sphere_is_ambient_plus_lambert() {
+        let light = DVec3::new(3.0, 0.0, -3.0);
+        let scene = one_pixel(vec![sphere(1.0, -5.0, material(0.125, 0.5, 0.0))], Some(light));
+        let expected = 0.125 + 0.5 * 0.5f64.sqrt();
+        assert!((color(&scene, 0, 0).x - expected).abs() < 1e-15);
+    }
+
+    #[test]
+    fn what_stands_in_the_way_of_the_light_casts_a_shadow() {
+        let objects =
+            vec![sphere(1.0, -5.0, material(0.125, 0.5, 0.0)), sphere(0.5, 5.0, material(0.0, 0.0, 1.0))];
+        let scene = one_pixel(objects, Some(DVec3::NEG_Z));
+        assert_eq!(color(&scene, 0, 0).x, 0.125);
+    }
+
+    #[test]
+    fn a_mirror_shows_the_background_and_a_light_from_behind_nothing() {
+        let scene = one_pixel(vec![sphere(1.0, -5.0, material(0.125, 0.5, 0.5))], Some(DVec3::Z));
+        assert_eq!(color(&scene, 0, 0), DVec3::new(0.125, 0.25, 0.625));
+    }
+
+    #[test]
+    fn two_facing_mirrors_end_after_the_fifth_bounce() {
+        let corner = |z: f64| [DVec3::new(-1.0, -1.0, z), DVec3::new(1.0, 1.0, z)];
+        let mirror = |z: f64| Object::Cuboid(Cuboid::new(corner(z), material(1.0, 0.0, 1.0)).unwrap());
+        let scene = one_pixel(vec![mirror(-1.0), mirror(1.0)], None);
+        assert_eq!(color(&scene, 0, 0), DVec3::splat(6.0));
+    }
+
+    #[test]
+    fn levels_are_rounded_and_clamped() {
+        assert_eq!(levels(DVec3::new(-1.0, 0.499 / 255.0, 0.501 / 255.0)), [0, 0, 1]);
+        assert_eq!(levels(DVec3::new(2.0, f64::INFINITY, f64::NEG_INFINITY)), [255, 255, 0]);
+    }
+
+    #[test]
+    fn a_raised_flag_stops_the_rendering() {
+        let flag = AtomicBool::new(true);
+        let options = RenderOptions { cancel: Some(&flag) };
+        assert!(matches!(render(&one_pixel(vec![], None), &options), Err(RenderError::Cancelled)));
+    }
+}
