@@ -1,1 +1,38 @@
 //! Ordered images to an animated GIF, streaming.
+//!
+//! A GIF has 256 colours a frame and hundredths of a second; this crate makes the best of both. It knows nothing of
+//! scenes, files or stores: images come in one by one through [`Encoder::push`], bytes go out to a [`std::io::Write`].
+//!
+//! What holds:
+//!
+//! - Every frame is there, in order, for its time: also one that equals its predecessor. Only above 50 frames a second
+//!   are frames dropped, and the [`Summary`] says how many.
+//! - Memory does not grow with the number of frames: one frame, its predecessor, what a viewer sees, and the last block.
+//! - The bytes depend on frames and settings alone, not on threads or time. Work is spread over the rayon pool that
+//!   [`Encoder::push`] is called in, by fork and join only: a pool of one thread is enough, inside or outside.
+//! - A frame with at most 256 colours is kept exactly.
+//!
+//! ```
+//! use image::{Rgb, RgbImage};
+//! use rayfold_gif::{Encoder, Settings};
+//!
+//! let mut gif = Vec::new();
+//! let mut encoder = Encoder::new(&mut gif, Settings { fps: 25.0, ..Settings::default() })?;
+//! for brightness in [0, 100, 200] {
+//!     encoder.push(RgbImage::from_pixel(16, 16, Rgb([brightness; 3])))?;
+//! }
+//! let summary = encoder.finish()?;
+//! assert_eq!(summary.frames, 3);
+//! assert!(gif.starts_with(b"GIF89a"));
+//! # Ok::<(), rayfold_gif::Error>(())
+//! ```
+
+mod block;
+mod colour;
+mod encoder;
+mod histogram;
+mod palette;
+mod quantise;
+mod timeline;
+
+pub use encoder::{Encoder, Error, Settings, Summary};

@@ -1,0 +1,128 @@
+//! The space in which errors are measured.
+//!
+//! A picture is judged by its levels (PSNR) and by the eye (CIE Lab). Neither alone will do: a palette that is best in
+//! one loses in the other. So a colour is a point with six coordinates, the sRGB levels and `LAB_WEIGHT` times CIE
+//! L\*a\*b\* (D65, CIE 15:2004), and the squared distance is the sum of both errors.
+//!
+//! Only +, -, x, / and square roots are used, which IEEE 754 defines to the bit: the same frames give the same bytes on
+//! every machine, whatever its mathematical library.
+
+use std::sync::LazyLock;
+
+/// Coordinates of a [`Point`].
+pub(crate) const DIMENSIONS: usize = 6;
+/// How much a unit of L\*a\*b\* counts against a level of sRGB.
+const LAB_WEIGHT: f32 = 3.0;
+
+/// A colour where distance is error.
+pub(crate) type Point = [f32; DIMENSIONS];
+
+/// Squared distance.
+pub(crate) fn error(a: &Point, b: &Point) -> f32 {
+    let mut sum = 0.0;
+    for k in 0..DIMENSIONS {
+        let d = a[k] - b[k];
+        sum += d * d;
+    }
+    sum
+}
+
+/// The point of a colour whose sRGB levels (0 to 255) may be fractions.
+pub(crate) fn point(rgb: [f32; 3]) -> Point {
+    let tables = &*TABLES;
+    let [r, g, b] = rgb.map(|level| interpolate(&tables.linear, level));
+    // IEC 61966-2-1, rows divided by the white point D65.
+    let f = |x: f32, y: f32, z: f32| interpolate(&tables.lightness, (x * r + y * g + z * b) * STEPS as f32);
+    let fx = f(0.412_456_4 / 0.950_47, 0.357_576_1 / 0.950_47, 0.180_437_5 / 0.950_47);
+    let fy = f(0.212_672_9, 0.715_152_2, 0.072_175);
+    let fz = f(0.019_333_9 / 1.088_83, 0.119_192 / 1.088_83, 0.950_304_1 / 1.088_83);
+    [
+        rgb[0],
+        rgb[1],
+        rgb[2],
+        LAB_WEIGHT * (116.0 * fy - 16.0),
+        LAB_WEIGHT * 500.0 * (fx - fy),
+        LAB_WEIGHT * 200.0 * (fy - fz),
+    ]
+}
+
+/// The point of a colour of whole levels.
+pub(crate) fn point_of(rgb: [u8; 3]) -> Point {
+    point(rgb.map(f32::from))
+}
+
+const STEPS: usize = 4096;
+
+struct Tables {
+    /// sRGB level to linear light.
+    linear: Vec<f32>,
+    /// Linear light in steps of 1 / `STEPS` to the `f` of L\*a\*b\*.
+    lightness: Vec<f32>,
+}
+
+static TABLES: LazyLock<Tables> = LazyLock::new(|| {
+    let linear = |level: usize| {
+        let v = level as f64 / 255.0;
+        if v <= 0.040_45 {
+            v / 12.92
+        } else {
+            let v = (v + 0.055) / 1.055;
+            v * v * root(v * v, 5)
+        }
+    };
+    let lightness = |step: usize| {
+        let t = step as f64 / STEPS as f64;
+        if t > 216.0 / 24_389.0 { root(t, 3) } else { (24_389.0 / 27.0 * t + 16.0) / 116.0 }
+    };
+    Tables {
+        linear: (0..256).map(|level| linear(level) as f32).collect(),
+        lightness: (0..=STEPS).map(|step| lightness(step) as f32).collect(),
+    }
+});
+
+fn interpolate(table: &[f32], at: f32) -> f32 {
+    let below = (at as usize).min(table.len() - 2);
+    let part = at - below as f32;
+    table[below] * (1.0 - part) + table[below + 1] * part
+}
+
+/// The `n`th root of a number in (0, 1], by Newton's method.
+fn root(x: f64, n: i32) -> f64 {
+    let mut y = 1.0;
+    for _ in 0..64 {
+        let power = (1..n).fold(1.0, |product, _| product * y);
+        y -= (y - x / power) / f64::from(n);
+    }
+    y
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lab_of_known_colours() {
+        for (rgb, lab) in [
+            ([255, 255, 255], [100.0, 0.0, 0.0]),
+            ([0, 0, 0], [0.0, 0.0, 0.0]),
+            ([255, 0, 0], [53.24, 80.09, 67.20]),
+            ([0, 255, 0], [87.73, -86.18, 83.18]),
+            ([0, 0, 255], [32.30, 79.19, -107.86]),
+            ([10, 20, 30], [5.95, -0.67, -8.14]),
+        ] {
+            let point = point_of(rgb);
+            for k in 0..3 {
+                let found = point[3 + k] / LAB_WEIGHT;
+                assert!((found - lab[k]).abs() < 0.15, "{rgb:?}: {found} for {}", lab[k]);
+            }
+        }
+    }
+
+    #[test]
+    fn root_is_a_root() {
+        for x in [1e-3, 0.1, 0.5, 1.0] {
+            assert!((root(x, 3) - f64::cbrt(x)).abs() < 1e-12);
+            assert!((root(x, 5) - x.powf(0.2)).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! Frames in, bytes out: checks, order, delays, and what runs beside what.
+
+use std::io::{self, Write};
+
+use gif::{DisposalMethod, Repeat};
+use image::RgbImage;
+
+use crate::block::Block;
+use crate::quantise::Quantiser;
+use crate::timeline::Timeline;
+
+/// The largest width and height that the format can hold.
+const LONGEST_SIDE: u32 = 65_535;
+
+/// How to write the animation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Frames a second: above 0, at least 100 / 65,535. Above 50, frames are dropped.
+    pub fps: f64,
+    /// How often the animation is repeated; 0: for ever.
+    pub loops: u16,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { fps: 10.0, loops: 0 }
+    }
+}
+
+/// What was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Summary {
+    /// Frames in the file.
+    pub frames: u64,
+    /// Frames left out because they would have been shown for less than two hundredths of a second.
+    pub dropped: u64,
+    /// Width and height in pixels.
+    pub size: (u32, u32),
+    /// Time from the first frame to the end of the last, in hundredths of a second.
+    pub duration_cs: u64,
+    /// Length of the file.
+    pub bytes: u64,
+}
+
+/// Why no animation came out. Frames are counted from 1.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The frame rate is not a number above 0, or so low that the delay has no room in the format.
+    #[error("{fps} frames a second: a GIF can hold rates from 0.00153 up")]
+    FrameRate {
+        /// The rate asked for.
+        fps: f64,
+    },
+    /// A frame differs in size from those before it.
+    #[error("frame {frame} is {} x {} pixels, the frames before it are {} x {}", found.0, found.1, expected.0, expected.1)]
+    UnlikeSize {
+        /// Which frame.
+        frame: u64,
+        /// Its width and height.
+        found: (u32, u32),
+        /// Width and height of the first frame.
+        expected: (u32, u32),
+    },
+    /// A frame has no pixels, or more on a side than the format can hold.
+    #[error("frame {frame} is {} x {} pixels, a GIF can hold 1 to {LONGEST_SIDE} on each side", found.0, found.1)]
+    Size {
+        /// Which frame.
+        frame: u64,
+        /// Its width and height.
+        found: (u32, u32),
+    },
+    /// [`Encoder::finish`] was called before any [`Encoder::push`].
+    #[error("an animation needs at least one frame")]
+    NoFrames,
+    /// The writer failed.
+    #[error("cannot write frame {frame}")]
+    Write {
+        /// The frame that was being written.
+        frame: u64,
+        /// What the writer said.
+        source: io::Error,
+    },
+}
+
+/// Writes an animation frame by frame.
+///
+/// See the [crate's documentation](crate) for what holds and for an example.
+pub struct Encoder<W: Write> {
+    settings: Settings,
+    timeline: Timeline,
+    pushed: u64,
+    written: u64,
+    duration_cs: u64,
+    stage: Stage<W>,
+}
+
+enum Stage<W: Write> {
+    Empty(W),
+    Running(Box<Running<W>>),
+    Failed,
+}
+
+struct Running<W: Write> {
+    size: (u32, u32),
+    file: gif::Encoder<Counting<W>>,
+    quantiser: Quantiser,
+    /// The last frame, quantised but not yet compressed: that runs beside the quantising of the next.
+    pending: Block,
+}
+
+impl<W: Write> Encoder<W> {
+    /// Nothing is written before the first frame.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::FrameRate`].
+    pub fn new(writer: W, settings: Settings) -> Result<Self, Error> {
+        let timeline = Timeline::new(settings.fps)?;
+        Ok(Self { settings, timeline, pushed: 0, written: 0, duration_cs: 0, stage: Stage::Empty(writer) })
+    }
+
+    /// Adds the next frame.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Size`], [`Error::UnlikeSize`]: the frame is refused, and the next one may be pushed in its place.
+    /// [`Error::Write`]: the animation is lost; so says every later call.
+    pub fn push(&mut self, frame: RgbImage) -> Result<(), Error> {
+        let number = self.pushed + 1;
+        let found = frame.dimensions();
+        if found.0.min(found.1) == 0 || found.0.max(found.1) > LONGEST_SIDE {
+            return Err(Error::Size { frame: number, found });
+        }
+        if let Stage::Running(running) = &self.stage
+            && running.size != found
+        {
+            return Err(Error::UnlikeSize { frame: number, found, expected: running.size });
+        }
+        let delay = self.timeline.advance();
+        self.pushed = number;
+        let Some(delay_cs) = delay else { return Ok(()) };
+
+        self.stage = match std::mem::replace(&mut self.stage, Stage::Failed) {
+            Stage::Empty(writer) => {
+                let file = begin(writer, found, self.settings.loops)
+                    .map_err(|source| Error::Write { frame: number, source })?;
+                let mut quantiser = Quantiser::new();
+                let pending = quantiser.quantise(frame, delay_cs);
+                Stage::Running(Box::new(Running { size: found, file, quantiser, pending }))
+            }
+            Stage::Running(mut running) => {
+                let quantiser = &mut running.quantiser;
+                let pending = running.pending;
+                let (compressed, next) =
+                    rayon::join(|| compress(pending), || quantiser.quantise(frame, delay_cs));
+                running.pending = next;
+                write(&mut running.file, &compressed)
+                    .map_err(|source| Error::Write { frame: self.written + 1, source })?;
+                self.written += 1;
+                Stage::Running(running)
+            }
+            Stage::Failed => return Err(self.failed_before()),
+        };
+        self.duration_cs += u64::from(delay_cs);
+        Ok(())
+    }
+
+    /// Writes what is left and flushes the writer.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NoFrames`], [`Error::Write`].
+    pub fn finish(mut self) -> Result<Summary, Error> {
+        let Running { size, mut file, pending, .. } = match std::mem::replace(&mut self.stage, Stage::Failed)
+        {
+            Stage::Empty(_) => return Err(Error::NoFrames),
+            Stage::Running(running) => *running,
+            Stage::Failed => return Err(self.failed_before()),
+        };
+        let frame = self.written + 1;
+        let end = || {
+            write(&mut file, &compress(pending))?;
+            let mut counting = file.into_inner().map_err(into_io)?;
+            counting.inner.flush()?;
+            Ok(counting.bytes)
+        };
+        let bytes = end().map_err(|source| Error::Write { frame, source })?;
+        let Self { pushed, duration_cs, .. } = self;
+        Ok(Summary { frames: frame, dropped: pushed - frame, size, duration_cs, bytes })
+    }
+
+    fn failed_before(&self) -> Error {
+        Error::Write { frame: self.written + 1, source: io::Error::other("writing has failed before") }
+    }
+}
+
+fn begin<W: Write>(writer: W, size: (u32, u32), loops: u16) -> io::Result<gif::Encoder<Counting<W>>> {
+    let mut file = gif::Encoder::new(Counting { inner: writer, bytes: 0 }, size.0 as u16, size.1 as u16, &[])
+        .map_err(into_io)?;
+    file.set_repeat(if loops == 0 { Repeat::Infinite } else { Repeat::Finite(loops) }).map_err(into_io)?;
+    Ok(file)
+}
+
+fn compress(block: Block) -> gif::Frame<'static> {
+    let mut frame = gif::Frame {
+        delay: block.delay_cs,
+        dispose: DisposalMethod::Keep,
+        transparent: block.transparent,
+        left: block.left,
+        top: block.top,
+        width: block.width,
+        height: block.height,
+        palette: Some(block.palette),
+        buffer: block.indices.into(),
+        ..gif::Frame::default()
+    };
+    frame.make_lzw_pre_encoded();
+    frame
+}
+
+fn write<W: Write>(file: &mut gif::Encoder<Counting<W>>, frame: &gif::Frame<'_>) -> io::Result<()> {
+    file.write_lzw_pre_encoded_frame(frame).map_err(into_io)
+}
+
+fn into_io(error: gif::EncodingError) -> io::Error {
+    match error {
+        gif::EncodingError::Io(source) => source,
+        other => io::Error::other(other),
+    }
+}
+
+struct Counting<W> {
+    inner: W,
+    bytes: u64,
+}
+
+impl<W: Write> Write for Counting<W> {
+    fn write(&mut self, buf: &[u8]) -> io::Result<usize> {
+        let written = self.inner.write(buf)?;
+        self.bytes += written as u64;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.inner.flush()
+    }
+}

@@ -1,0 +1,284 @@
+//! The best few colours for many.
+//!
+//! Clusters are split at the mean of their widest coordinate, always the one with the largest error first, and then
+//! settled by k-means (Lloyd 1982), where a colour looks only at centres closer than twice its distance from its own.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use crate::colour::{self, DIMENSIONS, Point};
+use crate::histogram::Bin;
+
+/// Rounds of k-means at most.
+const ROUNDS: usize = 5;
+/// How many of a colour's nearest others are kept at hand.
+pub(crate) const NEIGHBOURS: usize = 16;
+
+/// A weighted colour.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sample {
+    pub(crate) point: Point,
+    pub(crate) rgb: [f32; 3],
+    pub(crate) weight: f32,
+}
+
+impl From<&Bin> for Sample {
+    fn from(bin: &Bin) -> Self {
+        let rgb = bin.mean();
+        Self { point: colour::point(rgb), rgb, weight: bin.count as f32 }
+    }
+}
+
+/// Colours to draw with; for each its point and its nearest others.
+#[derive(Debug, Clone)]
+pub(crate) struct Palette {
+    pub(crate) colours: Vec<[u8; 3]>,
+    pub(crate) points: Vec<Point>,
+    neighbours: Vec<Vec<Neighbour>>,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Neighbour {
+    pub(crate) index: u8,
+    /// Squared distance.
+    pub(crate) apart: f32,
+}
+
+impl Palette {
+    /// Colours as they are, at most 256.
+    pub(crate) fn new(colours: Vec<[u8; 3]>) -> Self {
+        let points = colours.iter().map(|&rgb| colour::point_of(rgb)).collect::<Vec<_>>();
+        let neighbours = neighbours(&points);
+        Self { colours, points, neighbours }
+    }
+
+    /// At most `size` colours that fit the samples well, of which there is at least one.
+    pub(crate) fn of(samples: &[Sample], size: usize) -> Self {
+        let mut owners = split(samples, size);
+        for _ in 0..ROUNDS {
+            let centres = centres(samples, &mut owners);
+            let points = centres.iter().map(|&rgb| colour::point(rgb)).collect::<Vec<_>>();
+            let near = neighbours(&points);
+            let mut moved = 0;
+            for (sample, owner) in samples.iter().zip(&mut owners) {
+                let nearest = nearest(&points, &near, &sample.point, *owner);
+                moved += usize::from(nearest != *owner);
+                *owner = nearest;
+            }
+            if moved * 200 < samples.len() {
+                break;
+            }
+        }
+        let mut colours = centres(samples, &mut owners)
+            .into_iter()
+            .map(|rgb| rgb.map(|level| level.round() as u8))
+            .collect::<Vec<_>>();
+        colours.sort_unstable();
+        colours.dedup();
+        Self::new(colours)
+    }
+
+    /// The nearest colour; `guess` is where to start looking.
+    pub(crate) fn nearest(&self, point: &Point, guess: u8) -> u8 {
+        nearest(&self.points, &self.neighbours, point, guess)
+    }
+
+    /// The nearest others of a colour, nearest first.
+    pub(crate) fn neighbours(&self, index: u8) -> &[Neighbour] {
+        &self.neighbours[usize::from(index)]
+    }
+}
+
+fn neighbours(points: &[Point]) -> Vec<Vec<Neighbour>> {
+    let by_distance = |a: &Neighbour, b: &Neighbour| a.apart.total_cmp(&b.apart).then(a.index.cmp(&b.index));
+    points
+        .iter()
+        .enumerate()
+        .map(|(own, point)| {
+            let mut all = points
+                .iter()
+                .enumerate()
+                .filter(|&(index, _)| index != own)
+                .map(|(index, other)| Neighbour { index: index as u8, apart: colour::error(point, other) })
+                .collect::<Vec<_>>();
+            if all.len() > NEIGHBOURS {
+                all.select_nth_unstable_by(NEIGHBOURS - 1, by_distance);
+                all.truncate(NEIGHBOURS);
+            }
+            all.sort_unstable_by(by_distance);
+            all
+        })
+        .collect()
+}
+
+fn nearest(points: &[Point], neighbours: &[Vec<Neighbour>], point: &Point, guess: u8) -> u8 {
+    let from_guess = colour::error(point, &points[usize::from(guess)]);
+    let (mut best, mut least) = (guess, from_guess);
+    let near = &neighbours[usize::from(guess)];
+    for neighbour in near {
+        // Triangle inequality: a colour twice as far from the guess as the point is cannot be nearer to it.
+        if neighbour.apart >= 4.0 * from_guess {
+            return best;
+        }
+        let error = colour::error(point, &points[usize::from(neighbour.index)]);
+        if error < least {
+            (best, least) = (neighbour.index, error);
+        }
+    }
+    if near.len() + 1 == points.len() {
+        return best;
+    }
+    if best != guess {
+        return nearest(points, neighbours, point, best);
+    }
+    for (index, other) in points.iter().enumerate() {
+        let error = colour::error(point, other);
+        if error < least {
+            (best, least) = (index as u8, error);
+        }
+    }
+    best
+}
+
+/// Mean colours of the clusters; owners are renumbered so that no cluster is empty.
+fn centres(samples: &[Sample], owners: &mut [u8]) -> Vec<[f32; 3]> {
+    let mut sums = [[0.0_f64; 4]; 256];
+    for (sample, &owner) in samples.iter().zip(owners.iter()) {
+        let sum = &mut sums[usize::from(owner)];
+        for (sum, level) in sum.iter_mut().zip(sample.rgb) {
+            *sum += f64::from(level * sample.weight);
+        }
+        sum[3] += f64::from(sample.weight);
+    }
+    let mut number = [0_u8; 256];
+    let mut means = Vec::with_capacity(256);
+    for (sum, number) in sums.iter().zip(&mut number) {
+        if sum[3] > 0.0 {
+            *number = means.len() as u8;
+            means.push([0, 1, 2].map(|k| (sum[k] / sum[3]) as f32));
+        }
+    }
+    for owner in owners {
+        *owner = number[usize::from(*owner)];
+    }
+    means
+}
+
+struct Cluster {
+    /// Weighted squared error against the mean.
+    error: f64,
+    /// The coordinate with the largest part in it, and its mean.
+    widest: usize,
+    mean: f32,
+    members: std::ops::Range<usize>,
+}
+
+impl Cluster {
+    fn new(samples: &[Sample], order: &[u32], members: std::ops::Range<usize>) -> Self {
+        let mut weight = 0.0_f64;
+        let mut sums = [0.0_f64; DIMENSIONS];
+        let mut squares = [0.0_f64; DIMENSIONS];
+        for &member in &order[members.clone()] {
+            let Sample { point, weight: w, .. } = &samples[member as usize];
+            weight += f64::from(*w);
+            for k in 0..DIMENSIONS {
+                let weighted = point[k] * w;
+                sums[k] += f64::from(weighted);
+                squares[k] += f64::from(weighted * point[k]);
+            }
+        }
+        let spread = |k: usize| squares[k] - sums[k] * sums[k] / weight;
+        let widest = (1..DIMENSIONS).fold(0, |best, k| if spread(k) > spread(best) { k } else { best });
+        let error = if members.len() > 1 { (0..DIMENSIONS).map(spread).sum() } else { 0.0 };
+        Self { error, widest, mean: (sums[widest] / weight) as f32, members }
+    }
+}
+
+impl PartialEq for Cluster {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Cluster {}
+impl PartialOrd for Cluster {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Cluster {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.error.total_cmp(&other.error).then(other.members.start.cmp(&self.members.start))
+    }
+}
+
+/// The cluster, below `size`, of each sample.
+fn split(samples: &[Sample], size: usize) -> Vec<u8> {
+    let mut order = (0..samples.len() as u32).collect::<Vec<_>>();
+    let mut clusters = BinaryHeap::from([Cluster::new(samples, &order, 0..samples.len())]);
+    let mut done = Vec::new();
+    while clusters.len() + done.len() < size
+        && let Some(cluster) = clusters.pop()
+    {
+        let Cluster { widest, mean, members, .. } = &cluster;
+        let below = partition(&mut order[members.clone()], |&m| samples[m as usize].point[*widest] <= *mean);
+        if below == 0 || below == members.len() {
+            done.push(cluster);
+            continue;
+        }
+        let middle = members.start + below;
+        clusters.push(Cluster::new(samples, &order, members.start..middle));
+        clusters.push(Cluster::new(samples, &order, middle..members.end));
+    }
+    let mut owners = vec![0; samples.len()];
+    for (number, cluster) in done.iter().chain(&clusters).enumerate() {
+        for &member in &order[cluster.members.clone()] {
+            owners[member as usize] = number as u8;
+        }
+    }
+    owners
+}
+
+/// Moves what is wanted to the front and says how many there are.
+fn partition<T>(items: &mut [T], wanted: impl Fn(&T) -> bool) -> usize {
+    let mut front = 0;
+    for k in 0..items.len() {
+        if wanted(&items[k]) {
+            items.swap(front, k);
+            front += 1;
+        }
+    }
+    front
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn samples(colours: impl IntoIterator<Item = [u8; 3]>) -> Vec<Sample> {
+        let sample =
+            |rgb: [u8; 3]| Sample { point: colour::point_of(rgb), rgb: rgb.map(f32::from), weight: 1.0 };
+        colours.into_iter().map(sample).collect()
+    }
+
+    #[test]
+    fn few_colours_are_all_kept() {
+        let colours = (0..200).map(|k| [k, k / 2, 255 - k]).collect::<Vec<_>>();
+        assert_eq!(Palette::of(&samples(colours.iter().copied()), 255).colours, colours);
+    }
+
+    #[test]
+    fn nearest_is_the_nearest() {
+        let scatter = |k: u32| {
+            let [a, b, c, _] = k.wrapping_mul(2_654_435_761).to_be_bytes();
+            [a, b, c]
+        };
+        let palette = Palette::of(&samples((0..5_000).map(scatter)), 256);
+        assert_eq!(palette.colours.len(), 256);
+        for k in 5_000..6_000 {
+            let point = colour::point_of(scatter(k));
+            let found = palette.nearest(&point, (k % 256) as u8);
+            let least = palette.points.iter().map(|p| colour::error(p, &point)).fold(f32::MAX, f32::min);
+            assert_eq!(colour::error(&palette.points[usize::from(found)], &point), least);
+        }
+    }
+}
