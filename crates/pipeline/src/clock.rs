@@ -1,0 +1,88 @@
+//! Time and chance, passed in: a step that asks these and nothing else can be replayed from a seed.
+
+use std::future::Future;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+/// Milliseconds since 1970-01-01T00:00:00Z.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Timestamp(pub u64);
+
+impl Timestamp {
+    /// How long before `self` that `earlier` lies; zero when it does not.
+    pub fn since(self, earlier: Timestamp) -> Duration {
+        Duration::from_millis(self.0.saturating_sub(earlier.0))
+    }
+
+    /// The moment `duration` after this one.
+    pub fn after(self, duration: Duration) -> Timestamp {
+        Timestamp(self.0.saturating_add(u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)))
+    }
+}
+
+/// A clock that one can also wait on.
+pub trait Clock: Send + Sync {
+    /// The time. It need not be exact: ages are compared with seconds of tolerance.
+    fn now(&self) -> Timestamp;
+
+    /// Waits for at least `duration`.
+    fn sleep(&self, duration: Duration) -> impl Future<Output = ()> + Send;
+}
+
+/// The machine's clock; needs a tokio runtime with its timer.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SystemClock;
+
+impl Clock for SystemClock {
+    #[expect(clippy::disallowed_methods, reason = "this is the one place where the machine's clock enters")]
+    fn now(&self) -> Timestamp {
+        let elapsed =
+            std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or(Duration::ZERO);
+        Timestamp(0).after(elapsed)
+    }
+
+    #[expect(clippy::disallowed_methods, reason = "this is the one place where the machine's clock enters")]
+    async fn sleep(&self, duration: Duration) {
+        tokio::time::sleep(duration).await;
+    }
+}
+
+/// A seeded source of chance (SplitMix64; Steele, Lea & Flood 2014). It spreads retries, it keeps no secrets.
+#[derive(Debug)]
+pub struct Randomness(AtomicU64);
+
+impl Randomness {
+    /// The same seed gives the same draws.
+    pub fn seeded(seed: u64) -> Self {
+        Randomness(AtomicU64::new(seed))
+    }
+
+    /// The next 64 random bits.
+    pub fn bits(&self) -> u64 {
+        let step = 0x9e37_79b9_7f4a_7c15_u64;
+        let mut z = self.0.fetch_add(step, Ordering::Relaxed).wrapping_add(step);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number below `bound`, 0 when `bound` is 0.
+    pub fn below(&self, bound: u64) -> u64 {
+        u64::try_from((u128::from(self.bits()) * u128::from(bound)) >> 64).unwrap_or(0)
+    }
+
+    /// A duration from zero up to `most`.
+    pub fn up_to(&self, most: Duration) -> Duration {
+        Duration::from_micros(
+            self.below(u64::try_from(most.as_micros()).unwrap_or(u64::MAX).saturating_add(1)),
+        )
+    }
+
+    /// True once in `of` draws.
+    pub fn one_in(&self, of: u64) -> bool {
+        self.below(of) == 0
+    }
+}

@@ -1,0 +1,113 @@
+//! What can go wrong in the pipeline, sorted by what the caller may do about it.
+
+use std::error::Error as StdError;
+
+/// A cause that came from outside: a store's client, a decoder.
+pub type Cause = Box<dyn StdError + Send + Sync + 'static>;
+
+/// The pipeline's errors. Each names the object's key where there is one.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// There is no such object (404). A conditional put answers so when the object that it should replace is gone.
+    #[error("{key} does not exist")]
+    NotFound {
+        /// The object's key.
+        key: String,
+    },
+    /// The condition of a put does not hold (412): someone was first, possibly oneself, when an answer was lost.
+    #[error("{key} is not as the write expected it")]
+    PreconditionFailed {
+        /// The object's key.
+        key: String,
+    },
+    /// Another write to the same object is under way (409): nothing was written, try again.
+    #[error("{key} is being written by someone else")]
+    Conflict {
+        /// The object's key.
+        key: String,
+    },
+    /// The store asks for patience (503, 429): nothing was done.
+    #[error("the store is busy: {key}")]
+    Throttled {
+        /// The object's key or the listing's prefix.
+        key: String,
+        /// What the store said.
+        source: Cause,
+    },
+    /// The answer was lost (timeout, broken connection, 500): the request may or may not have taken effect.
+    #[error("no answer from the store: {key}")]
+    Ambiguous {
+        /// The object's key or the listing's prefix.
+        key: String,
+        /// What the client saw.
+        source: Cause,
+    },
+    /// The store refuses for good: permissions, a missing bucket, a malformed request.
+    #[error("the store refuses {key}")]
+    Refused {
+        /// The object's key or the listing's prefix.
+        key: String,
+        /// What the store said.
+        source: Cause,
+    },
+    /// A key that is none of the pipeline's.
+    #[error("{key}: {problem}")]
+    Key {
+        /// The key as it came.
+        key: String,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+    /// An object of the pipeline's own that cannot be read back.
+    #[error("{key} cannot be read")]
+    Malformed {
+        /// The object's key.
+        key: String,
+        /// What the decoder says.
+        source: Cause,
+    },
+    /// A manifest that breaks its own rules was about to be written; it was not.
+    #[error("the manifest of {animation} would break the rule {rule}")]
+    Invariant {
+        /// The animation.
+        animation: String,
+        /// The rule's name.
+        rule: &'static str,
+    },
+    /// The work was stopped before the invocation's deadline.
+    #[error("out of time: {what}")]
+    OutOfTime {
+        /// What was being done.
+        what: String,
+    },
+}
+
+impl Error {
+    /// Someone else's write was first: read again, then decide anew.
+    pub fn is_conflict(&self) -> bool {
+        matches!(self, Error::PreconditionFailed { .. } | Error::Conflict { .. })
+    }
+
+    /// There is no such object.
+    pub fn is_not_found(&self) -> bool {
+        matches!(self, Error::NotFound { .. })
+    }
+
+    /// The same request may succeed later.
+    pub fn is_retryable(&self) -> bool {
+        matches!(self, Error::Conflict { .. } | Error::Throttled { .. } | Error::Ambiguous { .. })
+    }
+
+    /// Whether the request took effect is unknown.
+    pub fn is_ambiguous(&self) -> bool {
+        matches!(self, Error::Ambiguous { .. })
+    }
+
+    pub(crate) fn key(key: &str, problem: &'static str) -> Self {
+        Error::Key { key: key.to_owned(), problem }
+    }
+}
+
+/// What the pipeline's functions return.
+pub type Result<T, E = Error> = std::result::Result<T, E>;

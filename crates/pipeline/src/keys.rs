@@ -1,0 +1,564 @@
+//! What lies where in the bucket: every key that the pipeline reads or writes is parsed and formatted here, once.
+//!
+//! A key that parses is canonical: formatting it gives the same text back. `docs/pipeline.md` has the table.
+//!
+//! ```
+//! use rayfold_pipeline::keys::Key;
+//! let key: Key = "scripts/films/hello/0007.txt".parse()?;
+//! assert!(matches!(&key, Key::Script { animation, name }
+//!     if animation.as_str() == "films/hello" && name.as_str() == "0007"));
+//! assert_eq!(key.to_string(), "scripts/films/hello/0007.txt");
+//! # Ok::<(), rayfold_pipeline::Error>(())
+//! ```
+
+use std::fmt;
+use std::num::NonZeroU64;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use crate::store::ETag;
+use crate::{Error, Result};
+
+mod event;
+
+pub use event::decode_event_key;
+
+/// The longest key below `scripts/`, in bytes: S3 allows 1,024, and a receipt's key adds a tag to the script's.
+pub const LONGEST_SCRIPT_KEY: usize = 900;
+
+/// What the scripts' folder is called.
+pub const SCRIPTS: &str = "scripts/";
+/// What the manifests' folder is called.
+pub const MANIFESTS: &str = "manifests/";
+
+/// An animation's name: path segments joined by `/`, none of them empty, `.` or `..`.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Animation(String);
+
+/// A script's name within its animation: the file's name without `.txt`. Not empty, without `/`.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct ScriptName(String);
+
+/// Which pixels: a script's version and the version of the renderer that draws them.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Tag {
+    /// The script's version, its entity tag.
+    pub version: ETag,
+    /// The renderer's pixel version.
+    pub pixels: u32,
+}
+
+/// The place of a frame in a script with several, counted from 1; `None` when the script is one frame.
+pub type Part = Option<NonZeroU64>;
+
+/// What a manifest, a claim and a GIF stand for: 32 hexadecimal digits.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Generation(String);
+
+/// A key of the pipeline.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Key {
+    /// `scripts/<animation>/<name>.txt`
+    Script {
+        /// The animation.
+        animation: Animation,
+        /// The script.
+        name: ScriptName,
+    },
+    /// `scripts/<animation>/animation.json`
+    Settings {
+        /// The animation.
+        animation: Animation,
+    },
+    /// `parts/<animation>/<name>@<tag>/<number>.json`
+    Part {
+        /// The animation.
+        animation: Animation,
+        /// The script.
+        name: ScriptName,
+        /// The script's version.
+        tag: Tag,
+        /// Which of its frames.
+        number: NonZeroU64,
+    },
+    /// Below `frames/`: what came of a script, a part, or of the whole.
+    Receipt {
+        /// The animation.
+        animation: Animation,
+        /// Which receipt.
+        receipt: Receipt,
+    },
+    /// `manifests/<animation>.json`
+    Manifest {
+        /// The animation.
+        animation: Animation,
+    },
+    /// `assemblies/<animation>/<revision>-<generation>.json`
+    Claim {
+        /// The animation.
+        animation: Animation,
+        /// The manifest's revision that is claimed for.
+        revision: u64,
+        /// Its generation.
+        generation: Generation,
+    },
+    /// `retries/<animation>/<name>@<tag>/<attempt>`, of a part `retries/<animation>/<name>@<tag>/<number>/<attempt>`
+    Retry {
+        /// The animation.
+        animation: Animation,
+        /// The script.
+        name: ScriptName,
+        /// The script's version.
+        tag: Tag,
+        /// Which of its frames.
+        part: Part,
+        /// Counted from 1.
+        attempt: NonZeroU64,
+    },
+    /// `animations/<animation>.gif`
+    Gif {
+        /// The animation.
+        animation: Animation,
+    },
+}
+
+/// The part of a receipt's key below `frames/<animation>/`.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Receipt {
+    /// `<name>@<tag>.png`, of a part `<name>@<tag>/<number>.png`
+    Frame {
+        /// The script.
+        name: ScriptName,
+        /// Its version.
+        tag: Tag,
+        /// Which of its frames.
+        part: Part,
+    },
+    /// `<name>@<tag>.error.json`, of a part `<name>@<tag>/<number>.error.json`
+    Fault {
+        /// The script.
+        name: ScriptName,
+        /// Its version.
+        tag: Tag,
+        /// Which of its frames.
+        part: Part,
+    },
+    /// `<name>@<tag>.split-<k>`
+    Split {
+        /// The script.
+        name: ScriptName,
+        /// Its version.
+        tag: Tag,
+        /// How many frames it is.
+        count: NonZeroU64,
+    },
+    /// `@<generation>.error.json`: this set of frames gives no GIF.
+    Refusal {
+        /// The set.
+        generation: Generation,
+    },
+}
+
+impl Animation {
+    /// Checks a name.
+    pub fn new(name: &str) -> Result<Self> {
+        for segment in name.split('/') {
+            match segment {
+                "" => return Err(Error::key(name, "an animation's name has an empty segment")),
+                "." | ".." => return Err(Error::key(name, "an animation's name has a segment . or ..")),
+                _ => {}
+            }
+        }
+        let longest = LONGEST_SCRIPT_KEY - SCRIPTS.len() - "/a.txt".len();
+        if name.len() > longest {
+            return Err(Error::key(name, "an animation's name is too long"));
+        }
+        Ok(Animation(name.to_owned()))
+    }
+
+    /// The name.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// `scripts/<animation>/`
+    pub fn scripts(&self) -> String {
+        format!("{SCRIPTS}{self}/")
+    }
+
+    /// `frames/<animation>/`
+    pub fn frames(&self) -> String {
+        format!("frames/{self}/")
+    }
+
+    /// `retries/<animation>/`
+    pub fn retries(&self) -> String {
+        format!("retries/{self}/")
+    }
+
+    /// `parts/<animation>/`
+    pub fn parts(&self) -> String {
+        format!("parts/{self}/")
+    }
+
+    /// `manifests/<animation>.json`
+    pub fn manifest(&self) -> String {
+        format!("{MANIFESTS}{self}.json")
+    }
+
+    /// `animations/<animation>.gif`
+    pub fn gif(&self) -> String {
+        format!("animations/{self}.gif")
+    }
+
+    /// `scripts/<animation>/animation.json`
+    pub fn settings(&self) -> String {
+        format!("{SCRIPTS}{self}/animation.json")
+    }
+
+    /// `scripts/<animation>/<name>.txt`
+    pub fn script(&self, name: &ScriptName) -> String {
+        format!("{SCRIPTS}{self}/{name}.txt")
+    }
+
+    /// A key below `frames/<animation>/`.
+    pub fn receipt(&self, receipt: &Receipt) -> String {
+        format!("frames/{self}/{receipt}")
+    }
+}
+
+impl ScriptName {
+    /// Checks a name.
+    pub fn new(name: &str) -> Result<Self> {
+        if name.is_empty() {
+            return Err(Error::key(name, "the script has no name before its ending"));
+        }
+        if name.contains('/') {
+            return Err(Error::key(name, "a script's name holds no slash"));
+        }
+        Ok(ScriptName(name.to_owned()))
+    }
+
+    /// The name.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl Tag {
+    /// What the receipts of a script's version start with, whatever drew it: `<name>@<version>-p`.
+    pub fn receipts_of(name: &ScriptName, version: &ETag) -> String {
+        format!("{name}@{}-p", escape(version))
+    }
+
+    fn parse(text: &str) -> Option<Self> {
+        let (version, pixels) = text.rsplit_once("-p")?;
+        Some(Tag { version: unescape(version)?, pixels: canonical(pixels)? })
+    }
+}
+
+impl Generation {
+    /// Takes 32 hexadecimal digits in lower case.
+    pub fn new(text: &str) -> Result<Self> {
+        let digit = |byte: &u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(byte);
+        if text.len() != 32 || !text.as_bytes().iter().all(digit) {
+            return Err(Error::key(text, "a generation is 32 hexadecimal digits"));
+        }
+        Ok(Generation(text.to_owned()))
+    }
+
+    /// The digits.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl Key {
+    /// The animation that it belongs to.
+    pub fn animation(&self) -> &Animation {
+        match self {
+            Key::Script { animation, .. }
+            | Key::Settings { animation }
+            | Key::Part { animation, .. }
+            | Key::Receipt { animation, .. }
+            | Key::Manifest { animation }
+            | Key::Claim { animation, .. }
+            | Key::Retry { animation, .. }
+            | Key::Gif { animation } => animation,
+        }
+    }
+}
+
+impl FromStr for Key {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let unknown = || Error::key(text, "not a key of the pipeline");
+        let (folder, rest) = text.split_once('/').ok_or_else(unknown)?;
+        let key = match folder {
+            "scripts" => script(text, rest)?,
+            "parts" => {
+                let (animation, scripted, file) = beneath_tag(rest).ok_or_else(unknown)?;
+                let (name, tag) = name_and_tag(scripted).ok_or_else(unknown)?;
+                let number = file.strip_suffix(".json").and_then(canonical).ok_or_else(unknown)?;
+                Key::Part { animation: Animation::new(animation)?, name, tag, number }
+            }
+            "frames" => {
+                let (animation, receipt) = receipt(rest).ok_or_else(unknown)?;
+                Key::Receipt { animation: Animation::new(animation)?, receipt }
+            }
+            "manifests" => {
+                let animation = rest.strip_suffix(".json").ok_or_else(unknown)?;
+                Key::Manifest { animation: Animation::new(animation)? }
+            }
+            "assemblies" => {
+                let (animation, file) = rest.rsplit_once('/').ok_or_else(unknown)?;
+                let (revision, generation) =
+                    file.strip_suffix(".json").and_then(|stem| stem.split_once('-')).ok_or_else(unknown)?;
+                Key::Claim {
+                    animation: Animation::new(animation)?,
+                    revision: canonical(revision).ok_or_else(unknown)?,
+                    generation: Generation::new(generation)?,
+                }
+            }
+            "retries" => {
+                let (above, attempt) = rest.rsplit_once('/').ok_or_else(unknown)?;
+                let attempt = canonical(attempt).ok_or_else(unknown)?;
+                let (animation, last) = above.rsplit_once('/').ok_or_else(unknown)?;
+                let (animation, (name, tag), part) = match name_and_tag(last) {
+                    Some(found) => (animation, found, None),
+                    None => {
+                        let part = canonical(last).ok_or_else(unknown)?;
+                        let (animation, scripted) = animation.rsplit_once('/').ok_or_else(unknown)?;
+                        (animation, name_and_tag(scripted).ok_or_else(unknown)?, Some(part))
+                    }
+                };
+                Key::Retry { animation: Animation::new(animation)?, name, tag, part, attempt }
+            }
+            "animations" => {
+                let animation = rest.strip_suffix(".gif").ok_or_else(unknown)?;
+                Key::Gif { animation: Animation::new(animation)? }
+            }
+            _ => return Err(unknown()),
+        };
+        Ok(key)
+    }
+}
+
+impl FromStr for Receipt {
+    type Err = Error;
+
+    /// Reads the part of a key below `frames/<animation>/`.
+    fn from_str(text: &str) -> Result<Self> {
+        let unknown = || Error::key(text, "not a receipt");
+        match receipt(&format!("a/{text}")).ok_or_else(unknown)? {
+            ("a", receipt) => Ok(receipt),
+            _ => Err(unknown()),
+        }
+    }
+}
+
+fn script(text: &str, rest: &str) -> Result<Key> {
+    let Some((animation, file)) = rest.rsplit_once('/') else {
+        return Err(Error::key(
+            text,
+            "a script lies in a folder, which is the animation: scripts/<animation>/<name>.txt",
+        ));
+    };
+    if text.len() > LONGEST_SCRIPT_KEY {
+        return Err(Error::key(text, "the key is longer than 900 bytes"));
+    }
+    let animation = Animation::new(animation).map_err(|error| match error {
+        Error::Key { problem, .. } => Error::key(text, problem),
+        other => other,
+    })?;
+    if file == "animation.json" {
+        return Ok(Key::Settings { animation });
+    }
+    match file.strip_suffix(".txt") {
+        Some("") => Err(Error::key(text, "the script has no name before its ending")),
+        Some(name) => Ok(Key::Script { animation, name: ScriptName(name.to_owned()) }),
+        None => Err(Error::key(text, "neither a script (.txt) nor animation.json")),
+    }
+}
+
+/// `<animation>/<name>@<tag>/<file>`, cut at the slashes.
+fn beneath_tag(rest: &str) -> Option<(&str, &str, &str)> {
+    let (above, file) = rest.rsplit_once('/')?;
+    let (animation, scripted) = above.rsplit_once('/')?;
+    Some((animation, scripted, file))
+}
+
+fn name_and_tag(text: &str) -> Option<(ScriptName, Tag)> {
+    let (name, tag) = text.rsplit_once('@')?;
+    Some((ScriptName::new(name).ok()?, Tag::parse(tag)?))
+}
+
+fn receipt(rest: &str) -> Option<(&str, Receipt)> {
+    let (above, file) = rest.rsplit_once('/')?;
+    if file.contains('@') {
+        if let Some(generation) = file.strip_prefix('@').and_then(|f| f.strip_suffix(".error.json")) {
+            return Some((above, Receipt::Refusal { generation: Generation::new(generation).ok()? }));
+        }
+        let receipt = if let Some(stem) = file.strip_suffix(".png") {
+            let (name, tag) = name_and_tag(stem)?;
+            Receipt::Frame { name, tag, part: None }
+        } else if let Some(stem) = file.strip_suffix(".error.json") {
+            let (name, tag) = name_and_tag(stem)?;
+            Receipt::Fault { name, tag, part: None }
+        } else {
+            let (stem, count) = file.rsplit_once(".split-")?;
+            let (name, tag) = name_and_tag(stem)?;
+            Receipt::Split { name, tag, count: canonical(count)? }
+        };
+        return Some((above, receipt));
+    }
+    let (animation, scripted) = above.rsplit_once('/')?;
+    let (name, tag) = name_and_tag(scripted)?;
+    let receipt = match file.strip_suffix(".error.json") {
+        Some(number) => Receipt::Fault { name, tag, part: Some(canonical(number)?) },
+        None => Receipt::Frame { name, tag, part: Some(canonical(file.strip_suffix(".png")?)?) },
+    };
+    Some((animation, receipt))
+}
+
+/// A number whose text is the one way of writing it.
+fn canonical<N: FromStr + ToString>(text: &str) -> Option<N> {
+    text.parse().ok().filter(|number: &N| number.to_string() == text)
+}
+
+/// Letters, digits, `-` and `_` stay; other bytes of a tag become `~` and two hexadecimal digits.
+fn escape(etag: &ETag) -> String {
+    let mut text = String::new();
+    for &byte in etag.as_str().as_bytes() {
+        if byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_' {
+            text.push(char::from(byte));
+        } else {
+            text.push_str(&format!("~{byte:02x}"));
+        }
+    }
+    text
+}
+
+fn unescape(text: &str) -> Option<ETag> {
+    let mut bytes = Vec::with_capacity(text.len());
+    let mut rest = text.bytes();
+    while let Some(byte) = rest.next() {
+        match byte {
+            b'~' => {
+                let digits = [rest.next()?, rest.next()?];
+                bytes.push(u8::from_str_radix(std::str::from_utf8(&digits).ok()?, 16).ok()?);
+            }
+            byte => bytes.push(byte),
+        }
+    }
+    let etag = ETag::new(std::str::from_utf8(&bytes).ok()?);
+    (!etag.as_str().is_empty() && escape(&etag) == text).then_some(etag)
+}
+
+impl fmt::Display for Key {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Key::Script { animation, name } => f.write_str(&animation.script(name)),
+            Key::Settings { animation } => f.write_str(&animation.settings()),
+            Key::Part { animation, name, tag, number } => {
+                write!(f, "parts/{animation}/{name}@{tag}/{number}.json")
+            }
+            Key::Receipt { animation, receipt } => f.write_str(&animation.receipt(receipt)),
+            Key::Manifest { animation } => f.write_str(&animation.manifest()),
+            Key::Claim { animation, revision, generation } => {
+                write!(f, "assemblies/{animation}/{revision}-{generation}.json")
+            }
+            Key::Retry { animation, name, tag, part: None, attempt } => {
+                write!(f, "retries/{animation}/{name}@{tag}/{attempt}")
+            }
+            Key::Retry { animation, name, tag, part: Some(number), attempt } => {
+                write!(f, "retries/{animation}/{name}@{tag}/{number}/{attempt}")
+            }
+            Key::Gif { animation } => f.write_str(&animation.gif()),
+        }
+    }
+}
+
+impl fmt::Display for Receipt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Receipt::Frame { name, tag, part: None } => write!(f, "{name}@{tag}.png"),
+            Receipt::Frame { name, tag, part: Some(number) } => write!(f, "{name}@{tag}/{number}.png"),
+            Receipt::Fault { name, tag, part: None } => write!(f, "{name}@{tag}.error.json"),
+            Receipt::Fault { name, tag, part: Some(number) } => write!(f, "{name}@{tag}/{number}.error.json"),
+            Receipt::Split { name, tag, count } => write!(f, "{name}@{tag}.split-{count}"),
+            Receipt::Refusal { generation } => write!(f, "@{generation}.error.json"),
+        }
+    }
+}
+
+impl fmt::Display for Tag {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}-p{}", escape(&self.version), self.pixels)
+    }
+}
+
+impl fmt::Display for Animation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl fmt::Display for ScriptName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl fmt::Display for Generation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl TryFrom<String> for Animation {
+    type Error = Error;
+    fn try_from(name: String) -> Result<Self> {
+        Animation::new(&name)
+    }
+}
+
+impl TryFrom<String> for ScriptName {
+    type Error = Error;
+    fn try_from(name: String) -> Result<Self> {
+        ScriptName::new(&name)
+    }
+}
+
+impl TryFrom<String> for Generation {
+    type Error = Error;
+    fn try_from(text: String) -> Result<Self> {
+        Generation::new(&text)
+    }
+}
+
+impl From<Animation> for String {
+    fn from(animation: Animation) -> String {
+        animation.0
+    }
+}
+
+impl From<ScriptName> for String {
+    fn from(name: ScriptName) -> String {
+        name.0
+    }
+}
+
+impl From<Generation> for String {
+    fn from(generation: Generation) -> String {
+        generation.0
+    }
+}
+
+#[cfg(test)]
+mod tests;

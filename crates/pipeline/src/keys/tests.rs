@@ -1,0 +1,112 @@
+//! Keys parse, format back to themselves, and say what is wrong with them.
+
+use super::*;
+
+fn animation(name: &str) -> Animation {
+    Animation::new(name).unwrap()
+}
+
+fn tag(version: &str, pixels: u32) -> Tag {
+    Tag { version: ETag::new(version), pixels }
+}
+
+fn check(text: &str, expected: Key) {
+    assert_eq!(text.parse::<Key>().unwrap_or_else(|error| panic!("{text}: {error}")), expected, "{text}");
+    assert_eq!(expected.to_string(), text);
+}
+
+fn rejects(text: &str, expected: &str) {
+    match text.parse::<Key>() {
+        Err(Error::Key { problem, .. }) => assert_eq!(problem, expected, "{text}"),
+        other => panic!("{text}: {other:?}"),
+    }
+}
+
+#[test]
+fn every_kind_of_key_reads_back() {
+    let name = ScriptName::new("00 1@x").unwrap();
+    let number = NonZeroU64::new(12).unwrap();
+    let generation = Generation::new(&"0a".repeat(16)).unwrap();
+    let a = || animation("films/ä+b");
+    let t = || tag("\"d41d8cd9-2\"", 3);
+    check("scripts/films/ä+b/00 1@x.txt", Key::Script { animation: a(), name: name.clone() });
+    check("scripts/films/ä+b/animation.json", Key::Settings { animation: a() });
+    check(
+        "parts/films/ä+b/00 1@x@d41d8cd9-2-p3/12.json",
+        Key::Part { animation: a(), name: name.clone(), tag: t(), number },
+    );
+    for (text, receipt) in [
+        ("00 1@x@d41d8cd9-2-p3.png", Receipt::Frame { name: name.clone(), tag: t(), part: None }),
+        ("00 1@x@d41d8cd9-2-p3/12.png", Receipt::Frame { name: name.clone(), tag: t(), part: Some(number) }),
+        ("00 1@x@d41d8cd9-2-p3.error.json", Receipt::Fault { name: name.clone(), tag: t(), part: None }),
+        (
+            "00 1@x@d41d8cd9-2-p3/12.error.json",
+            Receipt::Fault { name: name.clone(), tag: t(), part: Some(number) },
+        ),
+        ("00 1@x@d41d8cd9-2-p3.split-12", Receipt::Split { name: name.clone(), tag: t(), count: number }),
+        ("@0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a.error.json", Receipt::Refusal { generation: generation.clone() }),
+    ] {
+        assert_eq!(text.parse::<Receipt>().unwrap(), receipt);
+        check(&format!("frames/films/ä+b/{text}"), Key::Receipt { animation: a(), receipt });
+    }
+    check("manifests/films/ä+b.json", Key::Manifest { animation: a() });
+    check(
+        "assemblies/films/ä+b/17-0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a.json",
+        Key::Claim { animation: a(), revision: 17, generation },
+    );
+    let retry = |part| Key::Retry { animation: a(), name: name.clone(), tag: t(), part, attempt: number };
+    check("retries/films/ä+b/00 1@x@d41d8cd9-2-p3/12", retry(None));
+    check("retries/films/ä+b/00 1@x@d41d8cd9-2-p3/12/12", retry(Some(number)));
+    check("animations/films/ä+b.gif", Key::Gif { animation: a() });
+}
+
+#[test]
+fn tags_may_hold_anything() {
+    for version in ["a", "a-p1", "ü/ä.png", "~", "x@y", "a b\n"] {
+        let tag = tag(version, 0);
+        assert_eq!(Tag::parse(&tag.to_string()), Some(tag.clone()), "{version}");
+        assert!(!tag.to_string().contains(['/', '@', '.', ' ']), "{tag}");
+    }
+}
+
+#[test]
+fn script_keys_say_what_is_wrong() {
+    rejects("scripts/a//b.txt", "an animation's name has an empty segment");
+    rejects("scripts//b.txt", "an animation's name has an empty segment");
+    rejects("scripts/./b.txt", "an animation's name has a segment . or ..");
+    rejects("scripts/a/../b.txt", "an animation's name has a segment . or ..");
+    rejects("scripts/a/.txt", "the script has no name before its ending");
+    rejects("scripts/a/b.jpg", "neither a script (.txt) nor animation.json");
+    rejects("scripts/a/", "neither a script (.txt) nor animation.json");
+    rejects(
+        "scripts/b.txt",
+        "a script lies in a folder, which is the animation: scripts/<animation>/<name>.txt",
+    );
+    rejects("other/a/b.txt", "not a key of the pipeline");
+    rejects("frames/a/b.png", "not a key of the pipeline");
+    rejects("frames/a/b@c-p1/01.png", "not a key of the pipeline");
+    rejects("assemblies/a/+1-x.json", "not a key of the pipeline");
+}
+
+#[test]
+fn script_keys_end_at_900_bytes() {
+    let at_the_edge = format!("scripts/a/{}.txt", "x".repeat(900 - 14));
+    assert_eq!(at_the_edge.len(), LONGEST_SCRIPT_KEY);
+    let Key::Script { animation, name } = at_the_edge.parse().unwrap() else { panic!() };
+    rejects(&format!("scripts/a/{}.txt", "x".repeat(900 - 13)), "the key is longer than 900 bytes");
+
+    let most = NonZeroU64::new(99_999_999).unwrap();
+    let tag = tag(&format!("{}-10000", "0".repeat(32)), 9_999);
+    let receipt = Receipt::Fault { name: name.clone(), tag: tag.clone(), part: Some(most) };
+    let retry = Key::Retry { animation: animation.clone(), name, tag, part: Some(most), attempt: most };
+    for key in [animation.receipt(&receipt), retry.to_string()] {
+        assert!(key.len() <= 1024, "{} bytes", key.len());
+    }
+}
+
+#[test]
+fn event_keys_are_form_encoded() {
+    assert_eq!(decode_event_key("scripts/a%2Fb/x%2By+z.txt").unwrap(), "scripts/a/b/x+y z.txt");
+    assert_eq!(decode_event_key("100%25").unwrap(), "100%");
+    assert!(decode_event_key("%ff").is_err());
+}

@@ -1,0 +1,244 @@
+//! A bucket as the protocol sees it: objects under keys, conditional puts, listings.
+//!
+//! The trait is what the protocol needs of S3 and no more; it knows nothing of animations. Every call is one request
+//! (an [`Upload`] is several), and every `await` of one is a point at which an invocation may be killed.
+//!
+//! What every store guarantees, and [`conformance`] holds:
+//!
+//! - A read or listing that starts after a put was answered sees that put, or a later one.
+//! - An object appears whole or not at all.
+//! - [`Condition::IfAbsent`] and [`Condition::IfMatch`] are atomic: of two writers with the same condition one wins.
+//! - Listings come in the byte order of the keys.
+//!
+//! A store may repeat a request whose answer was lost. A conditional put then meets its own success and answers
+//! [`Error::PreconditionFailed`](crate::Error::PreconditionFailed); callers must be ready for that anyway.
+//!
+//! ```
+//! use rayfold_pipeline::store::{MemoryStore, PutOptions, Store};
+//! # #[tokio::main(flavor = "current_thread")] async fn main() -> rayfold_pipeline::Result<()> {
+//! let store = MemoryStore::new(rayfold_pipeline::SystemClock);
+//! store.put("a/b", "first".into(), PutOptions::if_absent()).await?;
+//! let again = store.put("a/b", "second".into(), PutOptions::if_absent()).await;
+//! assert!(again.unwrap_err().is_conflict());
+//! assert_eq!(store.get("a/b").await?.body, "first");
+//! # Ok(()) }
+//! ```
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::future::Future;
+use std::ops::Range;
+
+use bytes::Bytes;
+use serde::{Deserialize, Serialize};
+
+use crate::Result;
+use crate::clock::Timestamp;
+
+mod bucket;
+#[cfg(any(test, feature = "conformance"))]
+pub mod conformance;
+mod memory;
+
+pub use bucket::Bucket;
+pub use memory::{MemoryStore, MemoryUpload};
+
+/// The most names that a store returns in one page of a listing.
+pub const PAGE: usize = 1000;
+
+/// An object's entity tag, without the quotes. Opaque: equal tags of one key mean equal bodies, no more.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct ETag(String);
+
+impl ETag {
+    /// Takes the tag as a store gives it, with or without quotes.
+    pub fn new(text: &str) -> Self {
+        ETag(text.trim_matches('"').to_owned())
+    }
+
+    /// The tag without quotes.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Display for ETag {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// User metadata of an object: lower-case ASCII names without prefix, ASCII values, 2 KB together.
+pub type Metadata = BTreeMap<String, String>;
+
+/// What a store says of an object without its body.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ObjectInfo {
+    /// Identifies the body.
+    pub etag: ETag,
+    /// Bytes of the whole body, also when only a range of it was read.
+    pub size: u64,
+    /// When it was put, by the store's clock (whole seconds on S3).
+    pub modified: Timestamp,
+    /// As it was put.
+    pub metadata: Metadata,
+}
+
+/// An object, or a range of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Object {
+    /// All but the body.
+    pub info: ObjectInfo,
+    /// The bytes that were asked for.
+    pub body: Bytes,
+}
+
+/// When a put takes effect.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Condition {
+    /// In any case; replaces what is there.
+    #[default]
+    Always,
+    /// Only while there is no such object (`If-None-Match: *`); else `PreconditionFailed`.
+    IfAbsent,
+    /// Only while the object has this tag (`If-Match`); else `PreconditionFailed`, or `NotFound` when it is gone.
+    IfMatch(ETag),
+}
+
+/// How to put an object.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PutOptions {
+    /// When to.
+    pub condition: Condition,
+    /// Its media type.
+    pub content_type: &'static str,
+    /// Its user metadata.
+    pub metadata: Metadata,
+}
+
+impl PutOptions {
+    /// Puts in any case.
+    pub fn always() -> Self {
+        PutOptions {
+            condition: Condition::Always,
+            content_type: "application/octet-stream",
+            metadata: Metadata::new(),
+        }
+    }
+
+    /// Puts only what is not there.
+    pub fn if_absent() -> Self {
+        PutOptions { condition: Condition::IfAbsent, ..Self::always() }
+    }
+
+    /// Replaces only this version.
+    pub fn if_match(etag: ETag) -> Self {
+        PutOptions { condition: Condition::IfMatch(etag), ..Self::always() }
+    }
+
+    /// The same with this media type.
+    pub fn content_type(self, content_type: &'static str) -> Self {
+        PutOptions { content_type, ..self }
+    }
+
+    /// The same with one more entry of metadata.
+    pub fn metadata(mut self, name: &str, value: &str) -> Self {
+        self.metadata.insert(name.to_owned(), value.to_owned());
+        self
+    }
+}
+
+/// A listing, or where to go on with one.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct ListRequest {
+    /// Only keys that start so.
+    pub prefix: String,
+    /// Keys with a further `/` after the prefix are rolled up into one entry of `prefixes`.
+    pub delimiter: bool,
+    /// Only keys after this one, in byte order.
+    pub start_after: Option<String>,
+    /// [`ListPage::next`] of the page before.
+    pub continuation: Option<String>,
+}
+
+impl ListRequest {
+    /// All keys below a prefix.
+    pub fn all(prefix: impl Into<String>) -> Self {
+        ListRequest { prefix: prefix.into(), ..Self::default() }
+    }
+
+    /// The keys and the folders right below a prefix.
+    pub fn level(prefix: impl Into<String>) -> Self {
+        ListRequest { delimiter: true, ..Self::all(prefix) }
+    }
+}
+
+/// An object in a listing.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Listed {
+    /// Its key.
+    pub key: String,
+    /// Identifies its body.
+    pub etag: ETag,
+    /// Bytes of its body.
+    pub size: u64,
+    /// When it was put, by the store's clock.
+    pub modified: Timestamp,
+}
+
+/// Up to [`PAGE`] entries of a listing.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct ListPage {
+    /// Objects, in the byte order of their keys.
+    pub objects: Vec<Listed>,
+    /// Rolled-up prefixes with their closing `/`, in byte order.
+    pub prefixes: Vec<String>,
+    /// Where the listing goes on; none at its end.
+    pub next: Option<String>,
+}
+
+/// A bucket. See the [module](self) for what it guarantees.
+pub trait Store: Send + Sync {
+    /// An object being written piece by piece.
+    type Upload: Upload;
+
+    /// Reads an object.
+    fn get(&self, key: &str) -> impl Future<Output = Result<Object>> + Send;
+
+    /// Reads the bytes `range` of an object; fewer when the object ends before. The range starts inside the object
+    /// or at 0.
+    fn get_range(&self, key: &str, range: Range<u64>) -> impl Future<Output = Result<Object>> + Send;
+
+    /// Reads all but the body.
+    fn head(&self, key: &str) -> impl Future<Output = Result<ObjectInfo>> + Send;
+
+    /// Writes an object whole.
+    fn put(&self, key: &str, body: Bytes, options: PutOptions) -> impl Future<Output = Result<ETag>> + Send;
+
+    /// Removes an object; it is no error that there is none.
+    fn delete(&self, key: &str) -> impl Future<Output = Result<()>> + Send;
+
+    /// Reads one page of a listing.
+    fn list(&self, request: ListRequest) -> impl Future<Output = Result<ListPage>> + Send;
+
+    /// Begins an object that is too large to hold in memory. Nothing is visible before [`Upload::finish`], where
+    /// the condition is checked.
+    fn upload(&self, key: &str, options: PutOptions) -> impl Future<Output = Result<Self::Upload>> + Send;
+}
+
+/// An object being written piece by piece, with memory that does not grow with its size.
+///
+/// It ends with [`finish`](Upload::finish) or [`abort`](Upload::abort); one that is merely dropped, as by a killed
+/// process, leaves nothing visible, only parts for the bucket's lifecycle rule to clear.
+pub trait Upload: Send {
+    /// Adds bytes, of any length. The store gathers them into parts of the size that it likes.
+    fn write(&mut self, bytes: Bytes) -> impl Future<Output = Result<()>> + Send;
+
+    /// Makes the object visible, under the condition that the upload began with. When that does not hold the upload
+    /// is aborted and the error is that of a conditional put.
+    fn finish(self) -> impl Future<Output = Result<ETag>> + Send;
+
+    /// Gives up; nothing becomes visible.
+    fn abort(self) -> impl Future<Output = Result<()>> + Send;
+}

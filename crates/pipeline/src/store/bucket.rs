@@ -1,0 +1,119 @@
+//! A bucket's contents and rules as a plain value, one request at a time: what the memory store and the simulation
+//! share. It has no clock: every write is told the time.
+
+use std::collections::BTreeMap;
+use std::ops::{Bound, Range};
+
+use bytes::Bytes;
+use sha2::{Digest, Sha256};
+
+use super::{Condition, ETag, ListPage, ListRequest, Listed, Object, ObjectInfo, PAGE, PutOptions};
+use crate::clock::Timestamp;
+use crate::{Error, Result};
+
+/// Objects by key.
+#[derive(Debug, Clone, Default)]
+pub struct Bucket {
+    objects: BTreeMap<String, Object>,
+}
+
+impl Bucket {
+    /// Reads an object.
+    pub fn get(&self, key: &str) -> Result<Object> {
+        self.objects.get(key).cloned().ok_or_else(|| Error::NotFound { key: key.to_owned() })
+    }
+
+    /// Reads a range of an object.
+    pub fn get_range(&self, key: &str, range: Range<u64>) -> Result<Object> {
+        let Object { info, body } = self.get(key)?;
+        let at = |offset: u64| usize::try_from(offset).unwrap_or(usize::MAX).min(body.len());
+        let body = body.slice(at(range.start)..at(range.end.max(range.start)));
+        Ok(Object { info, body })
+    }
+
+    /// Reads all but the body.
+    pub fn head(&self, key: &str) -> Result<ObjectInfo> {
+        self.get(key).map(|object| object.info)
+    }
+
+    /// Writes an object whole.
+    pub fn put(&mut self, now: Timestamp, key: &str, body: Bytes, options: PutOptions) -> Result<ETag> {
+        let failed = || Error::PreconditionFailed { key: key.to_owned() };
+        match (&options.condition, self.objects.get(key)) {
+            (Condition::IfAbsent, Some(_)) => return Err(failed()),
+            (Condition::IfMatch(_), None) => return Err(Error::NotFound { key: key.to_owned() }),
+            (Condition::IfMatch(etag), Some(object)) if object.info.etag != *etag => return Err(failed()),
+            _ => {}
+        }
+        let etag = etag_of(&body);
+        let info = ObjectInfo {
+            etag: etag.clone(),
+            size: body.len() as u64,
+            modified: now,
+            metadata: options.metadata,
+        };
+        self.objects.insert(key.to_owned(), Object { info, body });
+        Ok(etag)
+    }
+
+    /// Removes an object; says whether there was one.
+    pub fn delete(&mut self, key: &str) -> bool {
+        self.objects.remove(key).is_some()
+    }
+
+    /// Reads one page of a listing.
+    pub fn list(&self, request: &ListRequest) -> ListPage {
+        let mut page = ListPage::default();
+        let mut from = match (&request.continuation, &request.start_after) {
+            (Some(token), _) | (None, Some(token)) if *token >= request.prefix => {
+                Bound::Excluded(token.clone())
+            }
+            _ => Bound::Included(request.prefix.clone()),
+        };
+        while let Some((key, object)) = self.objects.range::<String, _>((from, Bound::Unbounded)).next() {
+            let Some(rest) = key.strip_prefix(&request.prefix) else { break };
+            if page.objects.len() + page.prefixes.len() == PAGE {
+                page.next = Some(match page.prefixes.last() {
+                    Some(prefix) if page.objects.last().is_none_or(|object| object.key < *prefix) => {
+                        end_of(prefix)
+                    }
+                    _ => page.objects.last().map(|object| object.key.clone()).unwrap_or_default(),
+                });
+                break;
+            }
+            match rest.find('/').filter(|_| request.delimiter) {
+                Some(slash) => {
+                    let prefix = &key[..=request.prefix.len() + slash];
+                    page.prefixes.push(prefix.to_owned());
+                    from = Bound::Excluded(end_of(prefix));
+                }
+                None => {
+                    page.objects.push(Listed {
+                        key: key.clone(),
+                        etag: object.info.etag.clone(),
+                        size: object.info.size,
+                        modified: object.info.modified,
+                    });
+                    from = Bound::Excluded(key.clone());
+                }
+            }
+        }
+        page
+    }
+
+    /// All keys, in byte order.
+    pub fn keys(&self) -> impl Iterator<Item = &str> {
+        self.objects.keys().map(String::as_str)
+    }
+}
+
+/// A text after every key below `prefix`, which ends in `/`, and before every other later key.
+fn end_of(prefix: &str) -> String {
+    format!("{prefix}{}", char::MAX)
+}
+
+/// Depends on the body alone, as S3's does.
+fn etag_of(body: &[u8]) -> ETag {
+    let digest = Sha256::digest(body);
+    ETag(digest.iter().take(16).map(|byte| format!("{byte:02x}")).collect())
+}
