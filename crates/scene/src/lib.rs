@@ -1,10 +1,36 @@
 //! Scene scripts to typed scenes and back, with every diagnostic.
 //!
 //! Knows no other crate of the project and does no I/O: text comes in, trees and diagnostics go out.
+//!
+//! ```
+//! use rayfold_scene::{Limits, parse};
+//!
+//! let parsed = parse("red.txt", b"Screen 4 3\nSphere 1 0 0 -5 1 0 0 0 0 0\nTrace", &Limits::default());
+//! assert_eq!(parsed.script.unwrap().frame_count(), 1);
+//!
+//! let parsed = parse("red.txt", b"Screen 4 3\nSpere 1 0 0 -5 1 0 0 0 0 0\nTrace", &Limits::default());
+//! assert!(parsed.script.is_none());
+//! assert_eq!(parsed.diagnostics[0].help.as_deref(), Some("did you mean `Sphere`?"));
+//! ```
 
+pub mod diagnostic;
+mod limits;
 pub mod model;
+mod natural;
+mod parse;
+mod script;
+mod settings;
+mod shared_slice;
+mod write;
 
+pub use diagnostic::{Code, Diagnostic, Severity};
+pub use limits::Limits;
 pub use model::{
-    Camera, Cuboid, DirectionalLight, InvalidValue, Light, Material, Object, Pinhole, Scene, Screen, Sphere,
-    Triangle,
+    Camera, Cuboid, DirectionalLight, InvalidValue, Light, Material, Object, Parameter, Pinhole, Scene,
+    Screen, Sphere, Triangle,
 };
+pub use natural::natural_cmp;
+pub use parse::{Parsed, parse};
+pub use script::Script;
+pub use settings::{AnimationSettings, ParsedSettings, parse_settings};
+pub use shared_slice::SharedSlice;

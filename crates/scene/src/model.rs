@@ -4,31 +4,111 @@
 //! accessors. Lengths are world units, colours are display values (0 black, 1 white, unclamped), positions and
 //! directions are right-handed with y up on the screen. All numbers are finite.
 
-use std::sync::Arc;
+use std::fmt;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3Swizzles};
 
-/// Why a value cannot be part of a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+use crate::shared_slice::SharedSlice;
+
+/// Why a value cannot be part of a scene or of an animation's settings.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum InvalidValue {
     /// A component is infinite or not a number.
     #[error("{0} must be finite")]
-    NotFinite(&'static str),
+    NotFinite(Parameter),
     /// A length that must be positive is zero or negative.
     #[error("{0} must be greater than zero")]
-    NotPositive(&'static str),
+    NotPositive(Parameter),
     /// A direction has no length.
     #[error("{0} must not be zero")]
-    ZeroDirection(&'static str),
+    ZeroDirection(Parameter),
     /// Gaze and view-up span no plane.
-    #[error("gaze and up must not be parallel")]
+    #[error("the gaze and the view-up must not be parallel")]
     GazeParallelToUp,
-    /// The window has no width or no height.
-    #[error("the window must not be empty: {0}")]
-    EmptyWindow(&'static str),
-    /// The image has no pixels.
+    /// The window has no width: au equals bu.
+    #[error("the window must not be empty: au equals bu")]
+    EmptyWindowWidth,
+    /// The window has no height: av equals bv.
+    #[error("the window must not be empty: av equals bv")]
+    EmptyWindowHeight,
+    /// A count is zero.
     #[error("{0} must be at least 1")]
-    NoPixels(&'static str),
+    Zero(Parameter),
+    /// A number lies outside the range that makes sense for it.
+    #[error("{0} must be from {1} to {2}")]
+    OutOfRange(Parameter, f64, f64),
+    /// A triangle or a box was given a mirror coefficient, which the language has for spheres only.
+    #[error("only a sphere can have a mirror coefficient")]
+    MirrorOnFlat,
+}
+
+/// What an [`InvalidValue`] is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Parameter {
+    /// nx of `Screen`.
+    ScreenWidth,
+    /// ny of `Screen`.
+    ScreenHeight,
+    /// Colour of a ray that hits nothing.
+    Background,
+    /// Where the rays of a pinhole camera start.
+    Eye,
+    /// Direction of the camera's gaze.
+    Gaze,
+    /// The camera's view-up.
+    Up,
+    /// Distance of the camera's window from the eye.
+    WindowDistance,
+    /// Corner (au, av) or (bu, bv) of the camera's window.
+    WindowCorner,
+    /// Radius of a sphere.
+    Radius,
+    /// Centre of a sphere.
+    Center,
+    /// A corner of a triangle.
+    Vertex,
+    /// A corner of a box.
+    Corner,
+    /// What a surface shows without light.
+    Ambient,
+    /// What a surface scatters.
+    Diffuse,
+    /// What a surface mirrors.
+    Mirror,
+    /// Colour of a light.
+    LightColor,
+    /// The direction in which a light travels.
+    LightDirection,
+    /// How many frames an animation waits for.
+    FrameCount,
+    /// Frames a second.
+    FrameRate,
+}
+
+impl fmt::Display for Parameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::ScreenWidth => "the width nx",
+            Self::ScreenHeight => "the height ny",
+            Self::Background => "the background",
+            Self::Eye => "the eye",
+            Self::Gaze => "the gaze",
+            Self::Up => "the view-up",
+            Self::WindowDistance => "the window's distance s",
+            Self::WindowCorner => "the window's corner",
+            Self::Radius => "the radius",
+            Self::Center => "the centre",
+            Self::Vertex => "the vertex",
+            Self::Corner => "the corner",
+            Self::Ambient => "the ambient coefficient",
+            Self::Diffuse => "the diffuse coefficient",
+            Self::Mirror => "the mirror coefficient",
+            Self::LightColor => "the light's colour",
+            Self::LightDirection => "the light's direction",
+            Self::FrameCount => "`frames`",
+            Self::FrameRate => "`fps`",
+        })
+    }
 }
 
 /// Everything that a frame is drawn from.
@@ -43,15 +123,21 @@ pub struct Scene {
     /// Colour of a ray that hits nothing, each channel in 0..=1.
     background: DVec3,
     /// In the order of the script: of hits at the same distance the first object wins.
-    pub objects: Arc<Vec<Object>>,
+    pub objects: SharedSlice<Object>,
     /// In the order of the script, which is the order of summation.
-    pub lights: Arc<Vec<Light>>,
+    pub lights: SharedSlice<Light>,
 }
 
 impl Scene {
     /// An empty scene on a black background.
     pub fn new(screen: Screen, camera: Camera) -> Self {
-        Self { screen, camera, background: DVec3::ZERO, objects: Arc::default(), lights: Arc::default() }
+        Self {
+            screen,
+            camera,
+            background: DVec3::ZERO,
+            objects: SharedSlice::default(),
+            lights: SharedSlice::default(),
+        }
     }
 
     /// Colour of a ray that hits nothing, each channel in 0..=1.
@@ -64,8 +150,13 @@ impl Scene {
     /// # Errors
     /// When a channel is not finite.
     pub fn set_background(&mut self, color: DVec3) -> Result<(), InvalidValue> {
-        self.background = finite("background", color)?.clamp(DVec3::ZERO, DVec3::ONE);
+        self.background = finite(Parameter::Background, color)?.clamp(DVec3::ZERO, DVec3::ONE);
         Ok(())
+    }
+
+    /// Sets a background that was clamped before.
+    pub(crate) fn restore_background(&mut self, color: DVec3) {
+        self.background = color;
     }
 }
 
@@ -81,10 +172,10 @@ impl Screen {
     /// When a side is zero.
     pub fn new(width: u32, height: u32) -> Result<Self, InvalidValue> {
         if width == 0 {
-            return Err(InvalidValue::NoPixels("nx"));
+            return Err(InvalidValue::Zero(Parameter::ScreenWidth));
         }
         if height == 0 {
-            return Err(InvalidValue::NoPixels("ny"));
+            return Err(InvalidValue::Zero(Parameter::ScreenHeight));
         }
         Ok(Self { width, height })
     }
@@ -142,22 +233,40 @@ impl Pinhole {
         lower_left: DVec2,
         upper_right: DVec2,
     ) -> Result<Self, InvalidValue> {
-        finite("eye", eye)?;
-        direction("gaze", gaze)?;
-        direction("up", up)?;
-        positive("window distance s", distance)?;
-        finite("window corner au, av", lower_left.extend(0.0))?;
-        finite("window corner bu, bv", upper_right.extend(0.0))?;
-        if lower_left.x == upper_right.x {
-            return Err(InvalidValue::EmptyWindow("au equals bu"));
+        Self::checked(eye, gaze, up, distance, lower_left, upper_right).map_err(|faults| faults[0])
+    }
+
+    /// As [`Pinhole::new`], but says everything that is wrong.
+    pub(crate) fn checked(
+        eye: DVec3,
+        gaze: DVec3,
+        up: DVec3,
+        distance: f64,
+        lower_left: DVec2,
+        upper_right: DVec2,
+    ) -> Result<Self, Vec<InvalidValue>> {
+        let (a, b) = (lower_left, upper_right);
+        let gaze_and_up = [direction(Parameter::Gaze, gaze), direction(Parameter::Up, up)];
+        let parallel =
+            gaze_and_up.iter().all(Result::is_ok) && unit(up).cross(unit(gaze)).length() < PARALLEL;
+        let faults: Vec<_> = gaze_and_up
+            .into_iter()
+            .chain([
+                finite(Parameter::Eye, eye),
+                positive(Parameter::WindowDistance, distance).map(|_| eye),
+                finite(Parameter::WindowCorner, a.extend(0.0)),
+                finite(Parameter::WindowCorner, b.extend(0.0)),
+            ])
+            .filter_map(Result::err)
+            .chain(parallel.then_some(InvalidValue::GazeParallelToUp))
+            .chain((a.x == b.x).then_some(InvalidValue::EmptyWindowWidth))
+            .chain((a.y == b.y).then_some(InvalidValue::EmptyWindowHeight))
+            .collect();
+        if faults.is_empty() {
+            Ok(Self { eye, gaze, up, distance, lower_left, upper_right })
+        } else {
+            Err(faults)
         }
-        if lower_left.y == upper_right.y {
-            return Err(InvalidValue::EmptyWindow("av equals bv"));
-        }
-        if unit(up).cross(unit(gaze)).length() < PARALLEL {
-            return Err(InvalidValue::GazeParallelToUp);
-        }
-        Ok(Self { eye, gaze, up, distance, lower_left, upper_right })
     }
 
     /// Where the rays start.
@@ -237,8 +346,8 @@ impl Sphere {
     /// # Errors
     /// When the radius is not positive or a number is not finite.
     pub fn new(radius: f64, center: DVec3, material: Material) -> Result<Self, InvalidValue> {
-        positive("radius", radius)?;
-        finite("centre", center)?;
+        positive(Parameter::Radius, radius)?;
+        finite(Parameter::Center, center)?;
         Ok(Self { radius, center, material })
     }
 
@@ -267,12 +376,27 @@ pub struct Triangle {
 
 impl Triangle {
     /// # Errors
-    /// When a number is not finite.
+    /// When a number is not finite or the material mirrors.
     pub fn new(vertices: [DVec3; 3], material: Material) -> Result<Self, InvalidValue> {
-        finite("vertex u", vertices[0])?;
-        finite("vertex v", vertices[1])?;
-        finite("vertex w", vertices[2])?;
+        finite(Parameter::Vertex, vertices[0])?;
+        finite(Parameter::Vertex, vertices[1])?;
+        finite(Parameter::Vertex, vertices[2])?;
+        matte(&material)?;
         Ok(Self { vertices, material })
+    }
+
+    /// Whether it has no area: its vertices lie on a line or coincide, decided exactly.
+    pub fn is_degenerate(&self) -> bool {
+        let [u, v, w] = self.vertices;
+        // Each axis gets a power of two of its own, which keeps points on a line on a line, so that the products of
+        // the predicate neither overflow nor vanish.
+        let scale = u.abs().max(v.abs()).max(w.abs()).map(to_unit_scale);
+        let [u, v, w] = [u, v, w].map(|p| p * scale);
+        let area = |x: fn(DVec3) -> DVec2| {
+            let [a, b, c] = [x(u), x(v), x(w)].map(|p| robust::Coord { x: p.x, y: p.y });
+            robust::orient2d(a, b, c)
+        };
+        area(|p| p.truncate()) == 0.0 && area(|p| p.zy()) == 0.0 && area(|p| p.xz()) == 0.0
     }
 
     /// u, v, w in the order of the script.
@@ -297,10 +421,11 @@ impl Cuboid {
     /// From any two opposite corners.
     ///
     /// # Errors
-    /// When a number is not finite.
+    /// When a number is not finite or the material mirrors.
     pub fn new(corners: [DVec3; 2], material: Material) -> Result<Self, InvalidValue> {
-        finite("corner u", corners[0])?;
-        finite("corner v", corners[1])?;
+        finite(Parameter::Corner, corners[0])?;
+        finite(Parameter::Corner, corners[1])?;
+        matte(&material)?;
         Ok(Self { corners, material })
     }
 
@@ -337,9 +462,9 @@ impl Material {
     /// # Errors
     /// When a number is not finite.
     pub fn new(ambient: DVec3, diffuse: DVec3, mirror: DVec3) -> Result<Self, InvalidValue> {
-        finite("ambient coefficient", ambient)?;
-        finite("diffuse coefficient", diffuse)?;
-        finite("mirror coefficient", mirror)?;
+        finite(Parameter::Ambient, ambient)?;
+        finite(Parameter::Diffuse, diffuse)?;
+        finite(Parameter::Mirror, mirror)?;
         Ok(Self { ambient, diffuse, mirror })
     }
 
@@ -379,8 +504,8 @@ impl DirectionalLight {
     /// # Errors
     /// When the direction is zero or a number is not finite.
     pub fn new(color: DVec3, direction: DVec3) -> Result<Self, InvalidValue> {
-        finite("light colour", color)?;
-        self::direction("light direction", direction)?;
+        finite(Parameter::LightColor, color)?;
+        self::direction(Parameter::LightDirection, direction)?;
         Ok(Self { color, direction })
     }
 
@@ -409,11 +534,20 @@ pub fn unit(v: DVec3) -> DVec3 {
     scaled / scaled.length()
 }
 
-fn finite(name: &'static str, v: DVec3) -> Result<DVec3, InvalidValue> {
+/// The power of two that brings a positive `largest` to 1..2; 1 for zero.
+fn to_unit_scale(largest: f64) -> f64 {
+    if largest == 0.0 {
+        return 1.0;
+    }
+    let exponent = ((largest.to_bits() >> 52) & 0x7ff) as i32 - 1023;
+    2f64.powi(-exponent)
+}
+
+fn finite(name: Parameter, v: DVec3) -> Result<DVec3, InvalidValue> {
     if v.is_finite() { Ok(v) } else { Err(InvalidValue::NotFinite(name)) }
 }
 
-fn positive(name: &'static str, x: f64) -> Result<f64, InvalidValue> {
+fn positive(name: Parameter, x: f64) -> Result<f64, InvalidValue> {
     if !x.is_finite() {
         Err(InvalidValue::NotFinite(name))
     } else if x > 0.0 {
@@ -423,7 +557,11 @@ fn positive(name: &'static str, x: f64) -> Result<f64, InvalidValue> {
     }
 }
 
-fn direction(name: &'static str, v: DVec3) -> Result<DVec3, InvalidValue> {
+fn matte(material: &Material) -> Result<(), InvalidValue> {
+    if material.mirror == DVec3::ZERO { Ok(()) } else { Err(InvalidValue::MirrorOnFlat) }
+}
+
+fn direction(name: Parameter, v: DVec3) -> Result<DVec3, InvalidValue> {
     finite(name, v)?;
     if v == DVec3::ZERO { Err(InvalidValue::ZeroDirection(name)) } else { Ok(v) }
 }

@@ -109,7 +109,6 @@ fn levels(color: DVec3) -> [u8; CHANNELS] {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
     use std::sync::atomic::AtomicBool;
 
     use rayfold_scene::{Camera, Cuboid, DirectionalLight, Material, Screen, Sphere};
@@ -123,13 +122,11 @@ mod tests {
     fn one_pixel(objects: Vec<Object>, light: Option<DVec3>) -> Scene {
         let mut scene = Scene::new(Screen::new(1, 1).unwrap(), Camera::Orthographic);
         scene.set_background(DVec3::new(0.0, 0.25, 1.0)).unwrap();
-        scene.objects = Arc::new(objects);
-        scene.lights = Arc::new(
-            light
-                .map(|d| Light::Directional(DirectionalLight::new(DVec3::ONE, d).unwrap()))
-                .into_iter()
-                .collect(),
-        );
+        scene.objects = objects.into();
+        scene.lights = light
+            .into_iter()
+            .map(|d| Light::Directional(DirectionalLight::new(DVec3::ONE, d).unwrap()))
+            .collect();
         scene
     }
 

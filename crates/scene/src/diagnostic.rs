@@ -1,0 +1,202 @@
+//! What is wrong with a text, where, and what was expected.
+//!
+//! A diagnostic carries the piece of text that it is about, so that it can be stored, sent and shown where the text
+//! itself is not at hand. Messages are for people; [`Code`] is what programs tell diagnostics apart by.
+//!
+//! Invariants: lines and columns count from 1, columns in characters; the size of a diagnostic is bounded, however
+//! long the line is.
+//!
+//! ```
+//! let parsed = rayfold_scene::parse("a.txt", b"Screen 4 3\nTrace now", &Default::default());
+//! let shown = parsed.diagnostics[0].render(false);
+//! assert!(shown.contains("a.txt:2:7"));
+//! assert!(shown.contains("2 | Trace now"));
+//! ```
+
+use std::ops::Range;
+
+use annotate_snippets::{AnnotationKind, Level, Origin, Renderer, Snippet};
+use serde::{Deserialize, Serialize};
+
+/// Whether a text is unusable or only doubtful.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Severity {
+    /// The script is not rendered.
+    Error,
+    /// The script is rendered, but perhaps not as it was meant.
+    Warning,
+}
+
+/// What kind of fault a diagnostic is about; stable where the wording is not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Code {
+    /// The text is larger than the limit.
+    TextTooLarge,
+    /// Bytes that are not UTF-8.
+    NotUtf8,
+    /// A carriage return that no line feed follows.
+    LoneCarriageReturn,
+    /// The first word of a line is no command.
+    UnknownCommand,
+    /// A command lacks parameters.
+    TooFewParameters,
+    /// A command has parameters left over.
+    TooManyParameters,
+    /// A parameter is not a decimal number.
+    NotANumber,
+    /// A number beyond what a 64-bit float holds.
+    NumberTooLarge,
+    /// A number, or several together, that the command has no meaning for.
+    InvalidValue,
+    /// More objects, lights, pixels or frames than the limit.
+    LimitExceeded,
+    /// A `Trace` before any `Screen`.
+    NoScreen,
+    /// Nothing is rendered.
+    NoTrace,
+    /// A triangle that can never be hit.
+    DegenerateTriangle,
+    /// A command that no `Trace` follows.
+    Unused,
+    /// More faults than are described one by one.
+    TooManyFaults,
+    /// Settings that are not JSON, or not an object.
+    MalformedSettings,
+    /// A field that settings do not have.
+    UnknownField,
+    /// A field that is there twice.
+    DuplicateField,
+    /// A field with a value of the wrong type or range.
+    InvalidField,
+}
+
+/// A fault in a text.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Diagnostic {
+    /// Whether it makes the text unusable.
+    pub severity: Severity,
+    /// What kind of fault it is.
+    pub code: Code,
+    /// The name under which the text was parsed.
+    pub file: String,
+    /// Line of the fault, from 1.
+    pub line: usize,
+    /// Column of its first character, from 1, in characters.
+    pub column: usize,
+    /// Its bytes in the text as it was given; empty for a place between two characters.
+    pub span: Range<usize>,
+    /// What is wrong, without a full stop.
+    pub message: String,
+    /// What should be in its place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expected: Option<String>,
+    /// What to do about it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub help: Option<String>,
+    /// The text around it.
+    pub excerpt: Excerpt,
+}
+
+/// The line of a fault, or the part of it around the fault where the line is long.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Excerpt {
+    /// One line at most; bytes that are not UTF-8 are replaced by U+FFFD.
+    pub text: String,
+    /// The fault's bytes in `text`.
+    pub marked: Range<usize>,
+}
+
+impl Diagnostic {
+    /// Whether it makes the text unusable.
+    pub fn is_error(&self) -> bool {
+        self.severity == Severity::Error
+    }
+
+    /// As a person reads it: message, place, the line with the fault underlined, help; several lines, without a line
+    /// feed at the end. `color` adds ANSI escapes.
+    pub fn render(&self, color: bool) -> String {
+        let renderer = if color { Renderer::styled() } else { Renderer::plain() };
+        let level = match self.severity {
+            Severity::Error => Level::ERROR,
+            Severity::Warning => Level::WARNING,
+        };
+        let marked = self.excerpt.marked();
+        let from_line_start = self.excerpt.text[..marked.start].chars().count() + 1 == self.column;
+        let snippet = Snippet::source(&self.excerpt.text)
+            .line_start(self.line)
+            .fold(false)
+            .annotation(AnnotationKind::Primary.span(marked).label(self.expected.as_deref()));
+        let title = level.primary_title(&self.message);
+        let group = if from_line_start {
+            title.element(snippet.path(&self.file))
+        } else {
+            title.element(Origin::path(&self.file).line(self.line).char_column(self.column)).element(snippet)
+        };
+        let group = match &self.help {
+            Some(help) => group.element(Level::HELP.message(help)),
+            None => group,
+        };
+        renderer.render(&[group])
+    }
+}
+
+impl Excerpt {
+    /// Characters kept before a fault: more than the longest command has.
+    const BEFORE: usize = 500;
+    /// Characters kept of the fault itself, and of what follows it.
+    const REACH: usize = 100;
+
+    /// Of `line`, which holds no line feed, around its bytes `fault`.
+    pub(crate) fn new(line: &[u8], fault: Range<usize>) -> Self {
+        let before = last_chars(&line[..fault.start], Self::BEFORE);
+        let inside = first_chars(&line[fault.clone()], Self::REACH);
+        let after = first_chars(&line[fault.end..], Self::REACH);
+        let mut text = String::new();
+        if before.len() < fault.start {
+            text.push('…');
+        }
+        text.push_str(&String::from_utf8_lossy(before));
+        let start = text.len();
+        text.push_str(&String::from_utf8_lossy(inside));
+        let end = text.len();
+        if inside.len() < fault.len() {
+            text.push('…');
+        } else {
+            text.push_str(&String::from_utf8_lossy(after));
+            if after.len() < line.len() - fault.end {
+                text.push('…');
+            }
+        }
+        Self { text, marked: start..end }
+    }
+
+    /// The marked bytes; nothing at the start where a foreign excerpt does not fit its text.
+    fn marked(&self) -> Range<usize> {
+        if self.text.get(self.marked.clone()).is_some() { self.marked.clone() } else { 0..0 }
+    }
+}
+
+fn is_char_start(byte: u8) -> bool {
+    byte & 0xc0 != 0x80
+}
+
+/// The first `count` characters, in text that is not UTF-8 no more than four times as many bytes.
+fn first_chars(text: &[u8], count: usize) -> &[u8] {
+    let reach = &text[..text.len().min(4 * count + 1)];
+    match reach.iter().enumerate().filter(|&(_, &b)| is_char_start(b)).nth(count) {
+        Some((end, _)) => &text[..end],
+        None => &text[..text.len().min(4 * count)],
+    }
+}
+
+/// The last `count` characters, in text that is not UTF-8 no more than four times as many bytes.
+fn last_chars(text: &[u8], count: usize) -> &[u8] {
+    let reach = &text[text.len().saturating_sub(4 * count)..];
+    match reach.iter().enumerate().rev().filter(|&(_, &b)| is_char_start(b)).nth(count - 1) {
+        Some((start, _)) => &reach[start..],
+        None => reach,
+    }
+}
