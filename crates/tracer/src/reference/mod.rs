@@ -111,7 +111,7 @@ fn levels(color: DVec3) -> [u8; CHANNELS] {
 mod tests {
     use std::sync::atomic::AtomicBool;
 
-    use rayfold_scene::{Camera, Cuboid, DirectionalLight, Material, Screen, Sphere};
+    use rayfold_scene::{Camera, DirectionalLight, Material, Screen, Sphere};
 
     use super::*;
 
@@ -158,9 +158,8 @@ mod tests {
 
     #[test]
     fn two_facing_mirrors_end_after_the_fifth_bounce() {
-        let corner = |z: f64| [DVec3::new(-1.0, -1.0, z), DVec3::new(1.0, 1.0, z)];
-        let mirror = |z: f64| Object::Cuboid(Cuboid::new(corner(z), material(1.0, 0.0, 1.0)).unwrap());
-        let scene = one_pixel(vec![mirror(-1.0), mirror(1.0)], None);
+        let mirror = |z: f64| sphere(1.0, z, material(1.0, 0.0, 1.0));
+        let scene = one_pixel(vec![mirror(-2.0), mirror(2.0)], None);
         assert_eq!(color(&scene, 0, 0), DVec3::splat(6.0));
     }
 
