@@ -1,0 +1,139 @@
+//! A child process that does not outlive us, whatever ends us.
+//!
+//! The program runs under a small POSIX shell that holds the read end of a pipe; we hold the other. When we close it, or
+//! die in any way, also by SIGKILL, the kernel closes it, the shell reads the end of file and stops the program by its
+//! process id, with SIGKILL if it does not go within five seconds. No signal handler, no `unsafe`, no name to look up.
+//! The shell is in a process group of its own: a Ctrl-C in the terminal is ours to answer, in order.
+
+use std::io::{BufRead, BufReader};
+use std::os::unix::process::CommandExt;
+use std::path::Path;
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+
+use crate::{Error, Result};
+
+const SCRIPT: &str = r#"
+log=$1; shift
+exec 3<&0
+"$@" 3<&- </dev/null >>"$log" 2>&1 &
+pid=$!
+echo "$pid"
+exec >/dev/null 2>&1
+( read -r _ <&3; kill "$pid"; sleep 5; kill -9 "$pid" ) &
+keeper=$!
+exec 3<&-
+wait "$pid"
+status=$?
+kill "$keeper"
+exit "$status"
+"#;
+
+/// A running program; dropping it stops the program and waits until it is gone.
+#[derive(Debug)]
+pub(crate) struct Guarded {
+    shell: Child,
+    lifeline: Option<ChildStdin>,
+    pid: u32,
+}
+
+impl Guarded {
+    /// Starts `program`, its output appended to `log`.
+    ///
+    /// # Errors
+    /// [`Error::Spawn`] when the shell cannot be started; a program that is missing shows in [`Self::exited`].
+    pub(crate) fn spawn(
+        program: &Path,
+        args: &[String],
+        env: impl IntoIterator<Item = (String, String)>,
+        log: &Path,
+    ) -> Result<Self> {
+        let failed = |source| Error::Spawn { program: program.to_owned(), source };
+        let mut shell = Command::new("sh")
+            .args(["-c", SCRIPT, "sh"])
+            .arg(log)
+            .arg(program)
+            .args(args)
+            .envs(env)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .process_group(0)
+            .spawn()
+            .map_err(failed)?;
+        let lifeline = shell.stdin.take();
+        let mut line = String::new();
+        if let Some(out) = shell.stdout.take() {
+            BufReader::new(out).read_line(&mut line).map_err(failed)?;
+        }
+        let pid =
+            line.trim().parse().map_err(|_| failed(std::io::Error::other("the shell named no process")))?;
+        Ok(Self { shell, lifeline, pid })
+    }
+
+    /// The program's own process id.
+    pub(crate) fn pid(&self) -> u32 {
+        self.pid
+    }
+
+    /// How the program ended, if it has.
+    pub(crate) fn exited(&mut self) -> Option<ExitStatus> {
+        self.shell.try_wait().ok().flatten()
+    }
+}
+
+impl Drop for Guarded {
+    fn drop(&mut self) {
+        drop(self.lifeline.take());
+        let _ = self.shell.wait();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use super::*;
+
+    fn alive(pid: u32) -> bool {
+        Command::new("kill").args(["-0", &pid.to_string()]).stderr(Stdio::null()).status().unwrap().success()
+    }
+
+    fn sleeper(script: &str) -> (Guarded, tempfile::TempDir) {
+        let folder = tempfile::tempdir().unwrap();
+        let args = ["-c".to_owned(), script.to_owned()];
+        let guarded = Guarded::spawn(Path::new("sh"), &args, [], &folder.path().join("log")).unwrap();
+        (guarded, folder)
+    }
+
+    #[test]
+    fn a_dropped_program_is_gone() {
+        let (guarded, _folder) = sleeper("while :; do sleep 0.05; done");
+        let pid = guarded.pid();
+        assert!(alive(pid));
+        drop(guarded);
+        assert!(!alive(pid));
+    }
+
+    #[test]
+    fn a_program_that_ends_by_itself_is_seen() {
+        let (mut guarded, _folder) = sleeper("exit 7");
+        let start = Instant::now();
+        let status = loop {
+            if let Some(status) = guarded.exited() {
+                break status;
+            }
+            assert!(start.elapsed() < Duration::from_secs(10));
+            std::thread::sleep(Duration::from_millis(5));
+        };
+        assert_eq!(status.code(), Some(7));
+    }
+
+    #[test]
+    fn a_program_that_ignores_signals_is_killed() {
+        let (guarded, _folder) = sleeper("trap '' TERM; while :; do sleep 0.05; done");
+        let pid = guarded.pid();
+        std::thread::sleep(Duration::from_millis(100));
+        drop(guarded);
+        assert!(!alive(pid));
+    }
+}

@@ -1,0 +1,51 @@
+//! A function that does as its event says, to try the invoker's terms. It speaks the Runtime API over a bare socket: no
+//! runtime library stands between the invoker and what is tested.
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::process::exit;
+use std::time::Duration;
+
+fn main() {
+    let api = std::env::var("AWS_LAMBDA_RUNTIME_API").unwrap_or_default();
+    let mut served = 0;
+    loop {
+        // An invoker that is gone ends its processes this way.
+        let Some((head, event)) = call(&api, "GET", "invocation/next", "") else { exit(0) };
+        let id = header(&head, "lambda-runtime-aws-request-id").unwrap_or_default();
+        let deadline = header(&head, "lambda-runtime-deadline-ms").unwrap_or_default();
+        served += 1;
+        let mut end = "response";
+        let mut answer = format!("{{\"served\":{served},\"id\":\"{id}\",\"deadline\":{deadline}}}");
+        if event.contains("crash") {
+            exit(3);
+        } else if event.contains("hang") {
+            std::thread::sleep(Duration::from_secs(3600));
+        } else if event.contains("fail") {
+            end = "error";
+            answer = "{\"errorType\":\"Told\",\"errorMessage\":\"as told\"}".to_owned();
+        } else if event.contains("slow") {
+            std::thread::sleep(Duration::from_millis(200));
+        }
+        if call(&api, "POST", &format!("invocation/{id}/{end}"), &answer).is_none() {
+            exit(0);
+        }
+    }
+}
+
+fn call(api: &str, method: &str, path: &str, body: &str) -> Option<(String, String)> {
+    let mut stream = TcpStream::connect(api).ok()?;
+    let length = body.len();
+    let head =
+        format!("{method} /2018-06-01/runtime/{path} HTTP/1.1\r\nHost: {api}\r\nConnection: close\r\n");
+    write!(stream, "{head}Content-Length: {length}\r\n\r\n{body}").ok()?;
+    let mut text = String::new();
+    stream.read_to_string(&mut text).ok()?;
+    let (head, body) = text.split_once("\r\n\r\n")?;
+    Some((head.to_owned(), body.to_owned()))
+}
+
+fn header(head: &str, name: &str) -> Option<String> {
+    let lines = head.lines().filter_map(|line| line.split_once(": "));
+    lines.filter(|(found, _)| found.eq_ignore_ascii_case(name)).map(|(_, value)| value.to_owned()).next()
+}
