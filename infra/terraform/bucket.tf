@@ -1,0 +1,159 @@
+# One bucket holds everything: what is uploaded, what is made of it, and all state in between.
+
+resource "aws_s3_bucket" "this" {
+  #checkov:skip=CKV_AWS_144:Frames and GIFs can be made again from the scripts, and their owner has those
+  #checkov:skip=CKV_AWS_145:The key is optional (customer_managed_key): with it the same bytes render again
+  bucket        = local.bucket_name
+  force_destroy = var.force_destroy
+  tags          = local.tags
+}
+
+resource "aws_s3_bucket_ownership_controls" "this" {
+  bucket = aws_s3_bucket.this.bucket
+
+  rule {
+    object_ownership = "BucketOwnerEnforced"
+  }
+}
+
+resource "aws_s3_bucket_public_access_block" "this" {
+  bucket                  = aws_s3_bucket.this.bucket
+  block_public_acls       = true
+  block_public_policy     = true
+  ignore_public_acls      = true
+  restrict_public_buckets = true
+}
+
+resource "aws_s3_bucket_policy" "this" {
+  bucket = aws_s3_bucket.this.bucket
+
+  policy = jsonencode({
+    Version = "2012-10-17"
+    Statement = [
+      {
+        Sid       = "TlsOnly"
+        Effect    = "Deny"
+        Principal = "*"
+        Action    = "s3:*"
+        Resource  = [aws_s3_bucket.this.arn, "${aws_s3_bucket.this.arn}/*"]
+        Condition = { Bool = { "aws:SecureTransport" = "false" } }
+      },
+      {
+        Sid       = "Tls12OrNewer"
+        Effect    = "Deny"
+        Principal = "*"
+        Action    = "s3:*"
+        Resource  = [aws_s3_bucket.this.arn, "${aws_s3_bucket.this.arn}/*"]
+        Condition = { NumericLessThan = { "s3:TlsVersion" = "1.2" } }
+      },
+    ]
+  })
+
+  # Both write the bucket's policy state; at the same time S3 answers with a conflict.
+  depends_on = [aws_s3_bucket_public_access_block.this]
+}
+
+resource "aws_s3_bucket_server_side_encryption_configuration" "this" {
+  bucket = aws_s3_bucket.this.bucket
+
+  rule {
+    bucket_key_enabled = var.customer_managed_key
+
+    apply_server_side_encryption_by_default {
+      sse_algorithm     = var.customer_managed_key ? "aws:kms" : "AES256"
+      kms_master_key_id = local.kms_key_arn
+    }
+  }
+}
+
+resource "aws_s3_bucket_versioning" "this" {
+  bucket = aws_s3_bucket.this.bucket
+
+  versioning_configuration {
+    status = "Enabled"
+  }
+}
+
+locals {
+  # A rule names one prefix. What people value is kept for longer than the pipeline's own objects: a manifest is
+  # written once for every few frames, and each old version would be stored, and billed, for as long.
+  noncurrent_days = {
+    "scripts/"    = var.noncurrent_version_days
+    "animations/" = var.noncurrent_version_days
+    "parts/"      = 1
+    "frames/"     = 1
+    "manifests/"  = 1
+    "assemblies/" = 1
+    "retries/"    = 1
+  }
+
+  # The only current objects that age removes. Every other one is a receipt: gone, its work would be done again.
+  expiry_days = {
+    "assemblies/" = var.claim_days
+    "retries/"    = var.claim_days
+  }
+}
+
+resource "aws_s3_bucket_lifecycle_configuration" "this" {
+  bucket = aws_s3_bucket.this.bucket
+
+  rule {
+    id     = "unfinished-uploads-and-lone-delete-markers"
+    status = "Enabled"
+
+    filter {}
+
+    abort_incomplete_multipart_upload {
+      days_after_initiation = 1
+    }
+
+    expiration {
+      expired_object_delete_marker = true
+    }
+  }
+
+  dynamic "rule" {
+    for_each = local.noncurrent_days
+
+    content {
+      id     = "noncurrent-${trimsuffix(rule.key, "/")}"
+      status = "Enabled"
+
+      filter {
+        prefix = rule.key
+      }
+
+      noncurrent_version_expiration {
+        noncurrent_days = rule.value
+      }
+    }
+  }
+
+  dynamic "rule" {
+    for_each = local.expiry_days
+
+    content {
+      id     = "spent-${trimsuffix(rule.key, "/")}"
+      status = "Enabled"
+
+      filter {
+        prefix = rule.key
+      }
+
+      expiration {
+        days = rule.value
+      }
+    }
+  }
+
+  # Rules for noncurrent versions mean nothing before the bucket has versions.
+  depends_on = [aws_s3_bucket_versioning.this]
+}
+
+resource "aws_s3_bucket_logging" "this" {
+  count = var.access_log_bucket == null ? 0 : 1
+
+  bucket        = aws_s3_bucket.this.bucket
+  target_bucket = var.access_log_bucket
+  target_prefix = var.access_log_prefix
+}

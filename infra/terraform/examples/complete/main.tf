@@ -1,0 +1,185 @@
+# A stack as a team would run it: a key of its own, an access log, alarms that reach somebody, bounded concurrency.
+# Build the packages first: cargo xtask package --architecture arm64
+
+provider "aws" {
+  region = var.region
+
+  default_tags {
+    tags = { Team = "film", ManagedBy = "terraform" }
+  }
+}
+
+data "aws_caller_identity" "current" {}
+
+data "aws_partition" "current" {}
+
+locals {
+  account_id = data.aws_caller_identity.current.account_id
+}
+
+module "rayfold" {
+  source = "../.."
+
+  name = var.name
+  tags = { CostCenter = "4711" }
+
+  # Objects
+  noncurrent_version_days = 14
+  customer_managed_key    = true
+  access_log_bucket       = aws_s3_bucket.access_log.bucket
+  access_log_prefix       = "${var.name}/"
+
+  # Functions: Graviton is cheaper, two vCPUs a frame are twice as fast at the same price
+  architecture = "arm64"
+  packages     = var.packages
+  render = {
+    memory_mb            = 3538
+    timeout_s            = 600
+    reserved_concurrency = 500
+  }
+  assemble = {
+    memory_mb            = 5307
+    reserved_concurrency = 10
+  }
+
+  # Events and watching
+  sweep_minutes      = 10
+  log_retention_days = 90
+  alarm_actions      = [aws_sns_topic.alarms.arn]
+
+  depends_on = [aws_s3_bucket_policy.access_log]
+}
+
+# Who is told. Subscribe by `aws sns subscribe --protocol email --topic-arn ... --notification-endpoint you@example.com`.
+
+resource "aws_sns_topic" "alarms" {
+  name              = "${var.name}-alarms"
+  kms_master_key_id = aws_kms_key.alarms.arn
+}
+
+# Alarms cannot use the key that AWS manages for SNS: its policy lets no other service in.
+resource "aws_kms_key" "alarms" {
+  description         = "${var.name}: alarms"
+  enable_key_rotation = true
+
+  policy = jsonencode({
+    Version = "2012-10-17"
+    Statement = [
+      {
+        Sid       = "AccountAdministersByIam"
+        Effect    = "Allow"
+        Principal = { AWS = "arn:${data.aws_partition.current.partition}:iam::${local.account_id}:root" }
+        Action    = "kms:*"
+        Resource  = "*"
+      },
+      {
+        Sid       = "AlarmsOfThisAccount"
+        Effect    = "Allow"
+        Principal = { Service = "cloudwatch.amazonaws.com" }
+        Action    = ["kms:Decrypt", "kms:GenerateDataKey*"]
+        Resource  = "*"
+        Condition = { StringEquals = { "aws:SourceAccount" = local.account_id } }
+      },
+    ]
+  })
+}
+
+resource "aws_sns_topic_policy" "alarms" {
+  arn = aws_sns_topic.alarms.arn
+
+  policy = jsonencode({
+    Version = "2012-10-17"
+    Statement = [{
+      Sid       = "AlarmsOfThisAccount"
+      Effect    = "Allow"
+      Principal = { Service = "cloudwatch.amazonaws.com" }
+      Action    = "sns:Publish"
+      Resource  = aws_sns_topic.alarms.arn
+      Condition = { StringEquals = { "aws:SourceAccount" = local.account_id } }
+    }]
+  })
+}
+
+# Where the access log goes. A team has one for all of its buckets.
+
+resource "aws_s3_bucket" "access_log" {
+  #checkov:skip=CKV_AWS_18:A log of the log would log itself
+  #checkov:skip=CKV_AWS_21:A log is only ever added to
+  #checkov:skip=CKV_AWS_144:The log is for looking back some weeks, and not worth a copy
+  #checkov:skip=CKV_AWS_145:The log service writes to buckets with S3's own keys only
+  #checkov:skip=CKV2_AWS_62:Nobody waits for log lines
+  bucket = "${var.name}-access-log-${local.account_id}-${var.region}"
+}
+
+resource "aws_s3_bucket_ownership_controls" "access_log" {
+  bucket = aws_s3_bucket.access_log.bucket
+
+  rule {
+    object_ownership = "BucketOwnerEnforced"
+  }
+}
+
+resource "aws_s3_bucket_public_access_block" "access_log" {
+  bucket                  = aws_s3_bucket.access_log.bucket
+  block_public_acls       = true
+  block_public_policy     = true
+  ignore_public_acls      = true
+  restrict_public_buckets = true
+}
+
+resource "aws_s3_bucket_server_side_encryption_configuration" "access_log" {
+  bucket = aws_s3_bucket.access_log.bucket
+
+  rule {
+    apply_server_side_encryption_by_default {
+      sse_algorithm = "AES256"
+    }
+  }
+}
+
+resource "aws_s3_bucket_lifecycle_configuration" "access_log" {
+  bucket = aws_s3_bucket.access_log.bucket
+
+  rule {
+    id     = "forget"
+    status = "Enabled"
+
+    filter {}
+
+    expiration {
+      days = 90
+    }
+
+    abort_incomplete_multipart_upload {
+      days_after_initiation = 1
+    }
+  }
+}
+
+resource "aws_s3_bucket_policy" "access_log" {
+  bucket = aws_s3_bucket.access_log.bucket
+
+  policy = jsonencode({
+    Version = "2012-10-17"
+    Statement = [
+      {
+        Sid       = "TlsOnly"
+        Effect    = "Deny"
+        Principal = "*"
+        Action    = "s3:*"
+        Resource  = [aws_s3_bucket.access_log.arn, "${aws_s3_bucket.access_log.arn}/*"]
+        Condition = { Bool = { "aws:SecureTransport" = "false" } }
+      },
+      {
+        Sid       = "LogsOfThisAccount"
+        Effect    = "Allow"
+        Principal = { Service = "logging.s3.amazonaws.com" }
+        Action    = "s3:PutObject"
+        Resource  = "${aws_s3_bucket.access_log.arn}/${var.name}/*"
+        Condition = { StringEquals = { "aws:SourceAccount" = local.account_id } }
+      },
+    ]
+  })
+
+  depends_on = [aws_s3_bucket_public_access_block.access_log]
+}

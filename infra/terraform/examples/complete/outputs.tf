@@ -1,0 +1,24 @@
+output "bucket" {
+  description = "Name of the bucket"
+  value       = module.rayfold.bucket
+}
+
+output "sync_command" {
+  description = "Uploads a folder"
+  value       = module.rayfold.sync_command
+}
+
+output "submit_command" {
+  description = "Uploads a folder, waits, and downloads the GIF"
+  value       = module.rayfold.submit_command
+}
+
+output "dashboard_url" {
+  description = "Address of the dashboard"
+  value       = module.rayfold.dashboard_url
+}
+
+output "alarm_topic_arn" {
+  description = "ARN of the topic that tells of alarms"
+  value       = aws_sns_topic.alarms.arn
+}

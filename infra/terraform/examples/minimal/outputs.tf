@@ -1,0 +1,9 @@
+output "sync_command" {
+  description = "Uploads a folder"
+  value       = module.rayfold.sync_command
+}
+
+output "submit_command" {
+  description = "Uploads a folder, waits, and downloads the GIF"
+  value       = module.rayfold.submit_command
+}

@@ -1,0 +1,135 @@
+# The two functions, their logs, and the events of the bucket that wake them.
+
+locals {
+  function_names  = { for function in keys(local.functions) : function => "${var.name}-${function}" }
+  log_group_names = { for function, name in local.function_names : function => "/aws/lambda/${name}" }
+
+  # Spelled out, as the key's policy names them and the groups name the key.
+  log_group_arns = {
+    for function, name in local.log_group_names :
+    function => "arn:${local.partition}:logs:${local.region}:${local.account_id}:log-group:${name}"
+  }
+}
+
+resource "aws_cloudwatch_log_group" "this" {
+  #checkov:skip=CKV_AWS_158:The key is optional (customer_managed_key); the logs hold no script contents
+  #checkov:skip=CKV_AWS_338:log_retention_days decides; what failed is written into the bucket, which does not expire
+  for_each = local.log_group_names
+
+  name              = each.value
+  retention_in_days = var.log_retention_days
+  kms_key_id        = local.kms_key_arn
+  tags              = local.tags
+}
+
+resource "aws_lambda_function" "this" {
+  #checkov:skip=CKV_AWS_116:The on-failure destination takes the place of a dead-letter queue and says more: the error too
+  #checkov:skip=CKV_AWS_117:The functions speak with AWS services only; in a VPC they would need endpoints for nothing
+  #checkov:skip=CKV_AWS_272:The packages are built from this source by whoever applies it; there is no third party to sign
+  for_each = local.functions
+
+  function_name = local.function_names[each.key]
+  description   = each.value.description
+  role          = aws_iam_role.function[each.key].arn
+
+  package_type     = "Zip"
+  runtime          = "provided.al2023"
+  architectures    = [var.architecture]
+  handler          = "bootstrap"
+  filename         = local.packages[each.key]
+  source_code_hash = try(filebase64sha256(local.packages[each.key]), null)
+
+  memory_size                    = each.value.memory_mb
+  timeout                        = each.value.timeout_s
+  reserved_concurrent_executions = each.value.reserved_concurrency
+  kms_key_arn                    = local.kms_key_arn
+  tags                           = local.tags
+
+  ephemeral_storage {
+    size = each.value.tmp_mb
+  }
+
+  environment {
+    variables = {
+      # Events name their bucket; the sweep and the failure queue's records are told which one to look at.
+      RAYFOLD_BUCKET = aws_s3_bucket.this.bucket
+    }
+  }
+
+  logging_config {
+    log_format            = "JSON"
+    application_log_level = var.log_level
+    system_log_level      = "INFO"
+    log_group             = aws_cloudwatch_log_group.this[each.key].name
+  }
+
+  tracing_config {
+    mode = var.xray_tracing ? "Active" : "PassThrough"
+  }
+
+  lifecycle {
+    precondition {
+      condition     = fileexists(local.packages[each.key])
+      error_message = "There is no ${local.packages[each.key]}: build it with `cargo xtask package`, or name yours in `packages`."
+    }
+  }
+
+  # The first invocation must find its permissions.
+  depends_on = [aws_iam_role_policy.objects, aws_iam_role_policy.platform]
+}
+
+# A function that wakes itself without end is stopped by Lambda. The longest chain here is script, part, claim; this
+# spells out the default, so that nobody turns it off in passing.
+resource "aws_lambda_function_recursion_config" "this" {
+  for_each = aws_lambda_function.this
+
+  function_name  = each.value.function_name
+  recursive_loop = "Terminate"
+}
+
+resource "aws_lambda_function_event_invoke_config" "this" {
+  for_each = aws_lambda_function.this
+
+  function_name                = each.value.function_name
+  maximum_retry_attempts       = var.event_retries
+  maximum_event_age_in_seconds = var.event_max_age_s
+
+  destination_config {
+    on_failure {
+      destination = aws_sqs_queue.failures.arn
+    }
+  }
+}
+
+resource "aws_lambda_permission" "bucket" {
+  for_each = aws_lambda_function.this
+
+  statement_id   = "EventsOfTheBucket"
+  action         = "lambda:InvokeFunction"
+  function_name  = each.value.function_name
+  principal      = "s3.amazonaws.com"
+  source_arn     = aws_s3_bucket.this.arn
+  source_account = local.account_id
+}
+
+resource "aws_s3_bucket_notification" "this" {
+  bucket = aws_s3_bucket.this.bucket
+
+  dynamic "lambda_function" {
+    for_each = local.routes
+
+    content {
+      id                  = "${trimsuffix(lambda_function.value.prefix, "/")}-to-${lambda_function.value.function}"
+      lambda_function_arn = aws_lambda_function.this[lambda_function.value.function].arn
+      events              = lambda_function.value.events
+      filter_prefix       = lambda_function.value.prefix
+    }
+  }
+
+  # S3 asks at once whether it may invoke; and no event may come before failures have somewhere to go.
+  depends_on = [
+    aws_lambda_permission.bucket,
+    aws_lambda_function_event_invoke_config.this,
+    aws_lambda_event_source_mapping.failures,
+  ]
+}

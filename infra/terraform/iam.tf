@@ -1,0 +1,150 @@
+# Who may do what. Each function has a role of its own with two policies: `objects`, the document in policies/ that the
+# end-to-end tests enforce on the same binaries, and `platform`, for what surrounds them in AWS.
+
+resource "aws_iam_role" "function" {
+  for_each = local.functions
+
+  name                 = local.function_names[each.key]
+  description          = "What the ${each.key} function of ${var.name} may do"
+  permissions_boundary = var.permissions_boundary_arn
+  tags                 = local.tags
+
+  assume_role_policy = jsonencode({
+    Version = "2012-10-17"
+    Statement = [{
+      Effect    = "Allow"
+      Principal = { Service = "lambda.amazonaws.com" }
+      Action    = "sts:AssumeRole"
+    }]
+  })
+}
+
+resource "aws_iam_role_policy" "objects" {
+  for_each = local.functions
+
+  name = "objects"
+  role = aws_iam_role.function[each.key].id
+
+  # Through jsondecode, so that a template that is no JSON fails the plan.
+  policy = jsonencode(jsondecode(templatefile("${path.module}/policies/${each.key}.json.tftpl", {
+    bucket_arn = aws_s3_bucket.this.arn
+  })))
+}
+
+locals {
+  # The role's own log group only, which the stack creates: a function never does.
+  log_statements = {
+    for function, arn in local.log_group_arns : function => [{
+      Sid      = "WriteOwnLog"
+      Effect   = "Allow"
+      Action   = ["logs:CreateLogStream", "logs:PutLogEvents"]
+      Resource = "${arn}:*"
+    }]
+  }
+
+  # X-Ray knows no resources: these two actions are granted on everything or not at all.
+  trace_statements = var.xray_tracing ? [{
+    Sid      = "SendTraces"
+    Effect   = "Allow"
+    Action   = ["xray:PutTelemetryRecords", "xray:PutTraceSegments"]
+    Resource = "*"
+  }] : []
+
+  failure_statements = {
+    render = [{
+      Sid      = "HandOverFailedEvents"
+      Effect   = "Allow"
+      Action   = ["sqs:SendMessage"]
+      Resource = aws_sqs_queue.failures.arn
+    }]
+    assemble = [{
+      Sid      = "HandOverAndReadFailedEvents"
+      Effect   = "Allow"
+      Action   = ["sqs:DeleteMessage", "sqs:GetQueueAttributes", "sqs:ReceiveMessage", "sqs:SendMessage"]
+      Resource = aws_sqs_queue.failures.arn
+    }]
+  }
+
+  key_statements = [for arn in aws_kms_key.this[*].arn : {
+    Sid      = "UseTheKeyThroughBucketAndQueue"
+    Effect   = "Allow"
+    Action   = ["kms:Decrypt", "kms:GenerateDataKey"]
+    Resource = arn
+    Condition = {
+      StringEquals = {
+        "kms:ViaService" = ["s3.${local.region}.amazonaws.com", "sqs.${local.region}.amazonaws.com"]
+      }
+    }
+  }]
+}
+
+resource "aws_iam_role_policy" "platform" {
+  for_each = local.functions
+
+  name = "platform"
+  role = aws_iam_role.function[each.key].id
+
+  policy = jsonencode({
+    Version = "2012-10-17"
+    Statement = concat(
+      local.log_statements[each.key],
+      local.trace_statements,
+      local.failure_statements[each.key],
+      local.key_statements,
+    )
+  })
+}
+
+resource "aws_iam_role" "scheduler" {
+  name                 = "${var.name}-sweep-schedule"
+  description          = "Lets the schedule of ${var.name} wake the assemble function"
+  permissions_boundary = var.permissions_boundary_arn
+  tags                 = local.tags
+
+  assume_role_policy = jsonencode({
+    Version = "2012-10-17"
+    Statement = [{
+      Effect    = "Allow"
+      Principal = { Service = "scheduler.amazonaws.com" }
+      Action    = "sts:AssumeRole"
+      Condition = {
+        StringEquals = {
+          "aws:SourceAccount" = local.account_id
+          "aws:SourceArn"     = aws_scheduler_schedule_group.this.arn
+        }
+      }
+    }]
+  })
+}
+
+resource "aws_iam_role_policy" "scheduler" {
+  name = "sweep"
+  role = aws_iam_role.scheduler.id
+
+  policy = jsonencode({
+    Version = "2012-10-17"
+    Statement = concat(
+      [
+        {
+          Sid      = "WakeTheAssembleFunction"
+          Effect   = "Allow"
+          Action   = ["lambda:InvokeFunction"]
+          Resource = aws_lambda_function.this["assemble"].arn
+        },
+        {
+          Sid      = "KeepWhatCouldNotBeDelivered"
+          Effect   = "Allow"
+          Action   = ["sqs:SendMessage"]
+          Resource = aws_sqs_queue.dead_letters.arn
+        },
+      ],
+      [for arn in aws_kms_key.this[*].arn : {
+        Sid       = "UseTheKeyThroughTheQueue"
+        Effect    = "Allow"
+        Action    = ["kms:Decrypt", "kms:GenerateDataKey"]
+        Resource  = arn
+        Condition = { StringEquals = { "kms:ViaService" = ["sqs.${local.region}.amazonaws.com"] } }
+      }],
+    )
+  })
+}

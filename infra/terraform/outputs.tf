@@ -1,0 +1,59 @@
+output "bucket" {
+  description = "Name of the bucket"
+  value       = aws_s3_bucket.this.bucket
+}
+
+output "bucket_arn" {
+  description = "ARN of the bucket"
+  value       = aws_s3_bucket.this.arn
+}
+
+output "sync_command" {
+  description = "Uploads the folder FOLDER as the animation FOLDER; the GIF appears as animations/FOLDER.gif"
+  value       = "aws s3 sync FOLDER s3://${aws_s3_bucket.this.bucket}/scripts/FOLDER/ --region ${local.region}"
+}
+
+output "submit_command" {
+  description = "Checks the folder FOLDER, uploads what changed, waits, and downloads the GIF"
+  value       = "AWS_REGION=${local.region} rayfold submit FOLDER --bucket ${aws_s3_bucket.this.bucket}"
+}
+
+output "function_names" {
+  description = "Names of the functions, by `render` and `assemble`"
+  value       = { for function, resource in aws_lambda_function.this : function => resource.function_name }
+}
+
+output "function_arns" {
+  description = "ARNs of the functions, by `render` and `assemble`"
+  value       = { for function, resource in aws_lambda_function.this : function => resource.arn }
+}
+
+output "role_arns" {
+  description = "ARNs of the functions' roles, by `render` and `assemble`"
+  value       = { for function, resource in aws_iam_role.function : function => resource.arn }
+}
+
+output "log_group_names" {
+  description = "Names of the functions' log groups, by `render` and `assemble`"
+  value       = { for function, resource in aws_cloudwatch_log_group.this : function => resource.name }
+}
+
+output "failure_queue_url" {
+  description = "URL of the queue of events that a function could not handle, which the assemble function reads"
+  value       = aws_sqs_queue.failures.url
+}
+
+output "dead_letter_queue_url" {
+  description = "URL of the queue of events that nothing could handle"
+  value       = aws_sqs_queue.dead_letters.url
+}
+
+output "kms_key_arn" {
+  description = "ARN of the stack's own key, null without one"
+  value       = local.kms_key_arn
+}
+
+output "dashboard_url" {
+  description = "Address of the dashboard, null without one"
+  value       = one([for name in aws_cloudwatch_dashboard.this[*].dashboard_name : "https://${local.region}.console.aws.amazon.com/cloudwatch/home?region=${local.region}#dashboards/dashboard/${name}"])
+}

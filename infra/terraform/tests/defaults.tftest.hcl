@@ -1,0 +1,396 @@
+# What a stack is that was given nothing but a name.
+
+mock_provider "aws" {
+  source = "./tests/mocks"
+}
+
+variables {
+  name = "demo"
+  packages = {
+    render   = "tests/packages/rayfold-render.zip"
+    assemble = "tests/packages/rayfold-assemble.zip"
+  }
+}
+
+run "bucket" {
+  assert {
+    condition     = aws_s3_bucket.this.bucket == "demo-123456789012-eu-central-1"
+    error_message = "the bucket's name must hold account and region, which makes it unique"
+  }
+  assert {
+    condition     = aws_s3_bucket.this.force_destroy == false
+    error_message = "destroying the stack must not take the objects with it"
+  }
+  assert {
+    condition = alltrue([
+      aws_s3_bucket_public_access_block.this.block_public_acls,
+      aws_s3_bucket_public_access_block.this.block_public_policy,
+      aws_s3_bucket_public_access_block.this.ignore_public_acls,
+      aws_s3_bucket_public_access_block.this.restrict_public_buckets,
+    ])
+    error_message = "nothing may be public"
+  }
+  assert {
+    condition     = aws_s3_bucket_ownership_controls.this.rule[0].object_ownership == "BucketOwnerEnforced"
+    error_message = "the account must own every object, and access lists must be off"
+  }
+  assert {
+    condition     = aws_s3_bucket_versioning.this.versioning_configuration[0].status == "Enabled"
+    error_message = "an overwritten script must be recoverable"
+  }
+  assert {
+    condition     = one(one(aws_s3_bucket_server_side_encryption_configuration.this.rule).apply_server_side_encryption_by_default).sse_algorithm == "AES256"
+    error_message = "without a key of its own the bucket uses S3's, which keeps ETags a hash of the content"
+  }
+  assert {
+    condition = jsondecode(aws_s3_bucket_policy.this.policy) == jsondecode(jsonencode({
+      Version = "2012-10-17"
+      Statement = [
+        {
+          Sid       = "TlsOnly"
+          Effect    = "Deny"
+          Principal = "*"
+          Action    = "s3:*"
+          Resource  = ["arn:aws:s3:::demo-123456789012-eu-central-1", "arn:aws:s3:::demo-123456789012-eu-central-1/*"]
+          Condition = { Bool = { "aws:SecureTransport" = "false" } }
+        },
+        {
+          Sid       = "Tls12OrNewer"
+          Effect    = "Deny"
+          Principal = "*"
+          Action    = "s3:*"
+          Resource  = ["arn:aws:s3:::demo-123456789012-eu-central-1", "arn:aws:s3:::demo-123456789012-eu-central-1/*"]
+          Condition = { NumericLessThan = { "s3:TlsVersion" = "1.2" } }
+        },
+      ]
+    }))
+    error_message = "the bucket's policy must deny what does not come by TLS, and allow nobody anything"
+  }
+  assert {
+    condition     = length(aws_s3_bucket_logging.this) == 0 && length(aws_kms_key.this) == 0 && length(aws_kms_alias.this) == 0
+    error_message = "what costs or needs something from outside is off until it is asked for"
+  }
+}
+
+run "lifecycle" {
+  assert {
+    condition = sort([for rule in aws_s3_bucket_lifecycle_configuration.this.rule : rule.id]) == tolist([
+      "noncurrent-animations", "noncurrent-assemblies", "noncurrent-frames", "noncurrent-manifests", "noncurrent-parts",
+      "noncurrent-retries", "noncurrent-scripts", "spent-assemblies", "spent-retries",
+      "unfinished-uploads-and-lone-delete-markers",
+    ])
+    error_message = "there must be these rules and no other"
+  }
+  assert {
+    condition = alltrue([
+      for rule in aws_s3_bucket_lifecycle_configuration.this.rule :
+      rule.status == "Enabled" && length(rule.transition) == 0 && length(rule.noncurrent_version_transition) == 0
+    ])
+    error_message = "every rule must be on, and none may move objects to where reading them costs more"
+  }
+  assert {
+    condition = {
+      for rule in aws_s3_bucket_lifecycle_configuration.this.rule : one(rule.filter).prefix => one(rule.expiration).days
+      if length(rule.expiration) > 0 ? one(rule.expiration).days != null && one(rule.expiration).days != 0 : false
+    } == { "assemblies/" = 7, "retries/" = 7 }
+    error_message = "only claims and retry orders may expire by age: every other current object is a receipt"
+  }
+  assert {
+    condition = {
+      for rule in aws_s3_bucket_lifecycle_configuration.this.rule : one(rule.filter).prefix => one(rule.noncurrent_version_expiration).noncurrent_days
+      if length(rule.noncurrent_version_expiration) > 0
+      } == {
+      "scripts/" = 30, "animations/" = 30, "parts/" = 1, "frames/" = 1, "manifests/" = 1, "assemblies/" = 1, "retries/" = 1
+    }
+    error_message = "old versions must go, below every prefix"
+  }
+  assert {
+    condition = [
+      for rule in aws_s3_bucket_lifecycle_configuration.this.rule : one(rule.abort_incomplete_multipart_upload).days_after_initiation
+      if length(rule.abort_incomplete_multipart_upload) > 0
+    ] == [1]
+    error_message = "the parts of a GIF that was given up must not be billed for longer than a day"
+  }
+}
+
+run "functions" {
+  assert {
+    condition     = { for key, function in aws_lambda_function.this : key => function.function_name } == { render = "demo-render", assemble = "demo-assemble" }
+    error_message = "there must be these two functions"
+  }
+  assert {
+    condition = alltrue([
+      for function in aws_lambda_function.this : alltrue([
+        function.runtime == "provided.al2023",
+        function.architectures == tolist(["x86_64"]),
+        function.handler == "bootstrap",
+        one(function.tracing_config).mode == "Active",
+        one(function.logging_config).log_format == "JSON",
+        one(function.logging_config).application_log_level == "INFO",
+        one(function.ephemeral_storage).size == 512,
+        function.reserved_concurrent_executions == null,
+        one(function.environment).variables == tomap({ RAYFOLD_BUCKET = "demo-123456789012-eu-central-1" }),
+      ])
+    ])
+    error_message = "runtime, architecture, tracing, logs and settings of both functions"
+  }
+  assert {
+    condition = {
+      for key, function in aws_lambda_function.this : key => [function.memory_size, function.timeout]
+    } == { render = [1769, 300], assemble = [3008, 900] }
+    error_message = "memory (MB) and timeout (s)"
+  }
+  assert {
+    condition = {
+      for key, function in aws_lambda_function.this : key => function.source_code_hash
+      } == {
+      render   = filebase64sha256("tests/packages/rayfold-render.zip")
+      assemble = filebase64sha256("tests/packages/rayfold-assemble.zip")
+    }
+    error_message = "a changed package must change the function"
+  }
+  assert {
+    condition     = { for key, function in aws_lambda_function.this : key => function.role } == { for key, role in aws_iam_role.function : key => role.arn }
+    error_message = "each function must have the role of its own"
+  }
+  assert {
+    condition = alltrue([for key, group in aws_cloudwatch_log_group.this : alltrue([
+      group.name == "/aws/lambda/demo-${key}",
+      one(aws_lambda_function.this[key].logging_config).log_group == group.name,
+      group.retention_in_days == 30,
+    ])])
+    error_message = "each function must write into its own log group, which forgets"
+  }
+  assert {
+    condition     = { for key, config in aws_lambda_function_recursion_config.this : config.function_name => config.recursive_loop } == { demo-render = "Terminate", demo-assemble = "Terminate" }
+    error_message = "Lambda's recursion detection must stay on"
+  }
+}
+
+run "routes" {
+  assert {
+    condition = {
+      for route in aws_s3_bucket_notification.this.lambda_function : route.filter_prefix => [route.lambda_function_arn, join(" ", sort(route.events))]
+      } == {
+      "scripts/"    = ["arn:aws:lambda:eu-central-1:123456789012:function:demo-render", "s3:ObjectCreated:* s3:ObjectRemoved:*"]
+      "parts/"      = ["arn:aws:lambda:eu-central-1:123456789012:function:demo-render", "s3:ObjectCreated:*"]
+      "retries/"    = ["arn:aws:lambda:eu-central-1:123456789012:function:demo-render", "s3:ObjectCreated:*"]
+      "assemblies/" = ["arn:aws:lambda:eu-central-1:123456789012:function:demo-assemble", "s3:ObjectCreated:*"]
+    }
+    error_message = "these prefixes must wake these functions"
+  }
+  assert {
+    condition = (
+      [for route in aws_s3_bucket_notification.this.lambda_function : [route.filter_prefix, sort(route.events)]] ==
+      [for route in jsondecode(file("routes.json")).routes : [route.prefix, sort(route.events)]]
+    )
+    error_message = "the routes must be those of routes.json, which the local invoker reads"
+  }
+  assert {
+    condition = alltrue([for key, permission in aws_lambda_permission.bucket : alltrue([
+      permission.function_name == "demo-${key}",
+      permission.principal == "s3.amazonaws.com",
+      permission.action == "lambda:InvokeFunction",
+      permission.source_arn == aws_s3_bucket.this.arn,
+      permission.source_account == "123456789012",
+    ])]) && toset(keys(aws_lambda_permission.bucket)) == toset([for route in jsondecode(file("routes.json")).routes : route.function])
+    error_message = "only this bucket of this account may wake the functions"
+  }
+}
+
+run "failures" {
+  assert {
+    condition = alltrue([for key, config in aws_lambda_function_event_invoke_config.this : alltrue([
+      config.function_name == "demo-${key}",
+      config.maximum_retry_attempts == 2,
+      config.maximum_event_age_in_seconds == 21600,
+      one(one(config.destination_config).on_failure).destination == aws_sqs_queue.failures.arn,
+    ])]) && length(aws_lambda_function_event_invoke_config.this) == 2
+    error_message = "an event that failed must end in the failure queue, whichever function it was for"
+  }
+  assert {
+    condition = alltrue([
+      aws_lambda_event_source_mapping.failures.event_source_arn == aws_sqs_queue.failures.arn,
+      aws_lambda_event_source_mapping.failures.function_name == "arn:aws:lambda:eu-central-1:123456789012:function:demo-assemble",
+      aws_lambda_event_source_mapping.failures.function_response_types == toset(["ReportBatchItemFailures"]),
+      aws_lambda_event_source_mapping.failures.batch_size == 10,
+      one(aws_lambda_event_source_mapping.failures.scaling_config).maximum_concurrency == 2,
+    ])
+    error_message = "the assemble function must read the failure queue, and answer for each record"
+  }
+  assert {
+    condition     = aws_sqs_queue.failures.visibility_timeout_seconds == 6 * aws_lambda_function.this["assemble"].timeout
+    error_message = "a batch that is being worked on must not be handed out again"
+  }
+  assert {
+    condition = jsondecode(aws_sqs_queue.failures.redrive_policy) == {
+      deadLetterTargetArn = aws_sqs_queue.dead_letters.arn
+      maxReceiveCount     = 5
+    }
+    error_message = "what cannot be recorded must be kept for people"
+  }
+  assert {
+    condition = jsondecode(aws_sqs_queue_redrive_allow_policy.dead_letters.redrive_allow_policy) == {
+      redrivePermission = "byQueue"
+      sourceQueueArns   = [aws_sqs_queue.failures.arn]
+    }
+    error_message = "no other queue may use the dead-letter queue"
+  }
+  assert {
+    condition = alltrue([for queue in [aws_sqs_queue.failures, aws_sqs_queue.dead_letters] : alltrue([
+      queue.message_retention_seconds == 1209600,
+      queue.sqs_managed_sse_enabled == true,
+      queue.kms_master_key_id == null,
+    ])])
+    error_message = "both queues must keep messages as long as SQS can, encrypted"
+  }
+  assert {
+    condition = alltrue([for key, policy in aws_sqs_queue_policy.tls_only : jsondecode(policy.policy) == jsondecode(jsonencode({
+      Version = "2012-10-17"
+      Statement = [{
+        Sid       = "TlsOnly"
+        Effect    = "Deny"
+        Principal = "*"
+        Action    = "sqs:*"
+        Resource  = { failures = aws_sqs_queue.failures.arn, dead_letters = aws_sqs_queue.dead_letters.arn }[key]
+        Condition = { Bool = { "aws:SecureTransport" = "false" } }
+      }]
+    }))]) && length(aws_sqs_queue_policy.tls_only) == 2
+    error_message = "both queues must deny what does not come by TLS, and allow nobody anything"
+  }
+}
+
+run "sweep" {
+  assert {
+    condition = alltrue([
+      aws_scheduler_schedule.sweep.name == "demo-sweep",
+      aws_scheduler_schedule.sweep.group_name == "demo",
+      aws_scheduler_schedule.sweep.schedule_expression == "rate(15 minutes)",
+      one(aws_scheduler_schedule.sweep.flexible_time_window).mode == "OFF",
+      one(aws_scheduler_schedule.sweep.target).arn == "arn:aws:lambda:eu-central-1:123456789012:function:demo-assemble",
+      one(aws_scheduler_schedule.sweep.target).role_arn == "arn:aws:iam::123456789012:role/demo-sweep-schedule",
+      jsondecode(one(aws_scheduler_schedule.sweep.target).input) == { sweep = true },
+      one(one(aws_scheduler_schedule.sweep.target).dead_letter_config).arn == aws_sqs_queue.dead_letters.arn,
+      one(one(aws_scheduler_schedule.sweep.target).retry_policy).maximum_event_age_in_seconds == 840,
+      one(one(aws_scheduler_schedule.sweep.target).retry_policy).maximum_retry_attempts == 2,
+    ])
+    error_message = "the assemble function must sweep every quarter of an hour"
+  }
+}
+
+run "alarms" {
+  assert {
+    condition = toset(concat(
+      [for alarm in aws_cloudwatch_metric_alarm.function : alarm.alarm_name],
+      [for alarm in aws_cloudwatch_metric_alarm.dead_letters : alarm.alarm_name],
+      )) == toset([
+      "demo-render-errors", "demo-render-throttles", "demo-render-near-timeouts", "demo-render-dropped-events",
+      "demo-render-undelivered-failures", "demo-assemble-errors", "demo-assemble-throttles",
+      "demo-assemble-near-timeouts", "demo-assemble-dropped-events", "demo-assemble-undelivered-failures",
+      "demo-dead-letters",
+    ])
+    error_message = "there must be these alarms"
+  }
+  assert {
+    condition = {
+      for key, alarm in aws_cloudwatch_metric_alarm.function : key => [alarm.namespace, alarm.metric_name, alarm.statistic, alarm.threshold, alarm.evaluation_periods]
+      } == {
+      render-errors                 = ["AWS/Lambda", "Errors", "Sum", 1, 1]
+      render-throttles              = ["AWS/Lambda", "Throttles", "Sum", 1, 3]
+      render-near-timeouts          = ["AWS/Lambda", "Duration", "Maximum", 270000, 1]
+      render-dropped-events         = ["AWS/Lambda", "AsyncEventsDropped", "Sum", 1, 1]
+      render-undelivered-failures   = ["AWS/Lambda", "DestinationDeliveryFailures", "Sum", 1, 1]
+      assemble-errors               = ["AWS/Lambda", "Errors", "Sum", 1, 1]
+      assemble-throttles            = ["AWS/Lambda", "Throttles", "Sum", 1, 3]
+      assemble-near-timeouts        = ["AWS/Lambda", "Duration", "Maximum", 810000, 1]
+      assemble-dropped-events       = ["AWS/Lambda", "AsyncEventsDropped", "Sum", 1, 1]
+      assemble-undelivered-failures = ["AWS/Lambda", "DestinationDeliveryFailures", "Sum", 1, 1]
+    }
+    error_message = "what the alarms look at"
+  }
+  assert {
+    condition = alltrue([for key, alarm in aws_cloudwatch_metric_alarm.function : alltrue([
+      alarm.dimensions == tomap({ FunctionName = startswith(key, "render-") ? "demo-render" : "demo-assemble" }),
+      alarm.treat_missing_data == "notBreaching",
+      alarm.comparison_operator == "GreaterThanOrEqualToThreshold",
+    ])])
+    error_message = "each alarm must look at its own function, and be quiet while nothing happens"
+  }
+  assert {
+    condition = alltrue([
+      one(aws_cloudwatch_metric_alarm.dead_letters[*].metric_name) == "ApproximateNumberOfMessagesVisible",
+      one(aws_cloudwatch_metric_alarm.dead_letters[*].dimensions) == tomap({ QueueName = "demo-dead-letters" }),
+      one(aws_cloudwatch_metric_alarm.dead_letters[*].threshold) == 1,
+      one(aws_cloudwatch_metric_alarm.dead_letters[*].statistic) == "Maximum",
+    ])
+    error_message = "one dead letter must set off its alarm"
+  }
+}
+
+run "dashboard" {
+  assert {
+    condition     = one(aws_cloudwatch_dashboard.this[*].dashboard_name) == "demo" && length(jsondecode(one(aws_cloudwatch_dashboard.this[*].dashboard_body)).widgets) == 8
+    error_message = "there must be a dashboard of eight widgets"
+  }
+  assert {
+    condition = toset(flatten([
+      for widget in jsondecode(one(aws_cloudwatch_dashboard.this[*].dashboard_body)).widgets : [for metric in widget.properties.metrics : metric[3]]
+      if widget.type == "metric"
+    ])) == toset(["demo-render", "demo-assemble", "demo-failures", "demo-dead-letters"])
+    error_message = "the graphs must show both functions and both queues"
+  }
+  assert {
+    condition = alltrue([
+      for widget in jsondecode(one(aws_cloudwatch_dashboard.this[*].dashboard_body)).widgets :
+      widget.properties.region == "eu-central-1" && widget.x + widget.width <= 24
+    ])
+    error_message = "every widget must look at the stack's region and fit the page"
+  }
+}
+
+run "outputs" {
+  assert {
+    condition     = output.bucket == "demo-123456789012-eu-central-1" && output.bucket_arn == "arn:aws:s3:::demo-123456789012-eu-central-1"
+    error_message = "bucket"
+  }
+  assert {
+    condition     = output.sync_command == "aws s3 sync FOLDER s3://demo-123456789012-eu-central-1/scripts/FOLDER/ --region eu-central-1"
+    error_message = output.sync_command
+  }
+  assert {
+    condition     = output.submit_command == "AWS_REGION=eu-central-1 rayfold submit FOLDER --bucket demo-123456789012-eu-central-1"
+    error_message = output.submit_command
+  }
+  assert {
+    condition = alltrue([
+      output.function_names == { render = "demo-render", assemble = "demo-assemble" },
+      output.function_arns == {
+        render   = "arn:aws:lambda:eu-central-1:123456789012:function:demo-render"
+        assemble = "arn:aws:lambda:eu-central-1:123456789012:function:demo-assemble"
+      },
+      output.role_arns == {
+        render   = "arn:aws:iam::123456789012:role/demo-render"
+        assemble = "arn:aws:iam::123456789012:role/demo-assemble"
+      },
+      output.log_group_names == { render = "/aws/lambda/demo-render", assemble = "/aws/lambda/demo-assemble" },
+      output.failure_queue_url == "https://sqs.eu-central-1.amazonaws.com/123456789012/demo-failures",
+      output.dead_letter_queue_url == "https://sqs.eu-central-1.amazonaws.com/123456789012/demo-dead-letters",
+      output.kms_key_arn == null,
+      output.dashboard_url == "https://eu-central-1.console.aws.amazon.com/cloudwatch/home?region=eu-central-1#dashboards/dashboard/demo",
+    ])
+    error_message = "names and addresses of what was made"
+  }
+}
+
+run "tags" {
+  assert {
+    condition = alltrue([for tags in concat(
+      [for resource in aws_lambda_function.this : resource.tags],
+      [for resource in aws_cloudwatch_log_group.this : resource.tags],
+      [for resource in aws_iam_role.function : resource.tags],
+      [for resource in aws_cloudwatch_metric_alarm.function : resource.tags],
+      [aws_s3_bucket.this.tags, aws_sqs_queue.failures.tags, aws_sqs_queue.dead_letters.tags, aws_iam_role.scheduler.tags],
+    ) : tags == tomap({ Application = "demo" })])
+    error_message = "everything must say which stack it belongs to"
+  }
+}

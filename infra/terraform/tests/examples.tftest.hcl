@@ -1,0 +1,102 @@
+# Both examples, applied as they stand.
+
+mock_provider "aws" {
+  mock_data "aws_caller_identity" {
+    defaults = { account_id = "123456789012" }
+  }
+
+  mock_data "aws_partition" {
+    defaults = { partition = "aws" }
+  }
+
+  mock_data "aws_region" {
+    defaults = { region = "us-east-1" }
+  }
+
+  mock_resource "aws_s3_bucket" {
+    defaults = { arn = "arn:aws:s3:::bucket" }
+  }
+
+  mock_resource "aws_sns_topic" {
+    defaults = { arn = "arn:aws:sns:us-east-1:123456789012:rayfold-alarms" }
+  }
+}
+
+variables {
+  packages = {
+    render   = "tests/packages/rayfold-render.zip"
+    assemble = "tests/packages/rayfold-assemble.zip"
+  }
+}
+
+run "minimal" {
+  module {
+    source = "./examples/minimal"
+  }
+
+  assert {
+    condition     = output.sync_command == "aws s3 sync FOLDER s3://rayfold-123456789012-us-east-1/scripts/FOLDER/ --region us-east-1"
+    error_message = output.sync_command
+  }
+  assert {
+    condition     = output.submit_command == "AWS_REGION=us-east-1 rayfold submit FOLDER --bucket rayfold-123456789012-us-east-1"
+    error_message = output.submit_command
+  }
+}
+
+run "minimal_elsewhere" {
+  variables {
+    name = "film"
+  }
+
+  module {
+    source = "./examples/minimal"
+  }
+
+  assert {
+    condition     = output.sync_command == "aws s3 sync FOLDER s3://film-123456789012-us-east-1/scripts/FOLDER/ --region us-east-1"
+    error_message = output.sync_command
+  }
+}
+
+run "complete" {
+  module {
+    source = "./examples/complete"
+  }
+
+  assert {
+    condition     = output.bucket == "rayfold-123456789012-us-east-1"
+    error_message = output.bucket
+  }
+  assert {
+    condition     = output.alarm_topic_arn == "arn:aws:sns:us-east-1:123456789012:rayfold-alarms"
+    error_message = output.alarm_topic_arn
+  }
+  assert {
+    condition     = endswith(output.dashboard_url, "#dashboards/dashboard/rayfold")
+    error_message = output.dashboard_url
+  }
+  assert {
+    condition     = aws_s3_bucket.access_log.bucket == "rayfold-access-log-123456789012-us-east-1"
+    error_message = aws_s3_bucket.access_log.bucket
+  }
+  assert {
+    condition = alltrue([
+      aws_s3_bucket_public_access_block.access_log.block_public_acls,
+      aws_s3_bucket_public_access_block.access_log.block_public_policy,
+      aws_s3_bucket_public_access_block.access_log.ignore_public_acls,
+      aws_s3_bucket_public_access_block.access_log.restrict_public_buckets,
+    ])
+    error_message = "the log may not be public either"
+  }
+  assert {
+    condition = [
+      for statement in jsondecode(aws_s3_bucket_policy.access_log.policy).Statement : statement.Principal if statement.Effect == "Allow"
+    ] == [{ Service = "logging.s3.amazonaws.com" }]
+    error_message = "only S3's log service may write into the log"
+  }
+  assert {
+    condition     = jsondecode(aws_sns_topic_policy.alarms.policy).Statement[0].Principal == { Service = "cloudwatch.amazonaws.com" }
+    error_message = "only alarms may publish"
+  }
+}

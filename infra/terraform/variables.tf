@@ -1,0 +1,270 @@
+variable "name" {
+  description = "Prefix of every name in the stack: lower-case letters, digits and hyphens, 3 to 32 characters"
+  type        = string
+  nullable    = false
+
+  validation {
+    condition     = can(regex("^[a-z][a-z0-9-]{1,30}[a-z0-9]$", var.name)) && !strcontains(var.name, "--")
+    error_message = "name must be 3 to 32 lower-case letters, digits and single hyphens, begin with a letter and not end with a hyphen."
+  }
+}
+
+variable "tags" {
+  description = "Tags for every resource that takes them"
+  type        = map(string)
+  default     = {}
+  nullable    = false
+}
+
+# Bucket
+
+variable "bucket_name" {
+  description = "Name of the bucket; null gives NAME-ACCOUNT-REGION, which nobody else can have taken"
+  type        = string
+  default     = null
+
+  validation {
+    condition     = var.bucket_name == null ? true : can(regex("^[a-z0-9][a-z0-9-]{1,61}[a-z0-9]$", var.bucket_name))
+    error_message = "bucket_name must be 3 to 63 lower-case letters, digits and hyphens (no dots: they break TLS to the bucket's own host name)."
+  }
+}
+
+variable "force_destroy" {
+  description = "Whether `terraform destroy` may delete a bucket that still holds objects, all their versions included"
+  type        = bool
+  default     = false
+  nullable    = false
+}
+
+variable "noncurrent_version_days" {
+  description = "Days to keep overwritten or deleted scripts and GIFs; the pipeline's own working objects are kept one day"
+  type        = number
+  default     = 30
+  nullable    = false
+
+  validation {
+    condition     = var.noncurrent_version_days >= 1 && floor(var.noncurrent_version_days) == var.noncurrent_version_days
+    error_message = "noncurrent_version_days must be a whole number of at least 1."
+  }
+}
+
+variable "claim_days" {
+  description = "Days after which claims (`assemblies/`) and retry orders (`retries/`), which are spent within minutes, expire"
+  type        = number
+  default     = 7
+  nullable    = false
+
+  validation {
+    condition     = var.claim_days >= 1 && floor(var.claim_days) == var.claim_days
+    error_message = "claim_days must be a whole number of at least 1."
+  }
+}
+
+variable "access_log_bucket" {
+  description = "Name of an existing bucket that takes the server access log; null writes none"
+  type        = string
+  default     = null
+}
+
+variable "access_log_prefix" {
+  description = "Prefix of the access log's keys"
+  type        = string
+  default     = "rayfold/"
+  nullable    = false
+}
+
+variable "customer_managed_key" {
+  description = "Encrypt bucket, queues, logs and function settings with a key of the stack's own instead of keys that AWS manages. It costs a monthly fee and requests, and ETags then change at each upload, so that uploading the same bytes again renders them again"
+  type        = bool
+  default     = false
+  nullable    = false
+}
+
+# Functions
+
+variable "architecture" {
+  description = "Instruction set of both functions, `x86_64` or `arm64`; the packages must be built for it"
+  type        = string
+  default     = "x86_64"
+  nullable    = false
+
+  validation {
+    condition     = contains(["x86_64", "arm64"], var.architecture)
+    error_message = "architecture must be x86_64 or arm64."
+  }
+}
+
+variable "packages" {
+  description = "Paths of the functions' zip files; null takes what `cargo xtask package` wrote for the architecture"
+  type = object({
+    render   = string
+    assemble = string
+  })
+  default = null
+}
+
+variable "render" {
+  description = "Size of the render function. 1,769 MB are one vCPU; the price is memory times duration. Without reserved concurrency it shares the account's"
+  type = object({
+    memory_mb            = optional(number, 1769)
+    timeout_s            = optional(number, 300)
+    tmp_mb               = optional(number, 512)
+    reserved_concurrency = optional(number)
+  })
+  default  = {}
+  nullable = false
+
+  validation {
+    condition     = var.render.memory_mb >= 128 && var.render.memory_mb <= 10240 && floor(var.render.memory_mb) == var.render.memory_mb
+    error_message = "render.memory_mb must be a whole number from 128 to 10240."
+  }
+  validation {
+    condition     = var.render.timeout_s >= 10 && var.render.timeout_s <= 900 && floor(var.render.timeout_s) == var.render.timeout_s
+    error_message = "render.timeout_s must be a whole number from 10 to 900."
+  }
+  validation {
+    condition     = var.render.tmp_mb >= 512 && var.render.tmp_mb <= 10240 && floor(var.render.tmp_mb) == var.render.tmp_mb
+    error_message = "render.tmp_mb must be a whole number from 512 to 10240."
+  }
+  validation {
+    condition     = var.render.reserved_concurrency == null ? true : var.render.reserved_concurrency >= 1
+    error_message = "render.reserved_concurrency must be at least 1: 0 would stop the function, and events would be lost after event_max_age_s."
+  }
+}
+
+variable "assemble" {
+  description = "Size of the assemble function, which writes GIFs, sweeps and records failures"
+  type = object({
+    memory_mb            = optional(number, 3008)
+    timeout_s            = optional(number, 900)
+    tmp_mb               = optional(number, 512)
+    reserved_concurrency = optional(number)
+  })
+  default  = {}
+  nullable = false
+
+  validation {
+    condition     = var.assemble.memory_mb >= 128 && var.assemble.memory_mb <= 10240 && floor(var.assemble.memory_mb) == var.assemble.memory_mb
+    error_message = "assemble.memory_mb must be a whole number from 128 to 10240."
+  }
+  validation {
+    condition     = var.assemble.timeout_s >= 10 && var.assemble.timeout_s <= 900 && floor(var.assemble.timeout_s) == var.assemble.timeout_s
+    error_message = "assemble.timeout_s must be a whole number from 10 to 900."
+  }
+  validation {
+    condition     = var.assemble.tmp_mb >= 512 && var.assemble.tmp_mb <= 10240 && floor(var.assemble.tmp_mb) == var.assemble.tmp_mb
+    error_message = "assemble.tmp_mb must be a whole number from 512 to 10240."
+  }
+  validation {
+    condition     = var.assemble.reserved_concurrency == null ? true : var.assemble.reserved_concurrency >= 3
+    error_message = "assemble.reserved_concurrency must be at least 3: two for the failure queue's readers and one for claims and the sweep."
+  }
+}
+
+variable "permissions_boundary_arn" {
+  description = "ARN of a policy that bounds every role of the stack; null sets none"
+  type        = string
+  default     = null
+
+  validation {
+    condition     = var.permissions_boundary_arn == null ? true : can(regex("^arn:[a-z-]+:iam::([0-9]{12}|aws):policy/", var.permissions_boundary_arn))
+    error_message = "permissions_boundary_arn must be the ARN of an IAM policy."
+  }
+}
+
+variable "xray_tracing" {
+  description = "Whether X-Ray samples the invocations"
+  type        = bool
+  default     = true
+  nullable    = false
+}
+
+variable "log_level" {
+  description = "Least severe level that the functions log: TRACE, DEBUG, INFO, WARN, ERROR or FATAL"
+  type        = string
+  default     = "INFO"
+  nullable    = false
+
+  validation {
+    condition     = contains(["TRACE", "DEBUG", "INFO", "WARN", "ERROR", "FATAL"], var.log_level)
+    error_message = "log_level must be TRACE, DEBUG, INFO, WARN, ERROR or FATAL."
+  }
+}
+
+variable "log_retention_days" {
+  description = "Days to keep the functions' logs"
+  type        = number
+  default     = 30
+  nullable    = false
+
+  validation {
+    condition     = contains([1, 3, 5, 7, 14, 30, 60, 90, 120, 150, 180, 365, 400, 545, 731, 1096, 1827, 2192, 2557, 2922, 3288, 3653], var.log_retention_days)
+    error_message = "log_retention_days must be one of CloudWatch's: 1, 3, 5, 7, 14, 30, 60, 90, 120, 150, 180, 365, 400, 545, 731, 1096, 1827, 2192, 2557, 2922, 3288 or 3653."
+  }
+}
+
+# Events
+
+variable "event_retries" {
+  description = "How often Lambda runs a failed event again before it goes to the failure queue: 0, 1 or 2"
+  type        = number
+  default     = 2
+  nullable    = false
+
+  validation {
+    condition     = contains([0, 1, 2], var.event_retries)
+    error_message = "event_retries must be 0, 1 or 2."
+  }
+}
+
+variable "event_max_age_s" {
+  description = "Seconds that an event may wait for a free invocation before it goes to the failure queue, at most 21,600"
+  type        = number
+  default     = 21600
+  nullable    = false
+
+  validation {
+    condition     = var.event_max_age_s >= 60 && var.event_max_age_s <= 21600 && floor(var.event_max_age_s) == var.event_max_age_s
+    error_message = "event_max_age_s must be a whole number from 60 to 21600."
+  }
+}
+
+variable "sweep_minutes" {
+  description = "Minutes between two sweeps, which heal what lost events left behind; each lists every animation of the bucket, and so costs requests"
+  type        = number
+  default     = 15
+  nullable    = false
+
+  validation {
+    condition     = var.sweep_minutes >= 2 && var.sweep_minutes <= 1440 && floor(var.sweep_minutes) == var.sweep_minutes
+    error_message = "sweep_minutes must be a whole number from 2 to 1440."
+  }
+}
+
+# Watching
+
+variable "alarms_enabled" {
+  description = "Whether to create the alarms"
+  type        = bool
+  default     = true
+  nullable    = false
+}
+
+variable "alarm_actions" {
+  description = "ARNs, of SNS topics for example, that are told when an alarm goes off and when it is over"
+  type        = list(string)
+  default     = []
+  nullable    = false
+
+  validation {
+    condition     = alltrue([for arn in var.alarm_actions : startswith(arn, "arn:")])
+    error_message = "alarm_actions must be ARNs."
+  }
+}
+
+variable "dashboard_enabled" {
+  description = "Whether to create the CloudWatch dashboard"
+  type        = bool
+  default     = true
+  nullable    = false
+}
