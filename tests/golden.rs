@@ -1,0 +1,101 @@
+//! Golden frames: small pictures of the scenes in `scenes/`, committed in `tests/golden/`.
+//!
+//! Every frame must agree with its golden one within one level in each channel, drawn by the renderer and by the
+//! reference alike. A failure writes golden, drawn and difference side by side. After a change of the picture that is
+//! meant: `RAYFOLD_RENEW=1 cargo test -p rayfold-tracer --test golden`, then look at what `git diff` brings.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use image::{GenericImage as _, Rgb, RgbImage};
+use rayfold_scene::{Limits, Scene, Screen, parse};
+use rayfold_tracer::{RenderOptions, reference, render};
+
+/// Levels that a channel may be off: a result that lies on the border between two levels may round either way.
+const TOLERANCE: u8 = 1;
+/// Side of a golden frame in pixels.
+const SIDE: u32 = 96;
+
+#[test]
+fn sphere_light() {
+    check("sphere_light", &["frame01", "frame04", "frame08"]);
+}
+
+#[test]
+fn moving_up() {
+    check("moving_up", &["frame01", "frame03", "frame06"]);
+}
+
+#[test]
+fn artistic() {
+    check("artistic", &["frame01", "frame08", "frame15"]);
+}
+
+#[test]
+fn artisticsss() {
+    check("artisticsss", &["frame01", "frame08", "frame15"]);
+}
+
+#[test]
+fn hello() {
+    check("hello", &["frame01", "frame17", "frame34", "frame50"]);
+}
+
+fn check(folder: &str, frames: &[&str]) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    for frame in frames {
+        let scene = load(&root.join("scenes").join(folder).join(format!("{frame}.txt")));
+        let golden_path = root.join("tests/golden").join(folder).join(format!("{frame}.png"));
+        if std::env::var_os("RAYFOLD_RENEW").is_some() {
+            fs::create_dir_all(golden_path.parent().unwrap()).unwrap();
+            by_reference(&scene).save(&golden_path).unwrap();
+        }
+        let golden = image::open(&golden_path)
+            .unwrap_or_else(|e| panic!("{}: {e}", golden_path.display()))
+            .into_rgb8();
+        let name = format!("{folder}/{frame}");
+        compare(&format!("{name} by the reference"), &golden, &by_reference(&scene));
+        compare(&name, &golden, &render(&scene, &RenderOptions::default()).unwrap());
+    }
+}
+
+fn by_reference(scene: &Scene) -> RgbImage {
+    reference::render(scene, &RenderOptions::default()).unwrap()
+}
+
+fn load(path: &Path) -> Scene {
+    let text = fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let parsed = parse(&path.display().to_string(), &text, &Limits::default());
+    let script = parsed.script.unwrap_or_else(|| panic!("{}: {:?}", path.display(), parsed.diagnostics));
+    let mut scene = script.frames().next().unwrap();
+    scene.screen = Screen::new(SIDE, SIDE).unwrap();
+    scene
+}
+
+fn compare(name: &str, golden: &RgbImage, drawn: &RgbImage) {
+    assert_eq!(golden.dimensions(), drawn.dimensions(), "{name}: size");
+    let off = |a: &Rgb<u8>, b: &Rgb<u8>| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap();
+    let bad = golden.pixels().zip(drawn.pixels()).filter(|(a, b)| off(a, b) > TOLERANCE).count();
+    if bad == 0 {
+        return;
+    }
+    let mut difference = RgbImage::new(SIDE, SIDE);
+    for (x, y, pixel) in difference.enumerate_pixels_mut() {
+        let level = off(golden.get_pixel(x, y), drawn.get_pixel(x, y));
+        *pixel = if level > TOLERANCE { Rgb([255, level, 0]) } else { Rgb([0, 0, level * 80]) };
+    }
+    let mut panels = RgbImage::new(3 * SIDE, SIDE);
+    for (k, panel) in [golden, drawn, &difference].into_iter().enumerate() {
+        panels.copy_from(panel, k as u32 * SIDE, 0).unwrap();
+    }
+    let path =
+        PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("{}.png", name.replace(['/', ' '], "-")));
+    panels.save(&path).unwrap();
+    panic!(
+        "{name}: {bad} pixels are off by more than {TOLERANCE} level; golden, drawn and difference: {}\n\
+         if the change is meant: RAYFOLD_RENEW=1 cargo test -p rayfold-tracer --test golden",
+        path.display()
+    );
+}
