@@ -7,7 +7,7 @@ use clap::{Parser, Subcommand};
 
 use crate::console::{Color, Console};
 use crate::outcome::{Outcome, exit_code};
-use crate::{completions, interrupt};
+use crate::{check, completions, interrupt, render, split};
 
 /// Ray-traced animations from a folder of scene scripts.
 #[derive(Debug, Parser)]
@@ -18,6 +18,11 @@ use crate::{completions, interrupt};
     subcommand_required = true,
     arg_required_else_help = true,
     after_help = "\
+Examples:
+  rayfold render scenes/hello -o hello.gif      render a folder of scripts to an animation
+  rayfold check scenes/hello                    show what is wrong with its scripts
+  rayfold render --help                         more about rendering
+
 Exit codes: 0 done, 1 the input or the rendering failed, 2 wrong usage, 130 interrupted."
 )]
 pub(crate) struct App {
@@ -39,12 +44,18 @@ struct Global {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Render(render::Args),
+    Check(check::Args),
+    Split(split::Args),
     Completions(completions::Args),
 }
 
 impl Command {
     fn run(self, console: &Console) -> anyhow::Result<Outcome> {
         match self {
+            Self::Render(args) => render::run(&args, console),
+            Self::Check(args) => check::run(&args, console),
+            Self::Split(args) => split::run(&args, console),
             Self::Completions(args) => completions::run(&args, console),
         }
     }
@@ -64,7 +75,10 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let result = interrupt::listen().map_err(anyhow::Error::new).and_then(|()| app.command.run(&console));
     match result {
         Ok(outcome) => outcome.into(),
-        Err(_) if interrupt::signalled() => Outcome::Interrupted.into(),
+        Err(_) if interrupt::signalled() => {
+            console.note("interrupted");
+            Outcome::Interrupted.into()
+        }
         Err(error) => {
             console.error(&error);
             exit_code(&error)

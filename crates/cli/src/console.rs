@@ -68,11 +68,24 @@ impl Console {
     /// An error and its causes, on one line: `error: cannot read a.txt: permission denied`.
     pub(crate) fn error(&self, error: &anyhow::Error) {
         let label = if self.color { "\x1b[1;31merror\x1b[0m" } else { "error" };
-        self.say(format_args!("{label}: {error:#}"));
+        self.say(format_args!("{label}: {}", describe(error)));
     }
 
     /// Diagnostics and other text that must be seen. There is nowhere left to report that standard error is gone.
     pub(crate) fn say(&self, text: impl std::fmt::Display) {
         let _ = writeln!(std::io::stderr().lock(), "{text}");
     }
+}
+
+/// An error and its causes.
+pub(crate) fn describe(error: &anyhow::Error) -> String {
+    let causes: Vec<String> = error.chain().map(without_number).collect();
+    causes.join(": ")
+}
+
+/// What went wrong, without the number that the system has for it.
+fn without_number(error: &(dyn std::error::Error + 'static)) -> String {
+    let text = error.to_string();
+    let end = if error.is::<std::io::Error>() { text.rfind(" (os error ") } else { None };
+    text[..end.unwrap_or(text.len())].to_owned()
 }

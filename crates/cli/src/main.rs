@@ -4,16 +4,21 @@
 //! which holds what the global flags and the environment resolved to. Data goes to standard output, everything for
 //! people to standard error. Exit codes: see [`outcome`].
 
-#![allow(dead_code, reason = "render, the next subcommand, uses the rest")]
-
 use std::process::ExitCode;
 
 mod app;
+mod check;
 mod completions;
 mod console;
+mod input;
 mod interrupt;
 mod outcome;
 mod output;
+mod progress;
+mod render;
+mod split;
+mod survey;
+mod threads;
 
 fn main() -> ExitCode {
     app::run(std::env::args_os())

@@ -26,20 +26,8 @@ pub(crate) enum OutputError {
     #[error("cannot write {}: it is {what}", path.display())]
     Taken { path: PathBuf, what: &'static str },
     /// The system says no.
-    #[error("cannot write {}: {}", path.display(), reason(source))]
+    #[error("cannot write {}", path.display())]
     Io { path: PathBuf, source: io::Error },
-}
-
-/// What the system says, without its error number.
-pub(crate) fn reason(error: &io::Error) -> String {
-    let text = error.to_string();
-    let end = text.rfind(" (os error ").unwrap_or(text.len());
-    let mut text = text[..end].to_owned();
-    if let Some(first) = text.get(..1) {
-        let lower = first.to_lowercase();
-        text.replace_range(..1, &lower);
-    }
-    text
 }
 
 /// A file on its way; dropping it unfinished removes what was written.

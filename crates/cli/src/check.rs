@@ -1,0 +1,124 @@
+//! `rayfold check`: what is wrong with scripts and settings, for people and for editors.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use rayfold_scene::{Diagnostic, Limits};
+use serde::Serialize;
+
+use crate::console::{Console, describe};
+use crate::input::{Input, SETTINGS};
+use crate::outcome::Outcome;
+use crate::survey::{Faults, number, parse_all};
+use crate::threads::Threads;
+
+/// Show what is wrong with scripts, without rendering them
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  rayfold check scenes/hello                  a folder: its scripts and its animation.json
+  rayfold check scenes/*                      several
+  rayfold check --format json a.txt           for an editor, on standard output
+  cat a.txt | rayfold check -                 a buffer that is not saved
+
+The JSON document holds the number of files, frames, errors and warnings; `diagnostics`, each with file, line,
+column, span (byte offsets), severity, code, message and, where there is one, expected and help; and `unreadable`,
+the files that could not be read.")]
+pub(crate) struct Args {
+    /// Folders, script files, animation.json, or - for standard input
+    #[arg(required = true)]
+    input: Vec<PathBuf>,
+    /// How to show them
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+    /// The largest image that a script may ask for, in pixels
+    #[arg(long, value_name = "N", default_value_t = Limits::PIXELS)]
+    max_pixels: u64,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Format {
+    /// For people, on standard error
+    #[default]
+    Text,
+    /// For programs, one document on standard output
+    Json,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    files: usize,
+    frames: usize,
+    errors: usize,
+    warnings: usize,
+    diagnostics: &'a [Diagnostic],
+    unreadable: Vec<String>,
+}
+
+pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
+    args.threads.start()?;
+    let limits = Limits { max_pixels: args.max_pixels, ..Limits::default() };
+    let is_settings =
+        |path: &PathBuf| path.file_name().is_some_and(|name| name == SETTINGS) && !path.is_dir();
+    let (settings, inputs): (Vec<_>, Vec<_>) = args.input.iter().cloned().partition(is_settings);
+
+    let mut faults = Faults::default();
+    for path in &settings {
+        faults.settings(path);
+    }
+    let mut frames = 0;
+    for input in Input::each(&inputs, &limits) {
+        let input = match input {
+            Ok(input) => input,
+            Err(error) => {
+                faults.unusable(error);
+                continue;
+            }
+        };
+        if let Some(path) = &input.settings {
+            faults.settings(path);
+        }
+        let found = parse_all(&input.scripts, &limits, |_, parsed| {
+            let mut faults = Faults::default();
+            let frames = faults.script(parsed).map_or(0, |script| script.frame_count());
+            (faults, frames)
+        })?;
+        for (found, count) in found {
+            faults.add(found);
+            frames += count;
+        }
+    }
+    match args.format {
+        Format::Text => tell(&faults, frames, console),
+        Format::Json => {
+            let report = Report {
+                files: faults.files,
+                frames,
+                errors: faults.errors(),
+                warnings: faults.warnings(),
+                diagnostics: &faults.diagnostics,
+                unreadable: faults.unreadable.iter().map(describe).collect(),
+            };
+            let mut text = serde_json::to_vec_pretty(&report)?;
+            text.push(b'\n');
+            console.print(text)?;
+        }
+    }
+    Ok(if faults.bad > 0 { Outcome::Failed } else { Outcome::Done })
+}
+
+fn tell(faults: &Faults, frames: usize, console: &Console) {
+    faults.show(console);
+    let warnings = match faults.warnings() {
+        0 => String::new(),
+        n => format!(", {}", number(n, "warning")),
+    };
+    if faults.bad > 0 {
+        console.note(format_args!("{}{warnings}", faults.count()));
+    } else {
+        let files = number(faults.files, "file");
+        console.note(format_args!("{files}, {}: no errors{warnings}", number(frames, "frame")));
+    }
+}

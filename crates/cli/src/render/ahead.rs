@@ -1,0 +1,100 @@
+//! Rendering ahead of whoever takes the frames in order.
+//!
+//! Frames are drawn side by side on the rayon pool while the caller's thread takes the finished ones in order. How many
+//! may be drawn or waiting at once is bounded, so that memory does not grow with the number of frames, however slow the
+//! taker is.
+
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc;
+
+use crate::interrupt;
+
+/// Has `work` done on every item of `items`, at most `window` at once, and gives the results to `take` in order.
+///
+/// The first error, of an item, of its work or of taking it, ends the whole: everything under way is told to stop
+/// ([`interrupt::stop`]) and awaited.
+///
+/// # Errors
+/// That first error.
+pub(crate) fn in_order<I: Send, T: Send>(
+    items: impl Iterator<Item = I>,
+    window: usize,
+    work: impl Fn(I) -> anyhow::Result<T> + Sync,
+    mut take: impl FnMut(T) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    let mut items = items.enumerate().fuse();
+    let (sender, receiver) = mpsc::channel();
+    let work = &work;
+    rayon::in_place_scope(|scope| {
+        let mut waiting = BTreeMap::new();
+        let (mut started, mut taken) = (0, 0);
+        let mut run = || {
+            loop {
+                while started - taken < window.max(1) {
+                    let Some((index, item)) = items.next() else { break };
+                    started += 1;
+                    let sender = sender.clone();
+                    scope.spawn(move |_| {
+                        // A panic must not leave the taker waiting for ever.
+                        let result = catch_unwind(AssertUnwindSafe(|| work(item)))
+                            .unwrap_or_else(|_| Err(anyhow::anyhow!("frame {} ran into a bug", index + 1)));
+                        // Nobody listens any more when the whole has failed.
+                        let _ = sender.send((index, result));
+                    });
+                }
+                if let Some(next) = waiting.remove(&taken) {
+                    taken += 1;
+                    take(next)?;
+                    continue;
+                }
+                if started == taken {
+                    return Ok(());
+                }
+                let (index, result) = receiver.recv()?;
+                waiting.insert(index, result?);
+            }
+        };
+        let result = run();
+        if result.is_err() {
+            interrupt::stop();
+        }
+        result
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn results_come_in_order_and_never_more_than_the_window() {
+        let (under_way, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let mut taken = Vec::new();
+        in_order(
+            0..100_u64,
+            5,
+            |n| {
+                most.fetch_max(under_way.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+                std::thread::sleep(Duration::from_micros(n * 7919 % 500));
+                Ok(n)
+            },
+            |n| {
+                under_way.fetch_sub(1, Ordering::SeqCst);
+                taken.push(n);
+                Ok(())
+            },
+        )
+        .unwrap();
+        assert_eq!(taken, (0..100).collect::<Vec<_>>());
+        assert!(most.into_inner() <= 5);
+    }
+
+    #[test]
+    fn nothing_to_do_is_done() {
+        in_order(0..0, 3, Ok, |_: i32| panic!("nothing to take")).unwrap();
+    }
+}

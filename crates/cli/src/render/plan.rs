@@ -1,0 +1,257 @@
+//! Which frames there are, found out before the first is drawn.
+//!
+//! Every script is parsed once to learn its faults and the shape of its frames. Small scripts are kept; beyond
+//! [`KEPT_TEXT`] they are parsed again when their turn comes, so that memory does not grow with their number.
+
+use std::ops::RangeInclusive;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+
+use rayfold_scene::{AnimationSettings, Camera, Limits, Scene, Screen, Script};
+
+use crate::console::Console;
+use crate::input::{Input, SETTINGS, ScriptFile};
+use crate::survey::{Faults, number, parse_all};
+
+/// Bytes of text of which the parsed scripts are kept; they take about as much again.
+const KEPT_TEXT: usize = 64 << 20;
+
+/// Memory that frames ahead of the encoder may take, in bytes: fifteen images of 1920 x 1080 with what goes with them.
+const AHEAD: u64 = 192 << 20;
+
+/// Frames in order, and what they are drawn with.
+#[derive(Debug)]
+pub(crate) struct Plan {
+    parts: Vec<Part>,
+    limits: Limits,
+    size: Option<Screen>,
+    selected: RangeInclusive<u64>,
+    /// What the folder says about the animation.
+    pub(crate) settings: AnimationSettings,
+}
+
+/// A frame to draw.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Job {
+    /// Counted from 1 over all scripts.
+    pub(crate) number: u64,
+    part: usize,
+    index: usize,
+}
+
+#[derive(Debug)]
+struct Part {
+    file: ScriptFile,
+    /// Neighbouring frames of one shape are counted together.
+    runs: Vec<(usize, Shape)>,
+    frames: usize,
+    kept: Option<Arc<Script>>,
+    used: Mutex<Weak<Script>>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Shape {
+    screen: Screen,
+    orthographic: bool,
+    /// Rounded up to a power of two, so that a growing scene is few runs.
+    objects: usize,
+}
+
+/// What the user wants of the frames.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Wishes {
+    /// Draw them in this size.
+    pub(crate) size: Option<Screen>,
+    /// First and last frame; beyond the ends of what there is, when they are not given.
+    pub(crate) frames: (Option<u64>, Option<u64>),
+}
+
+/// Why the frames cannot be drawn although each script is fine by itself.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum PlanError {
+    #[error("the input has {}: there is no frame {wanted}", number(*.frames as usize, "frame"))]
+    NoSuchFrame { frames: u64, wanted: u64 },
+    #[error("{SETTINGS} says {}, but the scripts give {frames}", number(*.expected as usize, "frame"))]
+    TooFew { frames: u64, expected: u64 },
+    #[error(
+        "--size needs a pinhole camera: frame {frame} ({name}) is drawn by Orthocamera, whose pixels are world units"
+    )]
+    Orthographic { frame: u64, name: String },
+    #[error(
+        "a GIF has one size, but frame {first} ({first_name}) is {} x {} and frame {frame} ({name}) is {} x {}: give \
+         them one with --size",
+        .first_size.width(), .first_size.height(), .size.width(), .size.height()
+    )]
+    UnlikeSizes { first: u64, first_name: String, first_size: Screen, frame: u64, name: String, size: Screen },
+}
+
+impl Plan {
+    /// Parses everything and shows what is wrong. `None` when a script has an error.
+    ///
+    /// # Errors
+    /// When the scripts are fine but the wishes cannot be fulfilled.
+    pub(crate) fn new(
+        input: &Input,
+        limits: &Limits,
+        wishes: &Wishes,
+        console: &Console,
+    ) -> anyhow::Result<Result<Self, Faults>> {
+        let kept = AtomicUsize::new(0);
+        let parsed = parse_all(&input.scripts, limits, |file, parsed| {
+            let mut faults = Faults::default();
+            let part = faults.script(parsed).map(|script| {
+                let text = file.path().and_then(|p| p.metadata().ok()).map_or(0, |m| m.len() as usize);
+                let keep = kept.fetch_add(text, Ordering::Relaxed) + text <= KEPT_TEXT;
+                Part::new(file.clone(), script, keep)
+            });
+            (faults, part)
+        })?;
+        let mut faults = Faults::default();
+        let settings = input.settings.as_ref().map(|path| faults.settings(path));
+        let mut parts = Vec::with_capacity(parsed.len());
+        for (found, part) in parsed {
+            faults.add(found);
+            parts.extend(part);
+        }
+        faults.show(console);
+        if faults.bad > 0 {
+            return Ok(Err(faults));
+        }
+        let frames: u64 = parts.iter().map(|part| part.frames as u64).sum();
+        let settings = settings.flatten().unwrap_or_default();
+        if let Some(expected) = settings.frames()
+            && frames < expected
+        {
+            return Err(PlanError::TooFew { frames, expected }.into());
+        }
+        let (first, last) = (wishes.frames.0.unwrap_or(1), wishes.frames.1.unwrap_or(frames));
+        if let Some(wanted) = [first, last].into_iter().find(|n| *n < 1 || *n > frames) {
+            return Err(PlanError::NoSuchFrame { frames, wanted }.into());
+        }
+        let plan = Self { parts, limits: *limits, size: wishes.size, selected: first..=last, settings };
+        if plan.size.is_some()
+            && let Some((frame, part, _)) = plan.runs().find(|(_, _, shape)| shape.orthographic)
+        {
+            return Err(PlanError::Orthographic { frame, name: part.file.name.clone() }.into());
+        }
+        Ok(Ok(plan))
+    }
+
+    /// How many frames are to be drawn.
+    pub(crate) fn len(&self) -> u64 {
+        self.selected.end() + 1 - self.selected.start()
+    }
+
+    /// # Errors
+    /// When the frames have several sizes.
+    pub(crate) fn one_size(&self) -> Result<Screen, PlanError> {
+        let mut runs = self.runs();
+        let (first, first_part, shape) = runs.next().expect("a plan has a frame");
+        let first_size = self.size.unwrap_or(shape.screen);
+        match runs.find(|(_, _, shape)| self.size.is_none() && shape.screen != first_size) {
+            None => Ok(first_size),
+            Some((frame, part, shape)) => Err(PlanError::UnlikeSizes {
+                first,
+                first_name: first_part.file.name.clone(),
+                first_size,
+                frame,
+                name: part.file.name.clone(),
+                size: shape.screen,
+            }),
+        }
+    }
+
+    /// How many frames may be under way at once.
+    pub(crate) fn window(&self) -> usize {
+        let bytes = |shape: &Shape| {
+            let pixels = self.size.unwrap_or(shape.screen).pixels();
+            // The image and what it is encoded into; objects and what finds them quickly.
+            6 * pixels + 400 * shape.objects as u64
+        };
+        let largest = self.runs().map(|(_, _, shape)| bytes(shape)).max().unwrap_or(1);
+        let most = 4 * rayon::current_num_threads();
+        usize::try_from(AHEAD / largest).unwrap_or(most).clamp(1, most)
+    }
+
+    /// The frames to draw, in order.
+    pub(crate) fn jobs(&self) -> impl Iterator<Item = Job> + '_ {
+        let skip = *self.selected.start() as usize - 1;
+        (self.parts.iter().enumerate())
+            .flat_map(|(part, p)| (0..p.frames).map(move |index| (part, index)))
+            .zip(1..)
+            .map(|((part, index), number)| Job { number, part, index })
+            .skip(skip)
+            .take(self.len() as usize)
+    }
+
+    /// What a frame is drawn from.
+    ///
+    /// # Errors
+    /// When the script cannot be read again, or has changed for the worse since it was checked.
+    pub(crate) fn scene(&self, job: &Job) -> anyhow::Result<Scene> {
+        let part = &self.parts[job.part];
+        let script = part.script(&self.limits)?;
+        let mut scene = script.frame(job.index).ok_or_else(|| part.changed())?;
+        if let Some(size) = self.size {
+            scene.screen = size;
+        }
+        Ok(scene)
+    }
+
+    /// The script of a frame, as messages name it.
+    pub(crate) fn name(&self, job: &Job) -> &str {
+        &self.parts[job.part].file.name
+    }
+
+    /// Selected frames of one shape in a row, each with the number of its first.
+    fn runs(&self) -> impl Iterator<Item = (u64, &Part, &Shape)> {
+        let mut next = 1;
+        self.parts.iter().flat_map(|part| part.runs.iter().map(move |run| (part, run))).filter_map(
+            move |(part, (count, shape))| {
+                let (first, last) = (next, next + *count as u64 - 1);
+                next = last + 1;
+                let seen = first <= *self.selected.end() && last >= *self.selected.start();
+                seen.then(|| (first.max(*self.selected.start()), part, shape))
+            },
+        )
+    }
+}
+
+impl Part {
+    fn new(file: ScriptFile, script: Script, keep: bool) -> Self {
+        let mut runs: Vec<(usize, Shape)> = Vec::new();
+        for scene in script.frames() {
+            let shape = Shape {
+                screen: scene.screen,
+                orthographic: matches!(scene.camera, Camera::Orthographic),
+                objects: scene.objects.len().next_power_of_two(),
+            };
+            match runs.last_mut() {
+                Some((count, last)) if *last == shape => *count += 1,
+                _ => runs.push((1, shape)),
+            }
+        }
+        let frames = script.frame_count();
+        // What was read from standard input stays in memory anyhow.
+        let kept = (keep || file.path().is_none()).then(|| Arc::new(script));
+        Self { file, runs, frames, kept, used: Mutex::default() }
+    }
+
+    /// Kept, or in use by another frame, or parsed anew.
+    fn script(&self, limits: &Limits) -> anyhow::Result<Arc<Script>> {
+        if let Some(script) = &self.kept {
+            return Ok(Arc::clone(script));
+        }
+        let mut used = self.used.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(script) = used.upgrade() {
+            return Ok(script);
+        }
+        let script = Arc::new(self.file.parse(limits)?.script.ok_or_else(|| self.changed())?);
+        *used = Arc::downgrade(&script);
+        Ok(script)
+    }
+
+    fn changed(&self) -> anyhow::Error {
+        anyhow::anyhow!("{} has changed while it was being rendered", self.file.name)
+    }
+}

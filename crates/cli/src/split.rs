@@ -1,0 +1,78 @@
+//! `rayfold split`: a script with many Traces becomes a folder with a script a frame.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use rayfold_scene::Limits;
+
+use crate::console::Console;
+use crate::input::{Input, SETTINGS};
+use crate::interrupt;
+use crate::outcome::Outcome;
+use crate::output::OutputFile;
+use crate::survey::{Faults, number};
+
+/// Split a script with many Traces into one script a frame
+///
+/// Each script holds all that its frame needs, so that frames can be rendered apart from each other.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  rayfold split flight.txt flight        writes flight/flight-001.txt and on
+  rayfold render flight -o flight.gif    draws the same as flight.txt")]
+pub(crate) struct Args {
+    /// The script, or - for standard input
+    script: PathBuf,
+    /// The folder to write to; it is made when it is not there
+    dir: PathBuf,
+    /// The largest image that a script may ask for, in pixels
+    #[arg(long, value_name = "N", default_value_t = Limits::PIXELS)]
+    max_pixels: u64,
+}
+
+pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
+    if args.script.is_dir() {
+        anyhow::bail!("{} is a folder: expected a script", args.script.display());
+    }
+    let limits = Limits { max_pixels: args.max_pixels, ..Limits::default() };
+    let input = Input::animation(std::slice::from_ref(&args.script), &limits)?;
+    let mut faults = Faults::default();
+    let script = faults.script(input.scripts[0].parse(&limits));
+    faults.show(console);
+    let Some(script) = script else { anyhow::bail!("nothing was written: {}", faults.count()) };
+
+    let stem = args.script.file_stem().filter(|_| input.scripts[0].path().is_some());
+    let stem = stem.map_or_else(|| "frame".into(), |stem| stem.to_string_lossy());
+    let digits = script.frame_count().to_string().len();
+    let name = |number: usize| format!("{stem}-{number:0digits$}.txt");
+
+    let folder = &args.dir;
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let ours: BTreeSet<String> = (1..=script.frame_count()).map(name).collect();
+    refuse_strangers(folder, &ours)?;
+    for (scene, number) in script.frames().zip(1..) {
+        anyhow::ensure!(!interrupt::stopping(), "interrupted");
+        OutputFile::write(folder.join(name(number)), scene.to_string().as_bytes(), false)?;
+    }
+    let first = folder.join(name(1));
+    console.note(format_args!("{}: {} and on", number(script.frame_count(), "script"), first.display()));
+    Ok(Outcome::Done)
+}
+
+/// Other scripts in the folder would become frames of the same animation.
+fn refuse_strangers(folder: &Path, ours: &BTreeSet<String>) -> anyhow::Result<()> {
+    let entries =
+        std::fs::read_dir(folder).with_context(|| format!("cannot list the folder {}", folder.display()))?;
+    for entry in entries {
+        let name = entry?.file_name().to_string_lossy().into_owned();
+        if (name.ends_with(".txt") || name == SETTINGS) && !ours.contains(&name) {
+            anyhow::bail!(
+                "{} already holds {name}, which would be part of the same animation: expected a folder without scripts",
+                folder.display()
+            );
+        }
+    }
+    Ok(())
+}

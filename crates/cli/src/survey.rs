@@ -1,0 +1,122 @@
+//! Looking at all scripts before anything is done with any of them, so that all faults are told in one go.
+
+use std::path::Path;
+
+use anyhow::Context;
+use rayfold_scene::{AnimationSettings, Diagnostic, Limits, Parsed, Script, Severity, parse_settings};
+use rayon::prelude::*;
+
+use crate::console::Console;
+use crate::input::ScriptFile;
+use crate::interrupt;
+
+/// What is wrong with a number of scripts, in their order.
+#[derive(Debug, Default)]
+pub(crate) struct Faults {
+    /// What the parser says.
+    pub(crate) diagnostics: Vec<Diagnostic>,
+    /// Files that could not be read.
+    pub(crate) unreadable: Vec<anyhow::Error>,
+    /// How many files have an error.
+    pub(crate) bad: usize,
+    /// How many were looked at.
+    pub(crate) files: usize,
+}
+
+impl Faults {
+    /// How many errors there are in all.
+    pub(crate) fn errors(&self) -> usize {
+        self.unreadable.len() + self.diagnostics.iter().filter(|d| d.is_error()).count()
+    }
+
+    /// How many warnings there are in all.
+    pub(crate) fn warnings(&self) -> usize {
+        self.diagnostics.iter().filter(|d| d.severity == Severity::Warning).count()
+    }
+
+    /// Notes what is wrong with the next script, which is `None` when it is of no use.
+    pub(crate) fn script(&mut self, parsed: anyhow::Result<Parsed>) -> Option<Script> {
+        let parsed = parsed.map(|parsed| (parsed.script, parsed.diagnostics));
+        self.sort_out(parsed)
+    }
+
+    /// Reads a folder's settings and notes what is wrong with them; they are `None` when they are of no use.
+    pub(crate) fn settings(&mut self, path: &Path) -> Option<AnimationSettings> {
+        let name = path.display().to_string();
+        let parsed = std::fs::read(path)
+            .with_context(|| format!("cannot read {name}"))
+            .map(|text| parse_settings(&name, &text))
+            .map(|parsed| (parsed.settings, parsed.diagnostics));
+        self.sort_out(parsed)
+    }
+
+    /// Notes an input that could not even be listed.
+    pub(crate) fn unusable(&mut self, error: anyhow::Error) {
+        let _: Option<()> = self.sort_out(Err(error));
+    }
+
+    /// Notes what others found after what was noted here.
+    pub(crate) fn add(&mut self, others: Self) {
+        self.diagnostics.extend(others.diagnostics);
+        self.unreadable.extend(others.unreadable);
+        self.bad += others.bad;
+        self.files += others.files;
+    }
+
+    fn sort_out<T>(&mut self, parsed: anyhow::Result<(Option<T>, Vec<Diagnostic>)>) -> Option<T> {
+        self.files += 1;
+        let value = match parsed {
+            Ok((value, diagnostics)) => {
+                self.diagnostics.extend(diagnostics);
+                value
+            }
+            Err(unreadable) => {
+                self.unreadable.push(unreadable);
+                None
+            }
+        };
+        self.bad += usize::from(value.is_none());
+        value
+    }
+
+    /// Shows everything to people; warnings only where they did not ask for quiet.
+    pub(crate) fn show(&self, console: &Console) {
+        for error in &self.unreadable {
+            console.error(error);
+        }
+        for diagnostic in &self.diagnostics {
+            if diagnostic.is_error() || !console.quiet {
+                console.say(format_args!("{}\n", diagnostic.render(console.color)));
+            }
+        }
+    }
+
+    /// `3 errors in 2 of 50 files`.
+    pub(crate) fn count(&self) -> String {
+        let errors = number(self.errors(), "error");
+        if self.files == 1 { errors } else { format!("{errors} in {} of {} files", self.bad, self.files) }
+    }
+}
+
+/// `1 frame`, `2 frames`.
+pub(crate) fn number(count: usize, of: &str) -> String {
+    format!("{count} {of}{}", if count == 1 { "" } else { "s" })
+}
+
+/// Parses all scripts side by side and takes each to what `map` makes of it, in their order.
+///
+/// # Errors
+/// Only when the run was told to stop. A file that cannot be read is an error in its own place.
+pub(crate) fn parse_all<T: Send>(
+    scripts: &[ScriptFile],
+    limits: &Limits,
+    map: impl Fn(&ScriptFile, anyhow::Result<Parsed>) -> T + Sync,
+) -> anyhow::Result<Vec<T>> {
+    scripts
+        .par_iter()
+        .map(|script| {
+            anyhow::ensure!(!interrupt::stopping(), "interrupted");
+            Ok(map(script, script.parse(limits)))
+        })
+        .collect()
+}
