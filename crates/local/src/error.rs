@@ -59,6 +59,14 @@ pub enum Error {
         /// Why.
         source: io::Error,
     },
+    /// The bucket could not be set up.
+    #[error("cannot set up the bucket {bucket}")]
+    Bucket {
+        /// Its name.
+        bucket: String,
+        /// Why.
+        source: rayfold_pipeline::Error,
+    },
     /// The system gave no random bytes for the credentials.
     #[error("no random bytes from the system: {0}")]
     Random(getrandom::Error),

@@ -14,7 +14,9 @@ pub mod invoker;
 mod meter;
 pub mod minio;
 pub mod observation;
+mod platform;
 pub mod routes;
 
 pub use error::{Error, Result};
 pub use functions::Functions;
+pub use platform::{Plan, Platform, connection};

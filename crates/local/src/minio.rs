@@ -12,7 +12,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::Write;
 use std::net::SocketAddr;
 use std::os::unix::fs::OpenOptionsExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
@@ -99,6 +99,7 @@ pub struct Webhook {
 pub struct Minio {
     process: Guarded,
     address: SocketAddr,
+    data: PathBuf,
     credentials: Credentials,
     _lock: File,
 }
@@ -140,7 +141,9 @@ impl Minio {
                 &log,
             )?;
             match wait_until_healthy(&mut process, address, start).await {
-                Ok(()) => return Ok(Self { process, address, credentials, _lock: lock }),
+                Ok(()) => {
+                    return Ok(Self { process, address, data: data.to_owned(), credentials, _lock: lock });
+                }
                 Err(reason) if start.elapsed() >= START_TIMEOUT => {
                     return Err(Error::MinioStart { reason, log });
                 }
@@ -162,6 +165,11 @@ impl Minio {
     /// The S3 endpoint.
     pub fn endpoint(&self) -> String {
         format!("http://{}", self.address)
+    }
+
+    /// The folder with everything of it.
+    pub fn data(&self) -> &Path {
+        &self.data
     }
 
     /// Of the owner.

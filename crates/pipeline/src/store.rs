@@ -39,9 +39,13 @@ mod bucket;
 #[cfg(any(test, feature = "conformance"))]
 pub mod conformance;
 mod memory;
+#[cfg(feature = "s3")]
+mod s3;
 
 pub use bucket::Bucket;
 pub use memory::{MemoryStore, MemoryUpload};
+#[cfg(feature = "s3")]
+pub use s3::{Connection, Notification, S3Store, S3Upload};
 
 /// The most names that a store returns in one page of a listing.
 pub const PAGE: usize = 1000;

@@ -1,0 +1,271 @@
+//! A bucket of S3, or of what speaks S3.
+//!
+//! AWS's types end here: callers see the [`Store`] trait and the pipeline's errors. Who and where is taken from the
+//! standard AWS environment (variables, profile, the function's role); whenever an endpoint is set, buckets are
+//! addressed by path, as MinIO wants it.
+//!
+//! The client repeats a request up to three times, with exponential backoff and jitter, when the store is busy (503,
+//! 429), fails (500) or gives no answer. So a conditional put whose answer was lost may meet its own success and answer
+//! [`Error::PreconditionFailed`]. 409 and 412 are never repeated here: what to write next is the caller's decision.
+//!
+//! ```no_run
+//! use rayfold_pipeline::store::{ListRequest, S3Store, Store};
+//! # async fn example() -> rayfold_pipeline::Result<()> {
+//! let store = S3Store::from_environment("my-bucket").await?;
+//! let page = store.list(ListRequest::level("scripts/")).await?;
+//! # Ok(()) }
+//! ```
+
+mod admin;
+mod answers;
+mod upload;
+
+use std::ops::Range;
+use std::time::Duration;
+
+use aws_config::{BehaviorVersion, Region};
+use aws_sdk_s3::Client;
+use aws_sdk_s3::config::http::HttpResponse;
+use aws_sdk_s3::config::retry::RetryConfig;
+use aws_sdk_s3::config::timeout::TimeoutConfig;
+use aws_sdk_s3::config::{
+    Credentials, RequestChecksumCalculation, ResponseChecksumValidation, SharedHttpClient,
+};
+use aws_sdk_s3::error::SdkError;
+use aws_sdk_s3::primitives::{ByteStream, DateTime};
+use aws_sdk_s3::types::EncodingType;
+use aws_smithy_http_client::Builder as HttpBuilder;
+use aws_smithy_http_client::tls::{Provider, rustls_provider::CryptoMode};
+use aws_types::service_config::ServiceConfigKey;
+use bytes::Bytes;
+
+use super::{Condition, ETag, ListPage, ListRequest, Listed, Object, ObjectInfo, PAGE, PutOptions, Store};
+use crate::clock::Timestamp;
+use crate::{Error, Result};
+
+pub use admin::Notification;
+pub use upload::S3Upload;
+
+use answers::{decoded, error_of};
+
+/// Of one request, the repetitions not counted in: longer than any object of the pipeline takes.
+const READ_TIMEOUT: Duration = Duration::from_secs(30);
+
+/// The first try and its repetitions.
+const ATTEMPTS: u32 = 3;
+
+/// A bucket. Clones share the connections.
+#[derive(Debug, Clone)]
+pub struct S3Store {
+    client: Client,
+    bucket: String,
+}
+
+/// Who and where, when it is not the environment that says so.
+#[derive(Clone)]
+pub struct Connection {
+    /// With its scheme: `http://127.0.0.1:9000`.
+    pub endpoint: String,
+    /// The store's region.
+    pub region: String,
+    /// The access key's id.
+    pub access_key: String,
+    /// Its secret.
+    pub secret_key: String,
+}
+
+impl S3Store {
+    /// The bucket as the standard AWS environment reaches it.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] when the environment names no region. Missing or wrong credentials show at the first request.
+    pub async fn from_environment(bucket: &str) -> Result<Self> {
+        let http = https_client();
+        let sdk = aws_config::defaults(BehaviorVersion::latest()).http_client(http).load().await;
+        if sdk.region().is_none() {
+            let source = "no region: set AWS_REGION, or a region in the AWS profile".into();
+            return Err(Error::Refused { key: bucket.to_owned(), source });
+        }
+        let of_s3 = ServiceConfigKey::builder()
+            .service_id("S3")
+            .env("AWS_ENDPOINT_URL")
+            .profile("endpoint_url")
+            .build()
+            .ok()
+            .and_then(|key| sdk.service_config()?.load_config(key));
+        let endpoint = of_s3.or_else(|| sdk.endpoint_url().map(str::to_owned));
+        Ok(Self::new(aws_sdk_s3::config::Builder::from(&sdk), endpoint.as_deref(), bucket))
+    }
+
+    /// The bucket at an endpoint.
+    pub fn at(connection: &Connection, bucket: &str) -> Self {
+        let Connection { endpoint, region, access_key, secret_key } = connection;
+        let config = aws_sdk_s3::Config::builder()
+            .behavior_version(BehaviorVersion::latest())
+            .region(Region::new(region.clone()))
+            .credentials_provider(Credentials::new(access_key, secret_key, None, None, "rayfold"))
+            .http_client(https_client())
+            .endpoint_url(endpoint);
+        Self::new(config, Some(endpoint), bucket)
+    }
+
+    fn new(mut config: aws_sdk_s3::config::Builder, endpoint: Option<&str>, bucket: &str) -> Self {
+        if let Some(endpoint) = endpoint {
+            config = config.force_path_style(true);
+            if endpoint.starts_with("http://") {
+                // Without the certificates, whose loading is the larger part of a cold start.
+                config = config.http_client(HttpBuilder::new().build_http());
+            }
+        }
+        let config = config
+            .retry_config(RetryConfig::standard().with_max_attempts(ATTEMPTS))
+            .timeout_config(
+                TimeoutConfig::builder()
+                    .connect_timeout(Duration::from_secs(3))
+                    .read_timeout(READ_TIMEOUT)
+                    .build(),
+            )
+            // Bodies are signed by their SHA-256 already; parts of an upload need no second checksum at its end.
+            .request_checksum_calculation(RequestChecksumCalculation::WhenRequired)
+            .response_checksum_validation(ResponseChecksumValidation::WhenRequired)
+            .build();
+        Self { client: Client::from_conf(config), bucket: bucket.to_owned() }
+    }
+
+    /// The bucket's name.
+    pub fn bucket(&self) -> &str {
+        &self.bucket
+    }
+
+    async fn read(&self, key: &str, range: Option<Range<u64>>) -> Result<Object> {
+        let header = range.as_ref().map(|range| format!("bytes={}-{}", range.start, range.end.max(1) - 1));
+        let request = self.client.get_object().bucket(&self.bucket).key(key).set_range(header);
+        let answer = match request.send().await {
+            Err(error) if range.is_some_and(|range| range.start == 0) && status(&error) == Some(416) => {
+                // An empty object has no range at all.
+                return Box::pin(self.read(key, None)).await;
+            }
+            answer => answer.map_err(|error| error_of(key, error))?,
+        };
+        let whole = answer.content_range().and_then(|range| range.rsplit_once('/')?.1.parse().ok());
+        let size = whole.unwrap_or_else(|| length(answer.content_length()));
+        let info = ObjectInfo {
+            etag: ETag::new(answer.e_tag().unwrap_or_default()),
+            size,
+            modified: timestamp(answer.last_modified()),
+            metadata: answer.metadata().cloned().unwrap_or_default().into_iter().collect(),
+        };
+        let body = answer.body.collect().await;
+        let body = body.map_err(|error| Error::Ambiguous { key: key.to_owned(), source: error.into() })?;
+        Ok(Object { info, body: body.into_bytes() })
+    }
+}
+
+impl Store for S3Store {
+    type Upload = S3Upload;
+
+    async fn get(&self, key: &str) -> Result<Object> {
+        self.read(key, None).await
+    }
+
+    async fn get_range(&self, key: &str, range: Range<u64>) -> Result<Object> {
+        if range.is_empty() {
+            let info = self.head(key).await?;
+            return Ok(Object { info, body: Bytes::new() });
+        }
+        self.read(key, Some(range)).await
+    }
+
+    async fn head(&self, key: &str) -> Result<ObjectInfo> {
+        let answer = self.client.head_object().bucket(&self.bucket).key(key).send().await;
+        let answer = answer.map_err(|error| error_of(key, error))?;
+        Ok(ObjectInfo {
+            etag: ETag::new(answer.e_tag().unwrap_or_default()),
+            size: length(answer.content_length()),
+            modified: timestamp(answer.last_modified()),
+            metadata: answer.metadata().cloned().unwrap_or_default().into_iter().collect(),
+        })
+    }
+
+    async fn put(&self, key: &str, body: Bytes, options: PutOptions) -> Result<ETag> {
+        let (if_none_match, if_match) = headers(&options.condition);
+        let answer = self
+            .client
+            .put_object()
+            .bucket(&self.bucket)
+            .key(key)
+            .set_if_none_match(if_none_match)
+            .set_if_match(if_match)
+            .content_type(options.content_type)
+            .set_metadata(Some(options.metadata.into_iter().collect()))
+            .body(ByteStream::from(body))
+            .send()
+            .await
+            .map_err(|error| error_of(key, error))?;
+        Ok(ETag::new(answer.e_tag().unwrap_or_default()))
+    }
+
+    async fn delete(&self, key: &str) -> Result<()> {
+        let answer = self.client.delete_object().bucket(&self.bucket).key(key).send().await;
+        answer.map(drop).map_err(|error| error_of(key, error))
+    }
+
+    async fn list(&self, request: ListRequest) -> Result<ListPage> {
+        let answer = self
+            .client
+            .list_objects_v2()
+            .bucket(&self.bucket)
+            .prefix(&request.prefix)
+            .set_delimiter(request.delimiter.then(|| "/".to_owned()))
+            .set_start_after(request.start_after)
+            .set_continuation_token(request.continuation)
+            // Keys may hold what XML cannot.
+            .encoding_type(EncodingType::Url)
+            .max_keys(PAGE as i32)
+            .send()
+            .await
+            .map_err(|error| error_of(&request.prefix, error))?;
+        let objects = answer.contents().iter().map(|object| Listed {
+            key: decoded(object.key().unwrap_or_default()),
+            etag: ETag::new(object.e_tag().unwrap_or_default()),
+            size: length(object.size()),
+            modified: timestamp(object.last_modified()),
+        });
+        let prefixes = answer.common_prefixes().iter();
+        Ok(ListPage {
+            objects: objects.collect(),
+            prefixes: prefixes.map(|prefix| decoded(prefix.prefix().unwrap_or_default())).collect(),
+            next: answer.next_continuation_token().map(str::to_owned),
+        })
+    }
+
+    async fn upload(&self, key: &str, options: PutOptions) -> Result<Self::Upload> {
+        Ok(S3Upload::new(self.clone(), key, options))
+    }
+}
+
+/// `If-None-Match` and `If-Match`.
+fn headers(condition: &Condition) -> (Option<String>, Option<String>) {
+    match condition {
+        Condition::Always => (None, None),
+        Condition::IfAbsent => (Some("*".to_owned()), None),
+        Condition::IfMatch(etag) => (None, Some(format!("\"{etag}\""))),
+    }
+}
+
+fn https_client() -> SharedHttpClient {
+    HttpBuilder::new().tls_provider(Provider::Rustls(CryptoMode::Ring)).build_https()
+}
+
+fn length(bytes: Option<i64>) -> u64 {
+    bytes.and_then(|bytes| u64::try_from(bytes).ok()).unwrap_or_default()
+}
+
+fn timestamp(at: Option<&DateTime>) -> Timestamp {
+    let ms = at.and_then(|at| at.to_millis().ok()).and_then(|ms| u64::try_from(ms).ok());
+    Timestamp(ms.unwrap_or_default())
+}
+
+fn status<E>(error: &SdkError<E, HttpResponse>) -> Option<u16> {
+    error.raw_response().map(|response| response.status().as_u16())
+}

@@ -1,0 +1,79 @@
+//! Setting a bucket up where nobody else does: on AWS that is Terraform's part, on a laptop it is ours.
+
+use aws_sdk_s3::types::{
+    Event, FilterRule, FilterRuleName, NotificationConfiguration, NotificationConfigurationFilter,
+    QueueConfiguration, S3KeyFilter,
+};
+
+use super::S3Store;
+use super::answers::error_of;
+use crate::store::{ListRequest, Store};
+use crate::{Error, Result};
+
+/// Events of keys below a prefix go to a queue.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Notification {
+    /// Of the keys.
+    pub prefix: String,
+    /// S3's names of the events.
+    pub events: Vec<String>,
+    /// The queue.
+    pub queue_arn: String,
+}
+
+impl S3Store {
+    /// Makes the bucket; it is no error that it is there and ours.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] when the name is not allowed or taken by someone else.
+    pub async fn create_bucket(&self) -> Result<()> {
+        match self.client.create_bucket().bucket(&self.bucket).send().await {
+            Ok(_) => Ok(()),
+            Err(error) if error.as_service_error().is_some_and(|e| e.is_bucket_already_owned_by_you()) => {
+                Ok(())
+            }
+            Err(error) => match error_of(&self.bucket, error) {
+                Error::Conflict { key } => {
+                    let source = "the name is taken".into();
+                    Err(Error::Refused { key, source })
+                }
+                error => Err(error),
+            },
+        }
+    }
+
+    /// Sets the bucket's notifications, instead of those it had.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] when a queue is unknown or two prefixes overlap.
+    pub async fn notify(&self, notifications: &[Notification]) -> Result<()> {
+        let mut queues = Vec::new();
+        for (number, notification) in notifications.iter().enumerate() {
+            let rule = FilterRule::builder().name(FilterRuleName::Prefix).value(&notification.prefix).build();
+            let keys = S3KeyFilter::builder().filter_rules(rule).build();
+            let events = notification.events.iter().map(|event| Event::from(event.as_str())).collect();
+            let queue = QueueConfiguration::builder()
+                .id(format!("rayfold-{number}"))
+                .queue_arn(&notification.queue_arn)
+                .set_events(Some(events))
+                .filter(NotificationConfigurationFilter::builder().key(keys).build())
+                .build()
+                .map_err(|error| Error::Refused { key: notification.prefix.clone(), source: error.into() })?;
+            queues.push(queue);
+        }
+        let configuration =
+            NotificationConfiguration::builder().set_queue_configurations(Some(queues)).build();
+        let request = self.client.put_bucket_notification_configuration().bucket(&self.bucket);
+        let answer = request.notification_configuration(configuration).send().await;
+        answer.map(drop).map_err(|error| error_of(&self.bucket, error))
+    }
+
+    /// Whether the bucket can be listed: the cheapest request that fails where the others would.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] when there is no such bucket or it is not ours.
+    pub async fn check(&self) -> Result<()> {
+        let nothing = ListRequest { start_after: Some("~".into()), ..ListRequest::all("~") };
+        self.list(nothing).await.map(drop)
+    }
+}

@@ -1,0 +1,150 @@
+//! Multipart uploads: a part's worth of memory, however long the object.
+//!
+//! An object shorter than a part is put in one request at the end.
+
+use aws_sdk_s3::primitives::ByteStream;
+use aws_sdk_s3::types::{CompletedMultipartUpload, CompletedPart};
+use bytes::{Bytes, BytesMut};
+
+use super::answers::error_of;
+use super::{S3Store, headers};
+use crate::store::{ETag, PutOptions, Store, Upload};
+use crate::{Error, Result};
+
+/// Of all parts but the last. S3 allows 10,000 parts of at least 5 MiB: this allows objects of 78 GiB.
+const PART: usize = 8 << 20;
+
+/// An object being written to an [`S3Store`].
+#[derive(Debug)]
+pub struct S3Upload {
+    store: S3Store,
+    key: String,
+    options: PutOptions,
+    gathered: BytesMut,
+    id: Option<String>,
+    parts: Vec<CompletedPart>,
+}
+
+impl S3Upload {
+    pub(super) fn new(store: S3Store, key: &str, options: PutOptions) -> Self {
+        Self { store, key: key.to_owned(), options, gathered: BytesMut::new(), id: None, parts: Vec::new() }
+    }
+
+    async fn begun(&mut self) -> Result<String> {
+        if let Some(id) = &self.id {
+            return Ok(id.clone());
+        }
+        let answer = self
+            .store
+            .client
+            .create_multipart_upload()
+            .bucket(&self.store.bucket)
+            .key(&self.key)
+            .content_type(self.options.content_type)
+            .set_metadata(Some(self.options.metadata.clone().into_iter().collect()))
+            .send()
+            .await
+            .map_err(|error| error_of(&self.key, error))?;
+        let id = answer.upload_id().unwrap_or_default().to_owned();
+        self.id = Some(id.clone());
+        Ok(id)
+    }
+
+    async fn send_part(&mut self, body: Bytes) -> Result<()> {
+        let id = self.begun().await?;
+        let number = i32::try_from(self.parts.len() + 1).unwrap_or(i32::MAX);
+        let answer = self
+            .store
+            .client
+            .upload_part()
+            .bucket(&self.store.bucket)
+            .key(&self.key)
+            .upload_id(id)
+            .part_number(number)
+            .body(ByteStream::from(body))
+            .send()
+            .await
+            .map_err(|error| error_of(&self.key, error))?;
+        let part = CompletedPart::builder().part_number(number).set_e_tag(answer.e_tag);
+        self.parts.push(part.build());
+        Ok(())
+    }
+
+    async fn complete(&self, id: &str) -> Result<ETag> {
+        let (if_none_match, if_match) = headers(&self.options.condition);
+        let parts = CompletedMultipartUpload::builder().set_parts(Some(self.parts.clone())).build();
+        let answer = self
+            .store
+            .client
+            .complete_multipart_upload()
+            .bucket(&self.store.bucket)
+            .key(&self.key)
+            .upload_id(id)
+            .multipart_upload(parts)
+            .set_if_none_match(if_none_match)
+            .set_if_match(if_match)
+            .send()
+            .await;
+        match answer {
+            Ok(answer) => Ok(ETag::new(answer.e_tag().unwrap_or_default())),
+            Err(error) => {
+                let is_gone = error.as_service_error().is_some_and(|error| {
+                    aws_sdk_s3::error::ProvideErrorMetadata::code(error) == Some("NoSuchUpload")
+                });
+                if is_gone {
+                    // Completed by an earlier try whose answer was lost, or aborted by someone else.
+                    let source = "the upload is not there any more".into();
+                    return Err(Error::Ambiguous { key: self.key.clone(), source });
+                }
+                Err(error_of(&self.key, error))
+            }
+        }
+    }
+
+    async fn give_up(&self, id: &str) -> Result<()> {
+        let request = self.store.client.abort_multipart_upload();
+        let answer = request.bucket(&self.store.bucket).key(&self.key).upload_id(id).send().await;
+        match answer.map_err(|error| error_of(&self.key, error)) {
+            Err(error) if !error.is_not_found() => Err(error),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Upload for S3Upload {
+    async fn write(&mut self, mut bytes: Bytes) -> Result<()> {
+        while self.gathered.len() + bytes.len() >= PART {
+            let fitting = bytes.split_to(PART - self.gathered.len());
+            self.gathered.extend_from_slice(&fitting);
+            let part = self.gathered.split().freeze();
+            self.send_part(part).await?;
+        }
+        self.gathered.extend_from_slice(&bytes);
+        Ok(())
+    }
+
+    async fn finish(mut self) -> Result<ETag> {
+        let last = self.gathered.split().freeze();
+        if self.id.is_none() {
+            return self.store.put(&self.key, last, self.options).await;
+        }
+        let sent = if last.is_empty() { Ok(()) } else { self.send_part(last).await };
+        let id = self.begun().await?;
+        let finished = match sent {
+            Ok(()) => self.complete(&id).await,
+            Err(error) => Err(error),
+        };
+        if finished.is_err() {
+            // What cannot be aborted either is left to the bucket's rule for unfinished uploads.
+            let _ = self.give_up(&id).await;
+        }
+        finished
+    }
+
+    async fn abort(self) -> Result<()> {
+        match &self.id {
+            Some(id) => self.give_up(id).await,
+            None => Ok(()),
+        }
+    }
+}
