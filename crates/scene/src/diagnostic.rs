@@ -18,6 +18,8 @@ use std::ops::Range;
 use annotate_snippets::{AnnotationKind, Level, Origin, Renderer, Snippet};
 use serde::{Deserialize, Serialize};
 
+use crate::report::visible;
+
 /// Whether a text is unusable or only doubtful.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -131,9 +133,11 @@ impl Diagnostic {
             .annotation(AnnotationKind::Primary.span(marked).label(self.expected.as_deref()));
         let title = level.primary_title(&self.message);
         let group = if from_line_start {
-            title.element(snippet.path(&self.file))
+            title.element(snippet.path(visible(&self.file)))
         } else {
-            title.element(Origin::path(&self.file).line(self.line).char_column(self.column)).element(snippet)
+            title
+                .element(Origin::path(visible(&self.file)).line(self.line).char_column(self.column))
+                .element(snippet)
         };
         let group = match &self.help {
             Some(help) => group.element(Level::HELP.message(help)),

@@ -18,6 +18,7 @@ mod limits;
 pub mod model;
 mod natural;
 mod parse;
+mod report;
 mod script;
 mod settings;
 mod shared_slice;

@@ -2,26 +2,30 @@
 //!
 //! Parsing never stops at a fault: what can be said about a text is said in one go. A line is understood alone; only
 //! `Trace` looks at what came before. Nothing is allocated for a line that is in order, and nothing is kept of a
-//! script that has an error.
+//! script that has an error. A fault is told once: what follows from one that was told is not.
 //!
 //! Follows `docs/language.md`, where the forms of numbers, blanks and line ends are decided.
 
 mod command;
 mod number;
-mod report;
+mod text;
+mod wording;
 
 use std::ops::Range;
+use std::str::Utf8Error;
 
 use glam::{DVec2, DVec3};
 
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::Diagnostic;
 use crate::limits::Limits;
 use crate::model::{
-    Cuboid, DirectionalLight, InvalidValue, Light, Material, Object, Pinhole, Screen, Sphere, Triangle,
+    Camera, Cuboid, DirectionalLight, InvalidValue, Light, Material, Object, Pinhole, Screen, Sphere,
+    Triangle,
 };
+use crate::report::{Fault, Line, Report};
 use crate::script::{Recorder, Script};
 use command::{Command, MAX_PARAMETERS};
-use report::{Fault, Line, Report, grouped, quoted};
+use text::{Words, lines};
 
 /// What a text turned out to be.
 #[derive(Clone, Debug)]
@@ -36,46 +40,18 @@ pub struct Parsed {
 ///
 /// The `Trace` commands become the frames of the script; there is at least one.
 pub fn parse(name: &str, bytes: &[u8], limits: &Limits) -> Parsed {
-    let mut parser = Parser {
-        limits,
-        report: Report::new(name, limits.max_described),
-        recorder: Recorder::default(),
-        screen: ScreenState::Unset,
-        objects: 0,
-        lights: 0,
-        traces: 0,
-        trace_misspelt: false,
-        unused: None,
-    };
-    if bytes.len() > limits.max_script_bytes {
-        let line = Line { number: 1, offset: 0, bytes: &[] };
-        parser.report.error(line, 0..0, too_large(bytes.len(), limits.max_script_bytes));
-        return Parsed { script: None, diagnostics: parser.report.finish() };
+    let mut report = Report::new(name, limits.max_described);
+    let size = bytes.len();
+    if size > limits.max_script_bytes {
+        if let Some(line) = lines(bytes).next() {
+            report.error(line, 0..0, || wording::too_large(size, limits.max_script_bytes));
+        }
+    } else if let Some(mark @ (b"\xff\xfe" | b"\xfe\xff")) = bytes.get(..2) {
+        report.error(Line { number: 1, offset: 0, bytes: mark }, 0..2, wording::utf16);
+    } else {
+        return Parser::new(limits, report).text(bytes);
     }
-    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-        let line = Line { number: 1, offset: 0, bytes: &bytes[..2] };
-        let fault = Fault::new(Code::NotUtf8, "the script is UTF-16 text").help("save it as UTF-8");
-        parser.report.error(line, 0..2, fault);
-        return Parsed { script: None, diagnostics: parser.report.finish() };
-    }
-    let mut last = Line { number: 1, offset: 0, bytes: &[] };
-    for line in lines(bytes) {
-        parser.line(line);
-        last = line;
-    }
-    parser.finish(last)
-}
-
-/// The lines of a text without their ends and without the byte-order mark. The last one is empty when the text ends
-/// with a line feed.
-fn lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
-    const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
-    let mut offset = if bytes.starts_with(BYTE_ORDER_MARK) { BYTE_ORDER_MARK.len() } else { 0 };
-    bytes[offset..].split(|&b| b == b'\n').enumerate().map(move |(i, whole)| {
-        let line = Line { number: i + 1, offset, bytes: whole.strip_suffix(b"\r").unwrap_or(whole) };
-        offset += whole.len() + 1;
-        line
-    })
+    Parsed { script: None, diagnostics: report.finish() }
 }
 
 struct Parser<'a> {
@@ -83,98 +59,151 @@ struct Parser<'a> {
     report: Report<'a>,
     recorder: Recorder,
     screen: ScreenState,
-    /// Objects and lights of the scene as it stands.
+    /// Objects of the scene as it stands.
     objects: usize,
+    /// Lights of the scene as it stands.
     lights: usize,
     traces: usize,
-    /// Whether a line was probably meant to be a `Trace`.
+    /// Whether a word was probably meant to be a `Trace`.
     trace_misspelt: bool,
-    /// The first command since the last `Trace` that draws nothing if no other `Trace` comes.
+    /// The first command since the last `Trace` that has no effect if no other `Trace` comes.
     unused: Option<(Line<'a>, Range<usize>)>,
 }
 
 #[derive(Clone, Copy)]
 enum ScreenState {
     Unset,
-    /// Set by a command with an error, which has been reported.
+    /// Whatever is wrong with it has been told.
     Faulty,
     Set(Screen),
 }
 
-/// The words of a line: its command and the parameters, of which those beyond the most that any command takes are
-/// only counted.
-struct Words {
-    command: Range<usize>,
-    parameters: [Range<usize>; MAX_PARAMETERS],
-    count: usize,
-    /// End of the last word.
-    end: usize,
+/// A command whose words are numbers, and as many as it takes.
+struct Statement<'a> {
+    line: Line<'a>,
+    command: Command,
+    words: Words,
+    /// Of the parameters; 0 for optional ones that are missing.
+    values: [f64; MAX_PARAMETERS],
 }
 
-fn is_separator(byte: u8) -> bool {
-    matches!(byte, b' ' | b'\t' | b',')
-}
-
-/// `None` for a line without a command.
-fn words(line: &[u8]) -> Option<Words> {
-    const NOWHERE: Range<usize> = 0..0;
-    let mut words = Words { command: NOWHERE, parameters: [NOWHERE; MAX_PARAMETERS], count: 0, end: 0 };
-    let mut at = 0;
-    let mut next = || {
-        while at < line.len() && is_separator(line[at]) {
-            at += 1;
-        }
-        let start = at;
-        while at < line.len() && !is_separator(line[at]) && line[at] != b'#' {
-            at += 1;
-        }
-        (at > start).then_some(start..at)
-    };
-    words.command = next()?;
-    words.end = words.command.end;
-    while let Some(word) = next() {
-        words.end = word.end;
-        if let Some(slot) = words.parameters.get_mut(words.count) {
-            *slot = word;
-        }
-        words.count += 1;
+impl Statement<'_> {
+    fn vector(&self, first: usize) -> DVec3 {
+        DVec3::from_slice(&self.values[first..])
     }
-    Some(words)
+
+    fn corner(&self, first: usize) -> DVec2 {
+        DVec2::from_slice(&self.values[first..])
+    }
+
+    /// Ambient and diffuse coefficients from parameter `first`.
+    fn matte(&self, first: usize) -> Result<Material, InvalidValue> {
+        Material::new(self.vector(first), self.vector(first + 3), DVec3::ZERO)
+    }
 }
 
 impl<'a> Parser<'a> {
-    fn line(&mut self, line: Line<'a>) {
-        let text = match std::str::from_utf8(line.bytes) {
-            Ok(text) => text,
-            Err(error) => return self.not_utf8(line, error),
-        };
-        let Some(words) = words(line.bytes) else {
-            return self.lone_carriage_return(line, text);
-        };
-        if text.contains('\r') {
-            return self.lone_carriage_return(line, text);
-        }
-        let name = &text[words.command.clone()];
-        let Some(command) = Command::from_name(name) else {
-            return self.unknown_command(line, name, words.command);
-        };
-        match self.parameters(line, text, command, &words) {
-            Some(values) => self.run(line, command, &words, &values),
-            None => match command {
-                Command::Screen if matches!(self.screen, ScreenState::Unset) => {
-                    self.screen = ScreenState::Faulty;
-                }
-                Command::Trace => {
-                    self.traces += 1;
-                    self.unused = None;
-                }
-                _ => {}
-            },
+    fn new(limits: &'a Limits, report: Report<'a>) -> Self {
+        Self {
+            limits,
+            report,
+            recorder: Recorder::default(),
+            screen: ScreenState::Unset,
+            objects: 0,
+            lights: 0,
+            traces: 0,
+            trace_misspelt: false,
+            unused: None,
         }
     }
 
-    /// The values of the parameters, missing ones 0; `None` if there was something wrong with them.
-    fn parameters(
+    fn text(mut self, bytes: &'a [u8]) -> Parsed {
+        let mut last = Line { number: 1, offset: 0, bytes: &[] };
+        for line in lines(bytes) {
+            if let Some(statement) = self.statement(line) {
+                self.run(&statement);
+            }
+            last = line;
+        }
+        self.finish(last)
+    }
+
+    fn finish(mut self, last: Line<'a>) -> Parsed {
+        if self.traces == 0 && !self.trace_misspelt {
+            let end = last.bytes.len();
+            self.report.error(last, end..end, wording::no_trace);
+        } else if let Some((line, span)) = self.unused.take() {
+            self.report.warning(line, span, wording::unused);
+        }
+        let script = if self.report.has_errors() { None } else { self.recorder.finish() };
+        Parsed { script, diagnostics: self.report.finish() }
+    }
+
+    /// `None` for a line without a command and for one with a fault, which is reported.
+    fn statement(&mut self, line: Line<'a>) -> Option<Statement<'a>> {
+        let text = match std::str::from_utf8(line.bytes) {
+            Ok(text) => text,
+            Err(error) => self.not_utf8(line, error)?,
+        };
+        if let Some(at) = text.find('\r') {
+            self.report.error(line, at..at + 1, wording::lone_carriage_return);
+            self.expect_no_more();
+            return None;
+        }
+        let words = Words::of(text.as_bytes())?;
+        let name = &text[words.command.clone()];
+        let Some(command) = Command::from_name(name) else {
+            self.unknown_command(line, name, words.command);
+            return None;
+        };
+        let values = self.values(line, text, command, &words);
+        if values.is_none() {
+            self.expect_no_more_of(command);
+        }
+        values.map(|values| Statement { line, command, words, values })
+    }
+
+    /// The readable start of the line if only its comment is faulty.
+    fn not_utf8(&mut self, line: Line<'a>, error: Utf8Error) -> Option<&'a str> {
+        let start = error.valid_up_to();
+        let end = error.error_len().map_or(line.bytes.len(), |length| start + length);
+        self.report.error(line, start..end, || Fault::not_utf8(line, start..end, "script"));
+        let text = std::str::from_utf8(&line.bytes[..start]).ok().filter(|text| text.contains('#'));
+        if text.is_none() {
+            self.expect_no_more();
+        }
+        text
+    }
+
+    fn unknown_command(&mut self, line: Line<'a>, name: &str, span: Range<usize>) {
+        // Looking for it takes longer than parsing a line.
+        let nearest = if self.report.describes_next() { Command::nearest(name) } else { None };
+        self.report.error(line, span, || wording::unknown_command(name, nearest));
+        if let Some(command) = nearest {
+            self.expect_no_more_of(command);
+        }
+    }
+
+    /// A line could not be read: what is missing may stand in it.
+    fn expect_no_more(&mut self) {
+        self.expect_no_more_of(Command::Screen);
+        self.expect_no_more_of(Command::Trace);
+    }
+
+    /// A command was there, though faulty: that it is missing would be told in vain.
+    fn expect_no_more_of(&mut self, command: Command) {
+        match command {
+            Command::Trace => {
+                self.trace_misspelt = true;
+                self.unused = None;
+            }
+            Command::Screen if matches!(self.screen, ScreenState::Unset) => self.screen = ScreenState::Faulty,
+            _ => {}
+        }
+    }
+
+    /// The values of the parameters; `None` if there is a fault in them or in their number, which is reported.
+    fn values(
         &mut self,
         line: Line<'a>,
         text: &str,
@@ -183,278 +212,152 @@ impl<'a> Parser<'a> {
     ) -> Option<[f64; MAX_PARAMETERS]> {
         let mut values = [0.0; MAX_PARAMETERS];
         let mut good = true;
-        let names = command.parameters();
-        for ((value, word), name) in
-            values.iter_mut().zip(&words.parameters[..words.count.min(names.len())]).zip(names)
-        {
-            match number::parse(&text[word.clone()]) {
-                Ok(x) => *value = x,
+        for (i, (span, parameter)) in words.parameters().iter().zip(command.parameters()).enumerate() {
+            let word = &text[span.clone()];
+            match number::parse(word) {
+                Ok(value) => values[i] = value,
                 Err(fault) => {
                     good = false;
-                    self.report.error(line, word.clone(), fault.of(name, &text[word.clone()]));
+                    self.report.error(line, span.clone(), || wording::bad_number(fault, parameter, word));
                 }
             }
         }
-        if !command.arity().contains(&words.count) {
+        let (least, most) = command.arity().into_inner();
+        if words.count() < least {
             good = false;
-            self.wrong_count(line, command, words);
+            self.report.error(line, words.end(), || wording::too_few(command, words));
+        } else if words.count() > most {
+            good = false;
+            self.report.error(line, words.rest(most), || {
+                let first = words.parameters().get(most).map_or("", |span| &text[span.clone()]);
+                wording::too_many(command, words, first)
+            });
         }
         good.then_some(values)
     }
 
-    fn run(&mut self, line: Line<'a>, command: Command, words: &Words, values: &[f64; MAX_PARAMETERS]) {
-        let v3 = |i: usize| DVec3::new(values[i], values[i + 1], values[i + 2]);
-        let matte = |i: usize| Material::new(v3(i), v3(i + 3), DVec3::ZERO);
-        if !matches!(command, Command::Trace | Command::Clear) && self.unused.is_none() {
-            self.unused = Some((line, words.command.clone()));
+    fn run(&mut self, s: &Statement<'a>) {
+        if !matches!(s.command, Command::Trace | Command::Clear) && self.unused.is_none() {
+            self.unused = Some((s.line, s.words.command.clone()));
         }
-        match command {
-            Command::Screen => self.set_screen(line, words, values),
-            Command::Orthocamera => self.recorder.set_camera(crate::Camera::Orthographic),
-            Command::Camera => {
-                let (a, b) = (DVec2::new(values[10], values[11]), DVec2::new(values[12], values[13]));
-                match Pinhole::checked(v3(0), v3(3), v3(6), values[9], a, b) {
-                    Ok(pinhole) => self.recorder.set_camera(crate::Camera::Pinhole(pinhole)),
-                    Err(faults) => {
-                        faults.into_iter().for_each(|fault| self.invalid(line, command, words, fault));
-                    }
-                }
+        match s.command {
+            Command::Screen => {
+                self.screen = self.screen(s).map_or(ScreenState::Faulty, ScreenState::Set);
             }
-            Command::Background => self.recorder.set_background(v3(0)),
+            Command::Orthocamera => self.recorder.set_camera(Camera::Orthographic),
+            Command::Camera => self.camera(s),
+            Command::Background => self.recorder.set_background(s.vector(0)),
             Command::Sphere => {
-                let sphere =
-                    Material::new(v3(4), v3(7), v3(10)).and_then(|m| Sphere::new(values[0], v3(1), m));
-                self.add_object(line, command, words, sphere.map(Object::Sphere));
+                let material = Material::new(s.vector(4), s.vector(7), s.vector(10));
+                let sphere = material.and_then(|m| Sphere::new(s.values[0], s.vector(1), m));
+                self.object(s, sphere.map(Object::Sphere));
             }
             Command::Triangle => {
-                let triangle = matte(9).and_then(|m| Triangle::new([v3(0), v3(3), v3(6)], m));
+                let vertices = [s.vector(0), s.vector(3), s.vector(6)];
+                let triangle = s.matte(9).and_then(|m| Triangle::new(vertices, m));
                 if triangle.is_ok_and(|t| t.is_degenerate()) {
-                    let fault =
-                        Fault::new(Code::DegenerateTriangle, "this triangle has no area and is never hit")
-                            .expected("these three points lie on a line");
-                    let span = words.parameters[0].start..words.parameters[8].end;
-                    self.report.warning(line, span, fault);
+                    self.report.warning(s.line, s.words.span(0..9), wording::degenerate_triangle);
                 }
-                self.add_object(line, command, words, triangle.map(Object::Triangle));
+                self.object(s, triangle.map(Object::Triangle));
             }
             Command::Cuboid => {
-                let cuboid = matte(6).and_then(|m| Cuboid::new([v3(0), v3(3)], m));
-                self.add_object(line, command, words, cuboid.map(Object::Cuboid));
+                let cuboid = s.matte(6).and_then(|m| Cuboid::new([s.vector(0), s.vector(3)], m));
+                self.object(s, cuboid.map(Object::Cuboid));
             }
-            Command::Ilight => match DirectionalLight::new(v3(0), v3(3)) {
-                Ok(light) => {
-                    self.lights += 1;
-                    self.keep(line, words, self.lights, self.limits.max_lights, "lights", |recorder| {
-                        recorder.add_light(Light::Directional(light));
-                    });
-                }
-                Err(fault) => self.invalid(line, command, words, fault),
-            },
+            Command::Ilight => self.light(s),
             Command::Clear => {
                 (self.objects, self.lights) = (0, 0);
                 self.unused = None;
                 self.recorder.clear();
             }
-            Command::Trace => self.trace(line, words),
+            Command::Trace => self.trace(s),
         }
     }
 
-    fn add_object(
-        &mut self,
-        line: Line<'a>,
-        command: Command,
-        words: &Words,
-        object: Result<Object, InvalidValue>,
-    ) {
-        match object {
-            Ok(object) => {
-                self.objects += 1;
-                self.keep(line, words, self.objects, self.limits.max_objects, "objects", |recorder| {
-                    recorder.add_object(object);
-                });
+    fn screen(&mut self, s: &Statement<'a>) -> Option<Screen> {
+        let [width, height] = [0, 1].map(|i| {
+            let value = s.values[i];
+            if value.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&value) {
+                return Some(value as u32);
             }
-            Err(fault) => self.invalid(line, command, words, fault),
-        }
-    }
-
-    /// Records unless there are more than the limit, which is reported once for each scene, or the script has an
-    /// error, so that it will not be used.
-    fn keep(
-        &mut self,
-        line: Line<'a>,
-        words: &Words,
-        count: usize,
-        limit: usize,
-        what: &str,
-        record: impl FnOnce(&mut Recorder),
-    ) {
-        if count == limit.saturating_add(1) {
-            let fault = Fault::new(
-                Code::LimitExceeded,
-                format!("more than {} {what} in a scene", grouped(limit as u64)),
-            )
-            .expected("one more than the limit");
-            self.report.error(line, words.command.clone(), fault);
-        }
-        if self.report.has_errors() {
-            self.recorder = Recorder::default();
-        } else {
-            record(&mut self.recorder);
-        }
-    }
-
-    fn set_screen(&mut self, line: Line<'a>, words: &Words, values: &[f64; MAX_PARAMETERS]) {
-        self.screen = match self.sides(line, words, values) {
-            Some(screen) => ScreenState::Set(screen),
-            None => ScreenState::Faulty,
-        };
-    }
-
-    fn sides(&mut self, line: Line<'a>, words: &Words, values: &[f64; MAX_PARAMETERS]) -> Option<Screen> {
-        let mut sides = [0; 2];
-        let mut good = true;
-        for (i, side) in sides.iter_mut().enumerate() {
-            if values[i] >= 1.0 && values[i].fract() == 0.0 && values[i] <= f64::from(u32::MAX) {
-                *side = values[i] as u32;
-                continue;
-            }
-            good = false;
-            let name = Command::Screen.parameters()[i];
-            let message = if values[i] > f64::from(u32::MAX) {
-                format!("`{name}` must be at most {}", grouped(u32::MAX.into()))
-            } else {
-                format!("`{name}` must be a whole number from 1")
-            };
-            let fault = Fault::new(Code::InvalidValue, message).expected("expected a number of pixels");
-            self.report.error(line, words.parameters[i].clone(), fault);
-        }
-        let screen = if good { Screen::new(sides[0], sides[1]).ok()? } else { return None };
-        if screen.pixels() > self.limits.max_pixels {
-            let [pixels, limit] = [screen.pixels(), self.limits.max_pixels].map(grouped);
-            let fault = Fault::new(
-                Code::LimitExceeded,
-                format!("the image has {pixels} pixels, the limit is {limit}"),
-            )
-            .expected("this is too large")
-            .help("make it smaller, or raise the limit on pixels");
-            self.report.error(line, words.parameters[0].start..words.parameters[1].end, fault);
+            let span = s.words.span(i..i + 1);
+            self.report.error(s.line, span.clone(), || {
+                let word = String::from_utf8_lossy(&s.line.bytes[span]);
+                wording::no_side(value, s.command.parameters()[i], &word)
+            });
+            None
+        });
+        let screen = Screen::new(width?, height?).ok()?;
+        let (pixels, limit) = (screen.pixels(), self.limits.max_pixels);
+        if pixels > limit {
+            self.report.error(s.line, s.words.span(0..2), || wording::too_many_pixels(pixels, limit));
             return None;
         }
         Some(screen)
     }
 
-    fn trace(&mut self, line: Line<'a>, words: &Words) {
+    fn camera(&mut self, s: &Statement<'a>) {
+        let (eye, gaze, up) = (s.vector(0), s.vector(3), s.vector(6));
+        match Pinhole::checked(eye, gaze, up, s.values[9], s.corner(10), s.corner(12)) {
+            Ok(pinhole) => self.recorder.set_camera(Camera::Pinhole(pinhole)),
+            Err(faults) => faults.into_iter().for_each(|fault| self.invalid(s, fault)),
+        }
+    }
+
+    fn object(&mut self, s: &Statement<'a>, object: Result<Object, InvalidValue>) {
+        match object {
+            Ok(object) => {
+                self.objects += 1;
+                self.check_limit(s, self.objects, self.limits.max_objects, "objects in a scene");
+                self.record(|recorder| recorder.add_object(object));
+            }
+            Err(fault) => self.invalid(s, fault),
+        }
+    }
+
+    fn light(&mut self, s: &Statement<'a>) {
+        match DirectionalLight::new(s.vector(0), s.vector(3)) {
+            Ok(light) => {
+                self.lights += 1;
+                self.check_limit(s, self.lights, self.limits.max_lights, "lights in a scene");
+                self.record(|recorder| recorder.add_light(Light::Directional(light)));
+            }
+            Err(fault) => self.invalid(s, fault),
+        }
+    }
+
+    fn trace(&mut self, s: &Statement<'a>) {
         self.traces += 1;
         self.unused = None;
-        if self.limits.max_frames.is_some_and(|limit| self.traces == limit.saturating_add(1)) {
-            let fault = Fault::new(
-                Code::LimitExceeded,
-                format!("more than {} frames", grouped(self.traces as u64 - 1)),
-            )
-            .expected("one more than the limit");
-            self.report.error(line, words.command.clone(), fault);
-        }
+        self.check_limit(s, self.traces, self.limits.max_frames.unwrap_or(usize::MAX), "frames");
         match self.screen {
-            ScreenState::Set(screen) if !self.report.has_errors() => self.recorder.trace(screen),
+            ScreenState::Set(screen) => self.record(|recorder| recorder.trace(screen)),
             ScreenState::Unset => {
-                let fault = Fault::new(Code::NoScreen, "the size of the image is not known yet")
-                    .expected("expected a `Screen` command before this")
-                    .help("for example `Screen 640 480`");
-                self.report.error(line, words.command.clone(), fault);
+                self.report.error(s.line, s.words.command.clone(), wording::no_screen);
                 self.screen = ScreenState::Faulty;
             }
-            _ => {}
+            ScreenState::Faulty => {}
         }
     }
 
-    fn finish(mut self, last: Line<'a>) -> Parsed {
-        let end = last.bytes.len();
-        if self.traces == 0 && !self.trace_misspelt {
-            let fault = Fault::new(Code::NoTrace, "nothing is rendered: the script has no `Trace`")
-                .expected("expected a `Trace`")
-                .help("`Trace` renders a frame of everything that stands before it");
-            self.report.error(last, end..end, fault);
-        } else if let Some((line, span)) = self.unused.take() {
-            let fault = Fault::new(Code::Unused, "this has no effect: no `Trace` follows")
-                .help("`Trace` renders a frame of everything that stands before it");
-            self.report.warning(line, span, fault);
-        }
-        let script = if self.report.has_errors() { None } else { self.recorder.finish() };
-        Parsed { script, diagnostics: self.report.finish() }
+    fn invalid(&mut self, s: &Statement<'a>, fault: InvalidValue) {
+        let span = s.words.span(s.command.place_of(fault));
+        self.report.error(s.line, span, || wording::invalid(fault));
     }
 
-    fn not_utf8(&mut self, line: Line<'a>, error: std::str::Utf8Error) {
-        let start = error.valid_up_to();
-        let end = error.error_len().map_or(line.bytes.len(), |length| start + length);
-        let bytes: Vec<_> = line.bytes[start..end].iter().map(|b| format!("0x{b:02X}")).collect();
-        let fault = Fault::new(Code::NotUtf8, format!("not UTF-8 text: {}", bytes.join(" ")))
-            .expected("expected UTF-8")
-            .help("save the script as UTF-8");
-        self.report.error(line, start..end, fault);
-    }
-
-    fn lone_carriage_return(&mut self, line: Line<'a>, text: &str) {
-        if let Some(at) = text.find('\r') {
-            let fault = Fault::new(Code::LoneCarriageReturn, "a carriage return without a line feed")
-                .expected("expected a line feed here")
-                .help("lines end with LF or CR LF; save the script with either");
-            self.report.error(line, at..at + 1, fault);
+    /// Reports the first command beyond a limit.
+    fn check_limit(&mut self, s: &Statement<'a>, count: usize, limit: usize, what: &str) {
+        if count.checked_sub(1) == Some(limit) {
+            self.report.error(s.line, s.words.command.clone(), || wording::beyond_limit(limit, what));
         }
     }
 
-    fn unknown_command(&mut self, line: Line<'a>, name: &str, span: Range<usize>) {
-        let nearest = Command::nearest(name);
-        let fault = Fault::new(Code::UnknownCommand, format!("unknown command {}", quoted(name)));
-        let fault = match nearest {
-            Some(command) => fault.help(format!("did you mean `{}`?", command.name())),
-            None if number::parse(name).is_ok() => {
-                fault.help("a command and all its parameters stand on one line")
-            }
-            None => {
-                let names: Vec<_> = Command::ALL.iter().map(|c| c.name()).collect();
-                fault.help(format!("the commands are {}", names.join(", ")))
-            }
-        };
-        self.trace_misspelt |= nearest == Some(Command::Trace);
-        if nearest == Some(Command::Screen) && matches!(self.screen, ScreenState::Unset) {
-            self.screen = ScreenState::Faulty;
-        }
-        self.report.error(line, span, fault.expected("expected a command"));
-    }
-
-    fn wrong_count(&mut self, line: Line<'a>, command: Command, words: &Words) {
-        let name = command.name();
-        let (least, most) = command.arity().into_inner();
-        let takes = match (least, most) {
-            (0, 0) => "no parameters".to_string(),
-            (a, b) if a == b => format!("{a} numbers"),
-            (a, b) => format!("{a} to {b} numbers"),
-        };
-        let count = words.count;
-        let usage = format!("write `{}`", command.usage());
-        if count < least {
-            let found = if count == 0 { "none".to_string() } else { count.to_string() };
-            let fault = Fault::new(Code::TooFewParameters, format!("`{name}` takes {takes}, found {found}"))
-                .expected(format!("expected `{}` here", command.parameters()[count]))
-                .help(usage);
-            self.report.error(line, words.end..words.end, fault);
+    /// Records something, unless the script has an error: then it will not be used, and its memory is given back.
+    fn record(&mut self, what: impl FnOnce(&mut Recorder)) {
+        if self.report.has_errors() {
+            self.recorder = Recorder::default();
         } else {
-            let start = words.parameters.get(most).map_or(words.end, |word| word.start);
-            let fault = Fault::new(Code::TooManyParameters, format!("`{name}` takes {takes}, found {count}"))
-                .expected("expected the end of the line")
-                .help(usage);
-            self.report.error(line, start..words.end, fault);
+            what(&mut self.recorder);
         }
     }
-
-    fn invalid(&mut self, line: Line<'a>, command: Command, words: &Words, fault: InvalidValue) {
-        let place = command.place_of(fault);
-        let span = words.parameters[place.start].start..words.parameters[place.end - 1].end;
-        self.report.error(line, span, Fault::new(Code::InvalidValue, fault.to_string()));
-    }
-}
-
-fn too_large(size: usize, limit: usize) -> Fault {
-    let [size, limit] = [size, limit].map(|bytes| grouped(bytes as u64));
-    Fault::new(Code::TextTooLarge, format!("the script has {size} bytes, the limit is {limit}"))
 }

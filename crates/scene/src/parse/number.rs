@@ -4,9 +4,6 @@
 //! the language leaves out the words (`inf`, `infinity`, `nan`); a point needs a digit on one side (`5.` and `.5` are
 //! numbers, `.` is not). What is too small for a float is 0.
 
-use super::report::{Fault, quoted};
-use crate::diagnostic::Code;
-
 /// Why a word is not a number of the language.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NumberFault {
@@ -20,47 +17,6 @@ pub(super) fn parse(word: &str) -> Result<f64, NumberFault> {
         Ok(_) if word.bytes().any(|b| b.is_ascii_digit()) => Err(NumberFault::TooLarge),
         _ => Err(NumberFault::Malformed),
     }
-}
-
-impl NumberFault {
-    /// What to tell about `word`, which stands in the place of `parameter`.
-    pub(super) fn of(self, parameter: &str, word: &str) -> Fault {
-        match self {
-            Self::TooLarge => Fault::new(Code::NumberTooLarge, format!("{} is too large", quoted(word)))
-                .expected(format!("expected `{parameter}`, a number up to 1.7e308")),
-            Self::Malformed => {
-                let fault = Fault::new(Code::NotANumber, format!("{} is not a number", quoted(word)))
-                    .expected(format!("expected `{parameter}`, a number such as 2, -.5 or 1e-3"));
-                match hint(word) {
-                    Some(hint) => fault.help(hint),
-                    None => fault,
-                }
-            }
-        }
-    }
-}
-
-/// What a slip of the keyboard or of another program would explain.
-fn hint(word: &str) -> Option<String> {
-    // Long words are no slips, and looking at them has a price.
-    if word.len() > 100 {
-        return None;
-    }
-    let odd = word.chars().find(|c| !c.is_ascii_graphic())?;
-    let ascii: String = word
-        .chars()
-        .map(|c| if matches!(c, '\u{2010}'..='\u{2015}' | '\u{2212}') { '-' } else { c })
-        .collect();
-    if parse(&ascii).is_ok() {
-        return Some(format!("this minus is U+{:04X}: write `-`", u32::from(odd)));
-    }
-    if odd.is_whitespace() {
-        return Some(format!(
-            "it contains the blank U+{:04X}: separate parameters by ordinary blanks",
-            u32::from(odd)
-        ));
-    }
-    None
 }
 
 #[cfg(test)]

@@ -1,0 +1,172 @@
+//! What a person is told about a fault in a script: what is wrong, what was expected, what to do.
+
+use super::command::Command;
+use super::number::{self, NumberFault};
+use super::text::Words;
+use crate::diagnostic::Code;
+use crate::model::InvalidValue;
+use crate::report::{Fault, grouped, quoted};
+
+/// What `Trace` is for.
+const TRACE_HELP: &str = "`Trace` renders a frame of everything that stands before it";
+
+pub(super) fn too_large(size: usize, limit: usize) -> Fault {
+    let [size, limit] = [size, limit].map(|bytes| grouped(bytes as u64));
+    Fault::new(Code::TextTooLarge, format!("the script has {size} bytes, the limit is {limit}"))
+        .expected("expected a smaller script")
+}
+
+pub(super) fn utf16() -> Fault {
+    Fault::new(Code::NotUtf8, "the script is UTF-16 text")
+        .expected("expected UTF-8")
+        .help("save the script as UTF-8")
+}
+
+pub(super) fn lone_carriage_return() -> Fault {
+    Fault::new(Code::LoneCarriageReturn, "a carriage return without a line feed")
+        .expected("expected a line feed after this")
+        .help("lines end with LF or CR LF; save the script with either")
+}
+
+pub(super) fn unknown_command(name: &str, nearest: Option<Command>) -> Fault {
+    let help = if let Some(command) = nearest {
+        format!("did you mean `{}`?", command.name())
+    } else if number::parse(name).is_ok() {
+        "a command and all its parameters stand on one line".to_string()
+    } else if ["//", "/*", ";", "%", "--"].iter().any(|mark| name.starts_with(mark)) {
+        "a comment starts with `#`".to_string()
+    } else {
+        let names: Vec<_> = Command::ALL.iter().map(|c| format!("`{}`", c.name())).collect();
+        format!("the commands are {}", names.join(", "))
+    };
+    Fault::new(Code::UnknownCommand, format!("unknown command {}", quoted(name)))
+        .expected("expected a command")
+        .help(help)
+}
+
+/// About `word`, which stands in the place of `parameter`.
+pub(super) fn bad_number(fault: NumberFault, parameter: &str, word: &str) -> Fault {
+    match fault {
+        NumberFault::TooLarge => Fault::new(Code::NumberTooLarge, format!("{} is too large", quoted(word)))
+            .expected(format!("expected `{parameter}`, a number up to 1.79e308")),
+        NumberFault::Malformed => {
+            let fault = Fault::new(Code::NotANumber, format!("{} is not a number", quoted(word)))
+                .expected(format!("expected `{parameter}`, a number such as 2, -.5 or 1e-3"));
+            match hint(word) {
+                Some(hint) => fault.help(hint),
+                None => fault,
+            }
+        }
+    }
+}
+
+/// What a slip of the keyboard or of another program would explain.
+fn hint(word: &str) -> Option<String> {
+    // Longer words are no slips.
+    if word.len() > 100 {
+        return None;
+    }
+    if Command::from_name(word).is_some() {
+        return Some("every command stands on a line of its own".to_string());
+    }
+    let odd = word.chars().find(|c| !c.is_ascii_graphic())?;
+    let code = u32::from(odd);
+    let is_dash = |c| matches!(c, '\u{2010}'..='\u{2015}' | '\u{2212}' | '\u{fe63}' | '\u{ff0d}');
+    if is_dash(odd) && number::parse(&word.replace(is_dash, "-")).is_ok() {
+        return Some(format!("the minus sign is `-`, this one is U+{code:04X}"));
+    }
+    if odd.is_whitespace() {
+        return Some(format!("blanks, tabs and commas separate parameters, U+{code:04X} does not"));
+    }
+    None
+}
+
+pub(super) fn too_few(command: Command, words: &Words) -> Fault {
+    let missing = command.parameters()[words.count()];
+    miscounted(Code::TooFewParameters, command, words).expected(format!("expected `{missing}` here"))
+}
+
+/// `first` is the first word that is too much.
+pub(super) fn too_many(command: Command, words: &Words, first: &str) -> Fault {
+    let fault = miscounted(Code::TooManyParameters, command, words).expected("expected the end of the line");
+    if Command::from_name(first).is_some() {
+        fault.help("every command stands on a line of its own")
+    } else {
+        fault
+    }
+}
+
+fn miscounted(code: Code, command: Command, words: &Words) -> Fault {
+    let (least, most) = command.arity().into_inner();
+    let takes = match (least, most) {
+        (0, 0) => "no parameters".to_string(),
+        (a, b) if a == b => format!("{a} numbers"),
+        (a, b) => format!("{a} to {b} numbers"),
+    };
+    let found = match words.count() {
+        0 => "none".to_string(),
+        count => grouped(count as u64),
+    };
+    Fault::new(code, format!("`{}` takes {takes}, found {found}", command.name()))
+        .help(format!("write `{}`", command.usage()))
+}
+
+pub(super) fn invalid(fault: InvalidValue) -> Fault {
+    let expected = match fault {
+        InvalidValue::NotPositive(_) => "expected a number greater than 0",
+        InvalidValue::ZeroDirection(_) => "expected three numbers that are not all 0",
+        InvalidValue::GazeParallelToUp => "expected two directions that span a plane",
+        InvalidValue::EmptyWindowWidth => "expected `au` and `bu` to differ",
+        InvalidValue::EmptyWindowHeight => "expected `av` and `bv` to differ",
+        _ => "expected other values",
+    };
+    Fault::new(Code::InvalidValue, fault.to_string()).expected(expected)
+}
+
+/// About a side of the screen, `word` in the place of `parameter`.
+pub(super) fn no_side(value: f64, parameter: &str, word: &str) -> Fault {
+    let largest = u32::MAX;
+    let range = if value > largest.into() {
+        format!("up to {}", grouped(largest.into()))
+    } else {
+        "from 1".to_string()
+    };
+    Fault::new(Code::InvalidValue, format!("{} is not a number of pixels", quoted(word)))
+        .expected(format!("expected `{parameter}`, a whole number {range}"))
+}
+
+pub(super) fn too_many_pixels(pixels: u64, limit: u64) -> Fault {
+    let [pixels, limit] = [pixels, limit].map(grouped);
+    Fault::new(Code::LimitExceeded, format!("the image has {pixels} pixels, the limit is {limit}"))
+        .expected("expected a smaller image")
+        .help("make the image smaller or raise the limit")
+}
+
+pub(super) fn beyond_limit(limit: usize, what: &str) -> Fault {
+    let limit = grouped(limit as u64);
+    Fault::new(Code::LimitExceeded, format!("more than {limit} {what}"))
+        .expected(format!("expected at most {limit}, this is one more"))
+}
+
+pub(super) fn no_screen() -> Fault {
+    Fault::new(Code::NoScreen, "the size of the image is not known")
+        .expected("expected a `Screen` before this")
+        .help("write for example `Screen 640 480`")
+}
+
+pub(super) fn no_trace() -> Fault {
+    Fault::new(Code::NoTrace, "nothing is rendered: there is no `Trace`")
+        .expected("expected a `Trace`")
+        .help(TRACE_HELP)
+}
+
+pub(super) fn degenerate_triangle() -> Fault {
+    Fault::new(Code::DegenerateTriangle, "a triangle of no area is never hit")
+        .expected("expected three points that are not on a line")
+}
+
+pub(super) fn unused() -> Fault {
+    Fault::new(Code::Unused, "this has no effect: no `Trace` follows")
+        .expected("expected a `Trace` after this")
+        .help(TRACE_HELP)
+}

@@ -1,0 +1,239 @@
+//! Collects diagnostics: places them in the text and keeps their number bounded.
+//!
+//! Knows neither the language nor JSON. A fault beyond the bound is counted and never put into words, so that a large
+//! file in which every line is wrong takes no longer than one that is right.
+
+use std::ops::Range;
+
+use crate::diagnostic::{Code, Diagnostic, Excerpt, Severity};
+
+/// A line of the text that is being parsed, without its line end.
+#[derive(Clone, Copy)]
+pub(crate) struct Line<'a> {
+    /// From 1.
+    pub(crate) number: usize,
+    /// Where it starts in the text as it was given.
+    pub(crate) offset: usize,
+    pub(crate) bytes: &'a [u8],
+}
+
+impl<'a> Line<'a> {
+    /// The line of `text` that holds the byte at `offset`, and where in it.
+    pub(crate) fn around(text: &'a [u8], offset: usize) -> (Self, usize) {
+        let start = text[..offset].iter().rposition(|&b| b == b'\n').map_or(0, |at| at + 1);
+        let end = text[offset..].iter().position(|&b| b == b'\n').map_or(text.len(), |at| offset + at);
+        let number = text[..start].iter().filter(|&&b| b == b'\n').count() + 1;
+        (Line { number, offset: start, bytes: &text[start..end] }, offset - start)
+    }
+}
+
+/// What is wrong, apart from where.
+pub(crate) struct Fault {
+    pub(crate) code: Code,
+    pub(crate) message: String,
+    pub(crate) expected: Option<String>,
+    pub(crate) help: Option<String>,
+}
+
+impl Fault {
+    pub(crate) fn new(code: Code, message: impl Into<String>) -> Self {
+        Self { code, message: message.into(), expected: None, help: None }
+    }
+
+    /// About bytes `fault` of the line; `what` is the whole text.
+    pub(crate) fn not_utf8(line: Line<'_>, fault: Range<usize>, what: &str) -> Self {
+        let bytes: Vec<_> = line.bytes[fault].iter().map(|b| format!("0x{b:02X}")).collect();
+        Self::new(Code::NotUtf8, format!("this is not UTF-8 text: {}", bytes.join(" ")))
+            .expected("expected UTF-8")
+            .help(format!("save the {what} as UTF-8"))
+    }
+
+    pub(crate) fn expected(mut self, expected: impl Into<String>) -> Self {
+        self.expected = Some(expected.into());
+        self
+    }
+
+    pub(crate) fn help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+}
+
+/// The diagnostics of one text.
+pub(crate) struct Report<'a> {
+    file: &'a str,
+    /// How many of each severity are kept.
+    max_described: usize,
+    kept: Vec<Diagnostic>,
+    errors: Tally,
+    warnings: Tally,
+}
+
+/// How many there were, and the first that was not described.
+#[derive(Default)]
+struct Tally {
+    count: usize,
+    first_left_out: Option<Diagnostic>,
+}
+
+impl<'a> Report<'a> {
+    pub(crate) fn new(file: &'a str, max_described: usize) -> Self {
+        Self { file, max_described, kept: Vec::new(), errors: Tally::default(), warnings: Tally::default() }
+    }
+
+    pub(crate) fn has_errors(&self) -> bool {
+        self.errors.count > 0
+    }
+
+    /// Whether another error would be put into words.
+    pub(crate) fn describes_next(&self) -> bool {
+        self.errors.first_left_out.is_none()
+    }
+
+    /// `span` counts from the start of the line.
+    pub(crate) fn error(&mut self, line: Line<'_>, span: Range<usize>, fault: impl FnOnce() -> Fault) {
+        self.add(Severity::Error, line, span, fault);
+    }
+
+    /// `span` counts from the start of the line.
+    pub(crate) fn warning(&mut self, line: Line<'_>, span: Range<usize>, fault: impl FnOnce() -> Fault) {
+        self.add(Severity::Warning, line, span, fault);
+    }
+
+    fn add(&mut self, severity: Severity, line: Line<'_>, span: Range<usize>, fault: impl FnOnce() -> Fault) {
+        let tally = match severity {
+            Severity::Error => &mut self.errors,
+            Severity::Warning => &mut self.warnings,
+        };
+        tally.count += 1;
+        if tally.first_left_out.is_some() {
+            return;
+        }
+        let Fault { code, message, expected, help } = fault();
+        let before = String::from_utf8_lossy(&line.bytes[..span.start]);
+        let diagnostic = Diagnostic {
+            severity,
+            code,
+            file: self.file.to_string(),
+            line: line.number,
+            column: before.chars().count() + 1,
+            excerpt: Excerpt::new(line.bytes, span.clone()),
+            span: line.offset + span.start..line.offset + span.end,
+            message,
+            expected,
+            help,
+        };
+        if tally.count > self.max_described {
+            tally.first_left_out = Some(diagnostic);
+        } else {
+            self.kept.push(diagnostic);
+        }
+    }
+
+    /// All diagnostics in the order of the text; what was not described is counted at the place where it starts.
+    pub(crate) fn finish(mut self) -> Vec<Diagnostic> {
+        for (tally, name) in [(self.errors, "error"), (self.warnings, "warning")] {
+            if let Some(first) = tally.first_left_out {
+                let left_out = tally.count - self.max_described;
+                let s = if left_out == 1 { "" } else { "s" };
+                let left_out = grouped(left_out as u64);
+                self.kept.push(Diagnostic {
+                    code: Code::TooManyFaults,
+                    message: format!("{left_out} more {name}{s} from here on"),
+                    expected: None,
+                    help: None,
+                    ..first
+                });
+            }
+        }
+        self.kept.sort_by_key(|d| (d.span.start, d.span.end));
+        self.kept
+    }
+}
+
+/// A piece of the text for a message: in quotes, short, and with nothing in it that cannot be seen.
+pub(crate) fn quoted(text: &str) -> String {
+    const LONGEST: usize = 40;
+    let end = text.char_indices().nth(LONGEST).map_or(text.len(), |(end, _)| end);
+    let more = if end < text.len() { "…" } else { "" };
+    format!("`{}{more}`", visible(&text[..end]))
+}
+
+/// The text with control characters and others that cannot be seen written as escapes.
+pub(crate) fn visible(text: &str) -> String {
+    let mut visible = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\'' | '"' | '\\' => visible.push(c),
+            _ => visible.extend(c.escape_debug()),
+        }
+    }
+    visible
+}
+
+/// A count as people write it: 64,000,000.
+pub(crate) fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let mut grouped = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            grouped.push(',');
+        }
+        grouped.push(digit);
+    }
+    grouped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_seen_is_escaped() {
+        assert_eq!(quoted("a\u{feff}b\u{1b}[31m\"\\"), r#"`a\u{feff}b\u{1b}[31m"\`"#);
+        assert_eq!(quoted(&"ä".repeat(41)), format!("`{}…`", "ä".repeat(40)));
+    }
+
+    #[test]
+    fn counts_are_grouped() {
+        assert_eq!([0, 999, 1000, 64_000_000].map(grouped), ["0", "999", "1,000", "64,000,000"]);
+    }
+
+    #[test]
+    fn a_line_is_found_around_an_offset() {
+        let check = |offset, number, text: &str, at| {
+            let (line, start) = Line::around("ab\ncä\n".as_bytes(), offset);
+            assert_eq!((line.number, line.bytes, start), (number, text.as_bytes(), at), "{offset}");
+        };
+        check(0, 1, "ab", 0);
+        check(2, 1, "ab", 2);
+        check(3, 2, "cä", 0);
+        check(6, 2, "cä", 3);
+        check(7, 3, "", 0);
+    }
+
+    #[test]
+    fn faults_beyond_the_bound_are_counted() {
+        let line = Line { number: 7, offset: 100, bytes: b"abc" };
+        let mut report = Report::new("a.txt", 2);
+        for at in 0..3 {
+            report.error(line, at..at + 1, || Fault::new(Code::NotANumber, "wrong"));
+            report.warning(line, at..at, || Fault::new(Code::Unused, "odd"));
+        }
+        report.error(line, 0..3, || unreachable!("never put into words"));
+        assert!(report.has_errors());
+        let told: Vec<_> = report.finish().into_iter().map(|d| (d.message, d.column)).collect();
+        let told: Vec<_> = told.iter().map(|(message, column)| (message.as_str(), *column)).collect();
+        assert_eq!(
+            told,
+            [
+                ("odd", 1),
+                ("wrong", 1),
+                ("odd", 2),
+                ("wrong", 2),
+                ("1 more warning from here on", 3),
+                ("2 more errors from here on", 3)
+            ]
+        );
+    }
+}

@@ -1,0 +1,649 @@
+//! What people read about a script with faults, word for word.
+//!
+//! After a deliberate change `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews what is expected.
+
+use expect_test::{Expect, expect};
+use rayfold_scene::{Limits, parse};
+
+fn check(script: impl AsRef<[u8]>, expect: Expect) {
+    check_limited(script, Limits::default(), expect);
+}
+
+fn check_limited(script: impl AsRef<[u8]>, limits: Limits, expect: Expect) {
+    let parsed = parse("a.txt", script.as_ref(), &limits);
+    assert_eq!(parsed.script.is_some(), !parsed.diagnostics.iter().any(|d| d.is_error()));
+    let shown: Vec<_> = parsed.diagnostics.iter().map(|d| d.render(false)).collect();
+    expect.assert_eq(&shown.join("\n\n"));
+}
+
+#[test]
+fn a_misspelt_command() {
+    check(
+        "Screen 4 3\nSpere 1 0 0 -5 1 0 0 0 0 0\nTrace",
+        expect![[r#"
+        error: unknown command `Spere`
+         --> a.txt:2:1
+          |
+        2 | Spere 1 0 0 -5 1 0 0 0 0 0
+          | ^^^^^ expected a command
+          |
+          = help: did you mean `Sphere`?"#]],
+    );
+}
+
+#[test]
+fn a_word_that_is_like_no_command() {
+    check(
+        "Screen 4 3\nRotate 90 0 1 0\nTrace",
+        expect![[r#"
+        error: unknown command `Rotate`
+         --> a.txt:2:1
+          |
+        2 | Rotate 90 0 1 0
+          | ^^^^^^ expected a command
+          |
+          = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Background`, `Sphere`, `Triangle`, `Box`, `Ilight`, `Clear`, `Trace`"#]],
+    );
+}
+
+#[test]
+fn a_command_that_cannot_be_seen_to_be_misspelt() {
+    check(
+        "Screen 4 3\n\u{feff}Clear\nTrace\u{1b}[31m",
+        expect![[r#"
+        error: unknown command `\u{feff}Clear`
+         --> a.txt:2:1
+          |
+        2 | ﻿Clear
+          | ^^^^^ expected a command
+          |
+          = help: did you mean `Clear`?
+
+        error: unknown command `Trace\u{1b}[31m`
+         --> a.txt:3:1
+          |
+        3 | Trace␛[31m
+          | ^^^^^^^^^^ expected a command
+          |
+          = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Background`, `Sphere`, `Triangle`, `Box`, `Ilight`, `Clear`, `Trace`
+
+        error: nothing is rendered: there is no `Trace`
+         --> a.txt:3:11
+          |
+        3 | Trace␛[31m
+          |           ^ expected a `Trace`
+          |
+          = help: `Trace` renders a frame of everything that stands before it"#]],
+    );
+}
+
+#[test]
+fn a_comment_of_another_language() {
+    check(
+        "// a scene\nScreen 4 3\nTrace",
+        expect![[r#"
+        error: unknown command `//`
+         --> a.txt:1:1
+          |
+        1 | // a scene
+          | ^^ expected a command
+          |
+          = help: a comment starts with `#`"#]],
+    );
+}
+
+#[test]
+fn parameters_on_the_next_line() {
+    check(
+        "Screen 4 3\nSphere 1 0 0 -5 1 0 0\n 0 0 0\nTrace",
+        expect![[r#"
+        error: `Sphere` takes 10 to 13 numbers, found 7
+         --> a.txt:2:22
+          |
+        2 | Sphere 1 0 0 -5 1 0 0
+          |                      ^ expected `rr` here
+          |
+          = help: write `Sphere R cx cy cz ar ag ab rr rg rb [sr sg sb]`
+
+        error: unknown command `0`
+         --> a.txt:3:2
+          |
+        3 |  0 0 0
+          |  ^ expected a command
+          |
+          = help: a command and all its parameters stand on one line"#]],
+    );
+}
+
+#[test]
+fn missing_parameters() {
+    check(
+        "Screen\nBackground 1 1 # red\nTrace",
+        expect![[r#"
+        error: `Screen` takes 2 numbers, found none
+         --> a.txt:1:7
+          |
+        1 | Screen
+          |       ^ expected `nx` here
+          |
+          = help: write `Screen nx ny`
+
+        error: `Background` takes 3 numbers, found 2
+         --> a.txt:2:15
+          |
+        2 | Background 1 1 # red
+          |               ^ expected `b` here
+          |
+          = help: write `Background r g b`"#]],
+    );
+}
+
+#[test]
+fn surplus_parameters() {
+    check(
+        "Screen 4 3 Trace\nTriangle 0 0 0 1 0 0 0 1 0 1 1 1 0 0 0 .5 .5 .5\nTrace 1",
+        expect![[r#"
+        error: `Screen` takes 2 numbers, found 3
+         --> a.txt:1:12
+          |
+        1 | Screen 4 3 Trace
+          |            ^^^^^ expected the end of the line
+          |
+          = help: every command stands on a line of its own
+
+        error: `Triangle` takes 15 numbers, found 18
+         --> a.txt:2:48
+          |
+        2 | Triangle 0 0 0 1 0 0 0 1 0 1 1 1 0 0 0 .5 .5 .5
+          |                                                ^ expected the end of the line
+          |
+          = help: write `Triangle ux uy uz vx vy vz wx wy wz ar ag ab rr rg rb`
+
+        error: `Trace` takes no parameters, found 1
+         --> a.txt:3:7
+          |
+        3 | Trace 1
+          |       ^ expected the end of the line
+          |
+          = help: write `Trace`"#]],
+    );
+}
+
+#[test]
+fn words_that_are_no_numbers() {
+    check(
+        "Screen 4 3\nSphere one 0x10 nan -inf 1.2.3 1 1 1e 1 1\nTrace",
+        expect![[r#"
+        error: `one` is not a number
+         --> a.txt:2:8
+          |
+        2 | Sphere one 0x10 nan -inf 1.2.3 1 1 1e 1 1
+          |        ^^^ expected `R`, a number such as 2, -.5 or 1e-3
+
+        error: `0x10` is not a number
+         --> a.txt:2:12
+          |
+        2 | Sphere one 0x10 nan -inf 1.2.3 1 1 1e 1 1
+          |            ^^^^ expected `cx`, a number such as 2, -.5 or 1e-3
+
+        error: `nan` is not a number
+         --> a.txt:2:17
+          |
+        2 | Sphere one 0x10 nan -inf 1.2.3 1 1 1e 1 1
+          |                 ^^^ expected `cy`, a number such as 2, -.5 or 1e-3
+
+        error: `-inf` is not a number
+         --> a.txt:2:21
+          |
+        2 | Sphere one 0x10 nan -inf 1.2.3 1 1 1e 1 1
+          |                     ^^^^ expected `cz`, a number such as 2, -.5 or 1e-3
+
+        error: `1.2.3` is not a number
+         --> a.txt:2:26
+          |
+        2 | Sphere one 0x10 nan -inf 1.2.3 1 1 1e 1 1
+          |                          ^^^^^ expected `ar`, a number such as 2, -.5 or 1e-3
+
+        error: `1e` is not a number
+         --> a.txt:2:36
+          |
+        2 | Sphere one 0x10 nan -inf 1.2.3 1 1 1e 1 1
+          |                                    ^^ expected `rr`, a number such as 2, -.5 or 1e-3"#]],
+    );
+}
+
+#[test]
+fn signs_and_blanks_of_a_word_processor() {
+    check(
+        "Screen 4 3\nBackground \u{2212}1 1\u{a0}0 0,5 0\nTrace",
+        expect![[r#"
+        error: `−1` is not a number
+         --> a.txt:2:12
+          |
+        2 | Background −1 1 0 0,5 0
+          |            ^^ expected `r`, a number such as 2, -.5 or 1e-3
+          |
+          = help: the minus sign is `-`, this one is U+2212
+
+        error: `1\u{a0}0` is not a number
+         --> a.txt:2:15
+          |
+        2 | Background −1 1 0 0,5 0
+          |               ^^^ expected `g`, a number such as 2, -.5 or 1e-3
+          |
+          = help: blanks, tabs and commas separate parameters, U+00A0 does not
+
+        error: `Background` takes 3 numbers, found 5
+         --> a.txt:2:21
+          |
+        2 | Background −1 1 0 0,5 0
+          |                     ^^^ expected the end of the line
+          |
+          = help: write `Background r g b`"#]],
+    );
+}
+
+#[test]
+fn a_number_too_large_for_a_float() {
+    check(
+        "Screen 4 3\nBackground 1e999 0 0\nTrace",
+        expect![[r#"
+        error: `1e999` is too large
+         --> a.txt:2:12
+          |
+        2 | Background 1e999 0 0
+          |            ^^^^^ expected `r`, a number up to 1.79e308"#]],
+    );
+}
+
+#[test]
+fn a_screen_without_pixels() {
+    check(
+        "Screen 0 101.5\nScreen -4 1e10\nTrace",
+        expect![[r#"
+            error: `0` is not a number of pixels
+             --> a.txt:1:8
+              |
+            1 | Screen 0 101.5
+              |        ^ expected `nx`, a whole number from 1
+
+            error: `101.5` is not a number of pixels
+             --> a.txt:1:10
+              |
+            1 | Screen 0 101.5
+              |          ^^^^^ expected `ny`, a whole number from 1
+
+            error: `-4` is not a number of pixels
+             --> a.txt:2:8
+              |
+            2 | Screen -4 1e10
+              |        ^^ expected `nx`, a whole number from 1
+
+            error: `1e10` is not a number of pixels
+             --> a.txt:2:11
+              |
+            2 | Screen -4 1e10
+              |           ^^^^ expected `ny`, a whole number up to 4,294,967,295"#]],
+    );
+}
+
+#[test]
+fn a_radius_of_nothing() {
+    check(
+        "Screen 4 3\nSphere 0 0 0 -5 1 0 0 0 0 0\nSphere -1, 0 0 -5, 1 0 0, 0 0 0\nTrace",
+        expect![[r#"
+        error: the radius must be greater than zero
+         --> a.txt:2:8
+          |
+        2 | Sphere 0 0 0 -5 1 0 0 0 0 0
+          |        ^ expected a number greater than 0
+
+        error: the radius must be greater than zero
+         --> a.txt:3:8
+          |
+        3 | Sphere -1, 0 0 -5, 1 0 0, 0 0 0
+          |        ^^ expected a number greater than 0"#]],
+    );
+}
+
+#[test]
+fn everything_wrong_with_a_camera() {
+    check(
+        "Screen 4 3\nCamera 0 0 5  0 0 0  0 1 0  0  -1 -1 -1 -1\nTrace",
+        expect![[r#"
+        error: the gaze must not be zero
+         --> a.txt:2:15
+          |
+        2 | Camera 0 0 5  0 0 0  0 1 0  0  -1 -1 -1 -1
+          |               ^^^^^ expected three numbers that are not all 0
+
+        error: the window's distance s must be greater than zero
+         --> a.txt:2:29
+          |
+        2 | Camera 0 0 5  0 0 0  0 1 0  0  -1 -1 -1 -1
+          |                             ^ expected a number greater than 0
+
+        error: the window must not be empty: au equals bu
+         --> a.txt:2:32
+          |
+        2 | Camera 0 0 5  0 0 0  0 1 0  0  -1 -1 -1 -1
+          |                                ^^^^^^^^ expected `au` and `bu` to differ
+
+        error: the window must not be empty: av equals bv
+         --> a.txt:2:35
+          |
+        2 | Camera 0 0 5  0 0 0  0 1 0  0  -1 -1 -1 -1
+          |                                   ^^^^^^^^ expected `av` and `bv` to differ"#]],
+    );
+}
+
+#[test]
+fn a_gaze_along_the_view_up() {
+    check(
+        "Screen 4 3\nCamera 0 0 5  0 0.1 0  0 -7 0  1  -1 -1 1 1\nTrace",
+        expect![[r#"
+        error: the gaze and the view-up must not be parallel
+         --> a.txt:2:15
+          |
+        2 | Camera 0 0 5  0 0.1 0  0 -7 0  1  -1 -1 1 1
+          |               ^^^^^^^^^^^^^^^ expected two directions that span a plane"#]],
+    );
+}
+
+#[test]
+fn a_light_that_travels_nowhere() {
+    check(
+        "Screen 4 3\nIlight 1 1 1 0 0 -0\nTrace",
+        expect![[r#"
+        error: the light's direction must not be zero
+         --> a.txt:2:14
+          |
+        2 | Ilight 1 1 1 0 0 -0
+          |              ^^^^^^ expected three numbers that are not all 0"#]],
+    );
+}
+
+#[test]
+fn a_triangle_of_no_area_is_a_warning() {
+    check(
+        "Screen 4 3\nTriangle 0 0 0 .1 .2 .3 .2 .4 .6 1 1 1 0 0 0\nTrace",
+        expect![[r#"
+        warning: a triangle of no area is never hit
+         --> a.txt:2:10
+          |
+        2 | Triangle 0 0 0 .1 .2 .3 .2 .4 .6 1 1 1 0 0 0
+          |          ^^^^^^^^^^^^^^^^^^^^^^^ expected three points that are not on a line"#]],
+    );
+}
+
+#[test]
+fn no_screen_is_told_once() {
+    check(
+        "Trace\nTrace",
+        expect![[r#"
+        error: the size of the image is not known
+         --> a.txt:1:1
+          |
+        1 | Trace
+          | ^^^^^ expected a `Screen` before this
+          |
+          = help: write for example `Screen 640 480`"#]],
+    );
+}
+
+#[test]
+fn no_trace() {
+    check(
+        "Screen 4 3\nSphere 1 0 0 -5 1 0 0 0 0 0\n",
+        expect![[r#"
+        error: nothing is rendered: there is no `Trace`
+         --> a.txt:3:1
+          |
+        3 |
+          | ^ expected a `Trace`
+          |
+          = help: `Trace` renders a frame of everything that stands before it"#]],
+    );
+}
+
+#[test]
+fn nothing_at_all() {
+    check(
+        "",
+        expect![[r#"
+        error: nothing is rendered: there is no `Trace`
+         --> a.txt:1:1
+          |
+        1 |
+          | ^ expected a `Trace`
+          |
+          = help: `Trace` renders a frame of everything that stands before it"#]],
+    );
+}
+
+#[test]
+fn a_faulty_screen_or_trace_is_not_a_missing_one() {
+    check(
+        "Scren 4 3\nTrase",
+        expect![[r#"
+        error: unknown command `Scren`
+         --> a.txt:1:1
+          |
+        1 | Scren 4 3
+          | ^^^^^ expected a command
+          |
+          = help: did you mean `Screen`?
+
+        error: unknown command `Trase`
+         --> a.txt:2:1
+          |
+        2 | Trase
+          | ^^^^^ expected a command
+          |
+          = help: did you mean `Trace`?"#]],
+    );
+}
+
+#[test]
+fn what_stands_behind_the_last_trace() {
+    check(
+        "Screen 4 3\nTrace\nClear\nBackground 1 1 1\nSphere 1 0 0 -5 1 0 0 0 0 0",
+        expect![[r#"
+        warning: this has no effect: no `Trace` follows
+         --> a.txt:4:1
+          |
+        4 | Background 1 1 1
+          | ^^^^^^^^^^ expected a `Trace` after this
+          |
+          = help: `Trace` renders a frame of everything that stands before it"#]],
+    );
+}
+
+#[test]
+fn an_image_beyond_the_limit() {
+    check(
+        "Screen 8000 8000\nScreen 8000 8001\nTrace",
+        expect![[r#"
+        error: the image has 64,008,000 pixels, the limit is 64,000,000
+         --> a.txt:2:8
+          |
+        2 | Screen 8000 8001
+          |        ^^^^^^^^^ expected a smaller image
+          |
+          = help: make the image smaller or raise the limit"#]],
+    );
+}
+
+#[test]
+fn more_objects_lights_and_frames_than_the_limits() {
+    let limits = Limits { max_objects: 1, max_lights: 1, max_frames: Some(2), ..Limits::default() };
+    let sphere = "Sphere 1 0 0 -5 1 0 0 0 0 0\n";
+    let light = "Ilight 1 1 1 0 0 -1\n";
+    let scene = format!("{sphere}{light}Trace\n");
+    check_limited(format!("Screen 4 3\n{scene}Clear\n{scene}"), limits, expect![]);
+    check_limited(
+        format!("Screen 4 3\n{scene}{scene}{scene}"),
+        limits,
+        expect![[r#"
+            error: more than 1 objects in a scene
+             --> a.txt:5:1
+              |
+            5 | Sphere 1 0 0 -5 1 0 0 0 0 0
+              | ^^^^^^ expected at most 1, this is one more
+
+            error: more than 1 lights in a scene
+             --> a.txt:6:1
+              |
+            6 | Ilight 1 1 1 0 0 -1
+              | ^^^^^^ expected at most 1, this is one more
+
+            error: more than 2 frames
+              --> a.txt:10:1
+               |
+            10 | Trace
+               | ^^^^^ expected at most 2, this is one more"#]],
+    );
+}
+
+#[test]
+fn a_script_larger_than_the_limit() {
+    let limits = Limits { max_script_bytes: 16, ..Limits::default() };
+    check_limited("Screen 4 3\nTrace", limits, expect![]);
+    check_limited(
+        "Screen 4 3\nTrace\n",
+        limits,
+        expect![[r#"
+            error: the script has 17 bytes, the limit is 16
+             --> a.txt:1:1
+              |
+            1 | Screen 4 3
+              | ^ expected a smaller script"#]],
+    );
+}
+
+#[test]
+fn more_faults_than_are_told() {
+    let limits = Limits { max_described: 1, ..Limits::default() };
+    check_limited(
+        "Screen 4 3\nTrace 1 # ä\nx\nTrace ä\nTrace 1\n",
+        limits,
+        expect![[r#"
+        error: `Trace` takes no parameters, found 1
+         --> a.txt:2:7
+          |
+        2 | Trace 1 # ä
+          |       ^ expected the end of the line
+          |
+          = help: write `Trace`
+
+        error: 3 more errors from here on
+         --> a.txt:3:1
+          |
+        3 | x
+          | ^"#]],
+    );
+}
+
+#[test]
+fn text_that_is_not_utf8() {
+    check(
+        b"Screen 4 3 # sch\xc3\xb6n\n# sch\xf6n\nTrace # \xe2\x82",
+        expect![[r#"
+            error: this is not UTF-8 text: 0xF6
+             --> a.txt:2:6
+              |
+            2 | # sch�n
+              |      ^ expected UTF-8
+              |
+              = help: save the script as UTF-8
+
+            error: this is not UTF-8 text: 0xE2 0x82
+             --> a.txt:3:9
+              |
+            3 | Trace # �
+              |         ^ expected UTF-8
+              |
+              = help: save the script as UTF-8"#]],
+    );
+}
+
+#[test]
+fn utf16_text() {
+    check(
+        b"\xff\xfeT\0r\0a\0c\0e\0",
+        expect![[r#"
+        error: the script is UTF-16 text
+         --> a.txt:1:1
+          |
+        1 | ��
+          | ^^ expected UTF-8
+          |
+          = help: save the script as UTF-8"#]],
+    );
+}
+
+#[test]
+fn line_ends_of_the_last_century() {
+    check(
+        "Screen 4 3\rTrace\r",
+        expect![[r#"
+            error: a carriage return without a line feed
+             --> a.txt:1:11
+              |
+            1 | Screen 4 3␍Trace
+              |           ^ expected a line feed after this
+              |
+              = help: lines end with LF or CR LF; save the script with either"#]],
+    );
+    check(
+        "Screen 4 3 # small\rTrace\r\nTrace\r\n",
+        expect![[r#"
+            error: a carriage return without a line feed
+             --> a.txt:1:19
+              |
+            1 | Screen 4 3 # small␍Trace
+              |                   ^ expected a line feed after this
+              |
+              = help: lines end with LF or CR LF; save the script with either"#]],
+    );
+}
+
+#[test]
+fn a_place_counts_in_characters() {
+    check(
+        "\u{feff}# ä\r\nScreen 4 3\r\n\tÄÖÜ 日本\r\nTrace\r\n",
+        expect![[r#"
+        error: unknown command `ÄÖÜ`
+         --> a.txt:3:2
+          |
+        3 |     ÄÖÜ 日本
+          |     ^^^ expected a command
+          |
+          = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Background`, `Sphere`, `Triangle`, `Box`, `Ilight`, `Clear`, `Trace`"#]],
+    );
+}
+
+#[test]
+fn a_long_line_is_cut_around_the_fault() {
+    check(
+        format!("Screen 4 3\nBackground{} x{} # {}\nTrace", " ".repeat(600), " 1".repeat(2), "-".repeat(300)),
+        expect![[r#"
+            error: `x` is not a number
+             --> a.txt:2:612
+              |
+             ::: 
+            2 | ...                                         x 1 1 # ---------------------------------------------------------------------------------...
+              |                                             ^ expected `r`, a number such as 2, -.5 or 1e-3"#]],
+    );
+    check(
+        format!("Screen 4 3\nTrace {}\n", "x".repeat(10_000)),
+        expect![[r#"
+        error: `Trace` takes no parameters, found 1
+         --> a.txt:2:7
+          |
+        2 | Trace xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx…
+          |       ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^ expected the end of the line
+          |
+          = help: write `Trace`"#]],
+    );
+}
