@@ -271,6 +271,11 @@ impl Generation {
         Ok(Generation(text.to_owned()))
     }
 
+    /// Takes digits that this crate has just made.
+    pub(crate) fn of_hash(digits: String) -> Self {
+        Generation(digits)
+    }
+
     /// The digits.
     pub fn as_str(&self) -> &str {
         &self.0

@@ -3,10 +3,30 @@
 //! `docs/pipeline.md` is the protocol's reference. This crate knows the bucket only as a [`store::Store`], time only
 //! as a [`clock::Clock`] and chance only as [`clock::Randomness`]; it starts no threads and no tasks.
 
+pub mod assemble;
 pub mod clock;
 mod error;
+pub mod failure;
+pub mod fold;
+pub mod invariants;
+mod invocation;
 pub mod keys;
+pub mod manifest;
+mod observe;
+pub mod reconcile;
+pub mod render;
+pub mod retry;
 pub mod store;
+pub mod studio;
+pub mod sweep;
 
+pub use assemble::{Animator, Encoding, assemble};
 pub use clock::{Clock, Randomness, SystemClock, Timestamp};
 pub use error::{Cause, Error, Result};
+pub use failure::record_failure;
+pub use fold::fold;
+pub use invocation::{Invocation, Mutation, Policy};
+pub use reconcile::reconcile;
+pub use render::{Drawing, Renderer, render_frame};
+pub use retry::retry;
+pub use sweep::sweep;

@@ -1,0 +1,314 @@
+//! What the platform has given up: records of its on-failure destination, which the assemble function receives.
+//!
+//! A frame that timed out, or whose function died, in each attempt at one version would do so again: it gets an error
+//! receipt that says so. Other failures (a busy store, events too old) may pass: the frame is woken once more, a
+//! bounded number of times. Either way the manifest is folded, so that the user sees it. An assembly that timed out or
+//! died in each attempt is refused by name; other failed assemblies are the sweep's.
+
+use serde::Deserialize;
+
+use crate::assemble::generation_of;
+use crate::fold::Folded;
+use crate::invocation::Invocation;
+use crate::keys::{Animation, Generation, Key, Part, ScriptName, Tag, decode_event_key};
+use crate::manifest::{Fact, Reason, Status};
+use crate::store::{ETag, Store};
+use crate::{Clock, Error, Result};
+
+/// One failed event.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Failure {
+    /// The key that the event was about.
+    pub key: String,
+    /// The version of the object that the event was about, if it says so.
+    pub version: Option<ETag>,
+    /// How often the function was tried; 0 when it was never started.
+    pub attempts: u64,
+    /// What ended the last attempt.
+    pub end: End,
+}
+
+/// What ended an invocation.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum End {
+    /// The deadline.
+    TimedOut,
+    /// The process died, most likely for lack of memory.
+    Died,
+    /// The event became too old before it was tried.
+    TooOld,
+    /// The function answered with an error.
+    Error(String),
+}
+
+/// What became of a failed event.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Recorded {
+    /// There is a result, or nothing to render any more.
+    Resolved(Folded),
+    /// The frame was woken once more.
+    Woken {
+        /// Which attempt this is.
+        attempt: u64,
+    },
+    /// The frame has an error receipt now.
+    GivenUp(Folded),
+    /// The set of frames is refused now.
+    Refused(Folded),
+    /// The sweep will see to it.
+    LeftToSweep,
+}
+
+/// The failed events of an on-failure destination record (JSON, as Lambda writes it).
+///
+/// Records of events that are no object events, such as the schedule's, have none.
+///
+/// # Errors
+///
+/// [`Error::Malformed`] when it is not such a record.
+pub fn parse_record(record: &[u8]) -> Result<Vec<Failure>> {
+    let record: Record = serde_json::from_slice(record).map_err(|source| Error::Malformed {
+        key: "the on-failure record".to_owned(),
+        source: source.into(),
+    })?;
+    let end = record.end();
+    let attempts = record.request_context.approximate_invoke_count;
+    let payload: Payload = serde_json::from_value(record.request_payload).unwrap_or_default();
+    payload
+        .records
+        .into_iter()
+        .map(|event| {
+            let key = decode_event_key(&event.s3.object.key)?;
+            let version = event.s3.object.etag.filter(|etag| !etag.is_empty()).map(|etag| ETag::new(&etag));
+            Ok(Failure { key, version, attempts, end: end.clone() })
+        })
+        .collect()
+}
+
+/// Does what is due for a failed event.
+///
+/// # Errors
+///
+/// [`Error::Key`] for a key that wakes nothing: a retry would not help. Others are the store's.
+pub async fn record_failure<S: Store, C: Clock>(
+    invocation: &Invocation<'_, S, C>,
+    failure: &Failure,
+) -> Result<Recorded> {
+    match failure.key.parse()? {
+        Key::Script { animation, name } => {
+            let version = failure.version.clone();
+            invocation.record_frame(failure, animation, name, None, version).await
+        }
+        Key::Part { animation, name, tag, number } => {
+            invocation.record_frame(failure, animation, name, Some(number), Some(tag.version)).await
+        }
+        Key::Retry { animation, name, tag, part, .. } => {
+            invocation.record_frame(failure, animation, name, part, Some(tag.version)).await
+        }
+        Key::Settings { animation } => invocation.fold(&animation, &Fact::Fold).await.map(Recorded::Resolved),
+        Key::Claim { animation, generation, .. } => {
+            invocation.record_assembly(failure, animation, generation).await
+        }
+        _ => Err(Error::key(&failure.key, "this key wakes nothing")),
+    }
+}
+
+impl<S: Store, C: Clock> Invocation<'_, S, C> {
+    async fn record_frame(
+        &self,
+        failure: &Failure,
+        animation: Animation,
+        name: ScriptName,
+        part: Part,
+        tried: Option<ETag>,
+    ) -> Result<Recorded> {
+        let Some(script) = self.head(&animation.script(&name)).await? else {
+            return self.fold(&animation, &Fact::Absent(name)).await.map(Recorded::Resolved);
+        };
+        let version = script.etag;
+        if part.is_some() && tried.as_ref() != Some(&version) {
+            return self.fold(&animation, &Fact::Version(name, version)).await.map(Recorded::Resolved);
+        }
+        if let Some(standing) = self.standing(&animation, &name, &version, part).await? {
+            let fact = standing.fact(name, version, part);
+            return self.fold(&animation, &fact).await.map(Recorded::Resolved);
+        }
+        let mut attempts = 0;
+        for listed in self.retries(&animation).await? {
+            if let Ok(Key::Retry { name: of, tag, part: of_part, attempt, .. }) = listed.key.parse()
+                && (&of, &tag.version, of_part) == (&name, &version, part)
+            {
+                attempts = attempts.max(attempt.get());
+            }
+        }
+        let tag = Tag { version: version.clone(), pixels: self.policy.pixels };
+        let tries = failure.attempts;
+        let hopeless = match &failure.end {
+            End::TimedOut if tried.as_ref() == Some(&version) => {
+                Some(format!("timed out in each of {tries} attempts"))
+            }
+            End::Died if tried.as_ref() == Some(&version) => Some(format!(
+                "the render function died in each of {tries} attempts, most likely for lack of memory"
+            )),
+            _ if attempts < self.policy.attempts => None,
+            End::TimedOut | End::Died | End::TooOld => {
+                Some(format!("no result in each of {attempts} attempts"))
+            }
+            End::Error(message) => Some(format!("no result in each of {attempts} attempts: {message}")),
+        };
+        match hopeless {
+            None => {
+                self.put_retry(&animation, &name, tag, part, attempts + 1).await?;
+                Ok(Recorded::Woken { attempt: attempts + 1 })
+            }
+            Some(message) => {
+                let receipt = self.put_fault(&animation, &name, &tag, part, &Reason::new(message)).await?;
+                let fact = receipt.map_or(Fact::Fold, |receipt| Fact::Faulty(name, version, part, receipt));
+                self.fold(&animation, &fact).await.map(Recorded::GivenUp)
+            }
+        }
+    }
+
+    async fn record_assembly(
+        &self,
+        failure: &Failure,
+        animation: Animation,
+        claimed: Generation,
+    ) -> Result<Recorded> {
+        let what = match failure.end {
+            End::TimedOut => "timed out",
+            End::Died => "died, most likely for lack of memory,",
+            End::TooOld | End::Error(_) => return Ok(Recorded::LeftToSweep),
+        };
+        let known = self.manifest(&animation).await?;
+        let gif = self.head(&animation.gif()).await?;
+        let manifest = self.observe(&animation, known.as_ref()).await?.manifest;
+        let head = &manifest.head;
+        let current = head.status == Status::Done && head.generation == claimed;
+        if !current || generation_of(gif.as_ref()) == Some(claimed.as_str()) {
+            return Ok(Recorded::LeftToSweep);
+        }
+        let tries = failure.attempts;
+        let reason = Reason::new(format!(
+            "the assemble function {what} in each of {tries} attempts at {} frames: give it more time or memory and \
+             retry, or fetch the frames and assemble them locally",
+            head.total
+        ));
+        self.refuse(&manifest, &reason).await?;
+        self.fold(&animation, &Fact::Fold).await.map(Recorded::Refused)
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Record {
+    request_context: RequestContext,
+    #[serde(default)]
+    request_payload: serde_json::Value,
+    #[serde(default)]
+    response_payload: serde_json::Value,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct RequestContext {
+    #[serde(default)]
+    condition: String,
+    #[serde(default)]
+    approximate_invoke_count: u64,
+}
+
+#[derive(Deserialize, Default)]
+struct Payload {
+    #[serde(rename = "Records", default)]
+    records: Vec<Event>,
+}
+
+#[derive(Deserialize)]
+struct Event {
+    s3: Entity,
+}
+
+#[derive(Deserialize)]
+struct Entity {
+    object: EventObject,
+}
+
+#[derive(Deserialize)]
+struct EventObject {
+    key: String,
+    #[serde(rename = "eTag")]
+    etag: Option<String>,
+}
+
+impl Record {
+    /// Lambda says how an attempt ended only in the words of its error.
+    fn end(&self) -> End {
+        if self.request_context.condition == "EventAgeExceeded" {
+            return End::TooOld;
+        }
+        let text = |field: &str| self.response_payload[field].as_str().unwrap_or_default();
+        let (kind, message) = (text("errorType"), text("errorMessage"));
+        if message.contains("Task timed out")
+            || message.starts_with("out of time")
+            || kind == "Sandbox.Timedout"
+        {
+            End::TimedOut
+        } else if kind == "Runtime.ExitError"
+            || kind == "Runtime.OutOfMemory"
+            || message.contains("Runtime exited")
+        {
+            End::Died
+        } else {
+            End::Error(message.to_owned())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(condition: &str, response: &str) -> String {
+        format!(
+            r#"{{"version":"1.0","timestamp":"2026-01-01T00:00:00.000Z",
+            "requestContext":{{"requestId":"r","functionArn":"arn:aws:lambda:eu-west-1:1:function:f:$LATEST",
+            "condition":"{condition}","approximateInvokeCount":3}},
+            "requestPayload":{{"Records":[{{"s3":{{"bucket":{{"name":"b"}},
+            "object":{{"key":"scripts/a+b/x%2B1.txt","eTag":"abc"}}}}}}]}},
+            "responseContext":{{"statusCode":200,"executedVersion":"$LATEST","functionError":"Unhandled"}},
+            "responsePayload":{response}}}"#
+        )
+    }
+
+    fn check(condition: &str, response: &str, expected: End) {
+        let failures = parse_record(record(condition, response).as_bytes()).unwrap();
+        let failure = Failure {
+            key: "scripts/a b/x+1.txt".to_owned(),
+            version: Some(ETag::new("abc")),
+            attempts: 3,
+            end: expected,
+        };
+        assert_eq!(failures, [failure]);
+    }
+
+    #[test]
+    fn records_say_how_it_ended() {
+        let message = r#"{"errorMessage":"2026-01-01T00:00:00.000Z r Task timed out after 60.00 seconds"}"#;
+        check("RetriesExhausted", message, End::TimedOut);
+        let died = r#"{"errorType":"Runtime.ExitError","errorMessage":"RequestId: r Error: Runtime exited with error: signal: killed"}"#;
+        check("RetriesExhausted", died, End::Died);
+        let own = r#"{"errorType":"Error","errorMessage":"out of time: drawing x"}"#;
+        check("RetriesExhausted", own, End::TimedOut);
+        let other = r#"{"errorType":"Error","errorMessage":"the store is busy"}"#;
+        check("RetriesExhausted", other, End::Error("the store is busy".to_owned()));
+        check("EventAgeExceeded", "null", End::TooOld);
+    }
+
+    #[test]
+    fn records_of_the_schedule_have_no_objects() {
+        let text = record("RetriesExhausted", "null").replace("Records", "other");
+        assert_eq!(parse_record(text.as_bytes()).unwrap(), []);
+        assert!(parse_record(b"{}").is_err());
+    }
+}

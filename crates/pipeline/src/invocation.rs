@@ -1,0 +1,262 @@
+//! What a step is given: the store, the clock, chance, its own name, and how patient it is.
+//!
+//! Requests go through here so that a busy store and a lost answer are met in one way: whatever may be repeated
+//! without harm is repeated a few times with growing random pauses. Conditional writes of the manifest and the GIF are
+//! not repeated; after a lost answer of one the steps look at what is there.
+
+use std::future::Future;
+use std::time::Duration;
+
+use bytes::Bytes;
+
+use crate::keys::Animation;
+use crate::manifest::{Fact, Manifest};
+use crate::store::{ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store};
+use crate::{Clock, Error, Randomness, Result, Timestamp};
+
+/// The numbers of the protocol. Each default has its reason; tests and the local invoker shorten some.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Policy {
+    /// The renderer's pixel version, for the tags of what is drawn and woken.
+    pub pixels: u32,
+    /// How old the newest script must be before a GIF is made, when `animation.json` does not say how many frames to
+    /// wait for. 5 s: longer than the gaps of an upload, short enough to wait for.
+    pub quiet: Duration,
+    /// Pause before folding, for each frame that the manifest shows not done: with many to come another finisher
+    /// will list anyway.
+    pub pause_per_frame: Duration,
+    /// The longest such pause; with it the last finisher still claims within a second.
+    pub pause_cap: Duration,
+    /// How long nothing may happen before the sweep wakes pending frames; doubles with each attempt. 15 min: as long
+    /// as an invocation may run.
+    pub stuck_after: Duration,
+    /// After how many wakings a pending frame is given up.
+    pub attempts: u64,
+    /// How old a superseded frame must be before the sweep deletes it. A week: a script that is changed back finds
+    /// its old frame.
+    pub superseded_after: Duration,
+    /// How often a harmless request is sent before its failure is the step's.
+    pub request_attempts: u32,
+    /// The first pause before a request is repeated; doubles each time.
+    pub request_pause: Duration,
+    /// How many requests of one kind run side by side.
+    pub concurrency: usize,
+    /// How many frames are fetched ahead of the encoder.
+    pub prefetch: usize,
+    /// How long before its deadline the assembler gives up.
+    pub margin: Duration,
+    /// How long before its deadline a drawing is stopped: enough to say so.
+    pub draw_margin: Duration,
+}
+
+impl Default for Policy {
+    fn default() -> Self {
+        Policy {
+            pixels: rayfold_tracer::PIXEL_VERSION,
+            quiet: Duration::from_secs(5),
+            pause_per_frame: Duration::from_millis(1),
+            pause_cap: Duration::from_millis(500),
+            stuck_after: Duration::from_secs(15 * 60),
+            attempts: 3,
+            superseded_after: Duration::from_secs(7 * 24 * 3600),
+            request_attempts: 5,
+            request_pause: Duration::from_millis(50),
+            concurrency: 64,
+            prefetch: 8,
+            margin: Duration::from_secs(5),
+            draw_margin: Duration::from_millis(500),
+        }
+    }
+}
+
+/// One invocation of a function, or of a command that takes part in the protocol.
+#[derive(Debug)]
+pub struct Invocation<'a, S, C> {
+    pub(crate) store: &'a S,
+    pub(crate) clock: &'a C,
+    pub(crate) random: &'a Randomness,
+    pub(crate) policy: &'a Policy,
+    request_id: &'a str,
+    pub(crate) deadline: Option<Timestamp>,
+    #[cfg(any(test, feature = "simulation"))]
+    mutation: Option<Mutation>,
+}
+
+/// A rule of the protocol that the simulation breaks on purpose, to see its predicates catch it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mutation {
+    /// The fold does not list again after its commit.
+    SkipSecondListing,
+    /// The claim is put before the commit that it claims for.
+    ClaimBeforeCommit,
+    /// The manifest is put without its condition.
+    DropIfMatch,
+    /// An invocation leaves when the manifest is covered by its own unfinished commit.
+    LeaveOwnCommit,
+    /// Everyone who finds the set complete leaves the claim to someone else, also the revision's writer.
+    NeverClaim,
+    /// The assembler leaves as soon as a frame is pending, though it has just written.
+    AssemblerLeavesEarly,
+    /// The assembler does not look again after it has put the GIF.
+    AssemblerDoesNotLookAgain,
+    /// The GIF is put without its condition.
+    DropGifCondition,
+}
+
+/// A manifest as it was read or written.
+#[derive(Debug, Clone)]
+pub(crate) struct Known {
+    pub(crate) manifest: Manifest,
+    pub(crate) etag: ETag,
+}
+
+impl<'a, S, C> Invocation<'a, S, C> {
+    /// `request_id` names the event that is worked on; the platform's retries of an event share it. `random` spreads
+    /// invocations that would collide.
+    pub fn new(
+        store: &'a S,
+        clock: &'a C,
+        random: &'a Randomness,
+        policy: &'a Policy,
+        request_id: &'a str,
+    ) -> Self {
+        Invocation {
+            store,
+            clock,
+            random,
+            policy,
+            request_id,
+            deadline: None,
+            #[cfg(any(test, feature = "simulation"))]
+            mutation: None,
+        }
+    }
+
+    /// The event that is worked on.
+    pub fn request_id(&self) -> &str {
+        self.request_id
+    }
+
+    /// The same, which the platform will kill at `deadline`.
+    pub fn until(self, deadline: Timestamp) -> Self {
+        Invocation { deadline: Some(deadline), ..self }
+    }
+
+    /// The same, breaking a rule.
+    #[cfg(any(test, feature = "simulation"))]
+    pub fn breaking(self, mutation: Option<Mutation>) -> Self {
+        Invocation { mutation, ..self }
+    }
+
+    /// Whether this rule is to be broken.
+    #[cfg(any(test, feature = "simulation"))]
+    pub(crate) fn breaks(&self, rule: Mutation) -> bool {
+        self.mutation == Some(rule)
+    }
+
+    #[cfg(not(any(test, feature = "simulation")))]
+    #[expect(clippy::unused_self, reason = "without the simulation no rule is broken")]
+    pub(crate) fn breaks(&self, _: Mutation) -> bool {
+        false
+    }
+}
+
+impl<S: Store, C: Clock> Invocation<'_, S, C> {
+    /// Reads an object, or `None` when there is none.
+    pub(crate) async fn get(&self, key: &str) -> Result<Option<Object>> {
+        found(self.persist(|| self.store.get(key)).await)
+    }
+
+    /// Reads all but the body, or `None` when there is no such object.
+    pub(crate) async fn head(&self, key: &str) -> Result<Option<ObjectInfo>> {
+        found(self.persist(|| self.store.head(key)).await)
+    }
+
+    /// Puts what may be put twice.
+    pub(crate) async fn put(&self, key: &str, body: Bytes) -> Result<ETag> {
+        let options = || PutOptions::always().content_type("application/json");
+        self.persist(|| self.store.put(key, body.clone(), options())).await
+    }
+
+    /// Puts a receipt; `None` when there is one already.
+    pub(crate) async fn put_receipt(
+        &self,
+        key: &str,
+        body: Bytes,
+        content_type: &'static str,
+    ) -> Result<Option<ETag>> {
+        let options = || PutOptions::if_absent().content_type(content_type);
+        match self.persist(|| self.store.put(key, body.clone(), options())).await {
+            Ok(etag) => Ok(Some(etag)),
+            Err(Error::PreconditionFailed { .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Removes an object.
+    pub(crate) async fn delete(&self, key: &str) -> Result<()> {
+        self.persist(|| self.store.delete(key)).await
+    }
+
+    /// Reads a page of a listing.
+    pub(crate) async fn list(&self, request: ListRequest) -> Result<ListPage> {
+        self.persist(|| self.store.list(request.clone())).await
+    }
+
+    /// Reads the manifest.
+    pub(crate) async fn manifest(&self, animation: &Animation) -> Result<Option<Known>> {
+        match self.get(&animation.manifest()).await? {
+            None => Ok(None),
+            Some(Object { info, body }) => {
+                Ok(Some(Known { manifest: Manifest::decode(animation, &body)?, etag: info.etag }))
+            }
+        }
+    }
+
+    /// Whether the invocation may leave: the manifest shows the fact, and it is not this invocation's own, whose
+    /// claim may still be owed.
+    pub(crate) fn is_covered(&self, known: Option<&Known>, fact: &Fact) -> bool {
+        let may_leave = |known: &Known| !self.is_own(known) || self.breaks(Mutation::LeaveOwnCommit);
+        known.is_some_and(|known| may_leave(known) && known.manifest.shows(fact))
+    }
+
+    /// Whether this invocation, or an earlier attempt at the same event, wrote the manifest.
+    pub(crate) fn is_own(&self, known: &Known) -> bool {
+        known.manifest.head.writer == self.request_id
+    }
+
+    /// Waits a random time that is the longer the more frames are to come.
+    pub(crate) async fn pause(&self, known: Option<&Known>) {
+        let most = known.map_or(self.policy.pause_cap, |known| {
+            let missing = u32::try_from(known.manifest.head.missing()).unwrap_or(u32::MAX);
+            self.policy.pause_per_frame.saturating_mul(missing).min(self.policy.pause_cap)
+        });
+        self.clock.sleep(self.random.up_to(most)).await;
+    }
+
+    /// Sends a request until it is answered for good, or its attempts are used up.
+    async fn persist<T, F>(&self, request: impl Fn() -> F) -> Result<T>
+    where
+        F: Future<Output = Result<T>>,
+    {
+        let mut pause = self.policy.request_pause;
+        for _ in 1..self.policy.request_attempts {
+            match request().await {
+                Err(error) if error.is_retryable() => {
+                    self.clock.sleep(self.random.up_to(pause)).await;
+                    pause = pause.saturating_mul(2);
+                }
+                answer => return answer,
+            }
+        }
+        request().await
+    }
+}
+
+fn found<T>(answer: Result<T>) -> Result<Option<T>> {
+    match answer {
+        Ok(value) => Ok(Some(value)),
+        Err(error) if error.is_not_found() => Ok(None),
+        Err(error) => Err(error),
+    }
+}

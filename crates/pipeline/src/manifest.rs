@@ -1,0 +1,384 @@
+//! The manifest: what the bucket's listing amounts to, written down for people, the command line and the protocol.
+//!
+//! `docs/manifest.md` describes the document field by field. The type knows no store: [`crate::fold`] decides when one
+//! is written, [`crate::reconcile`] what it says, [`crate::invariants`] what it may never say.
+//!
+//! Its first line is the [`Head`], whose size does not grow with the number of frames; the frames follow, a line each.
+
+use std::num::NonZeroU64;
+
+use bytes::Bytes;
+use rayfold_scene::{AnimationSettings, Diagnostic};
+use serde::{Deserialize, Serialize};
+
+use crate::keys::{Animation, Generation, Part, ScriptName};
+use crate::store::ETag;
+use crate::{Error, Result};
+
+/// The version of the document's form. Readers refuse a later one.
+pub const SCHEMA: u32 = 1;
+
+/// How many diagnostics of a script the manifest repeats; the receipt has more.
+pub const DIAGNOSTICS_SHOWN: usize = 3;
+
+/// The manifest of an animation.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Manifest {
+    /// All but the frames.
+    #[serde(flatten)]
+    pub head: Head,
+    /// The frames in the order of the animation.
+    pub frames: Vec<Frame>,
+}
+
+/// What a manifest says in short.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Head {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// The animation's name.
+    pub animation: Animation,
+    /// Grows by one with each write, from 1.
+    pub revision: u64,
+    /// The request id of the invocation that wrote this revision.
+    pub writer: String,
+    /// Where the animation stands.
+    pub status: Status,
+    /// What this set of frames and settings is; a GIF of the same generation is up to date.
+    pub generation: Generation,
+    /// Scripts in the folder.
+    pub scripts: u64,
+    /// Frames known; a script that has not been read yet counts as one.
+    pub total: u64,
+    /// Frames drawn.
+    pub done: u64,
+    /// Frames that are still to come.
+    pub pending: u64,
+    /// Frames that cannot be drawn.
+    pub failed: u64,
+    /// `animation.json`.
+    pub settings: Settings,
+    /// Files that are meant as scripts but have a key that the pipeline cannot take.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rejected: Vec<Rejected>,
+    /// Why this generation gives no GIF though all its frames are there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refusal: Option<Fault>,
+    /// Every 1,000th script's name: where listings in ranges start.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub marks: Vec<ScriptName>,
+}
+
+/// Where an animation stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Status {
+    /// There is no script; there will be no GIF.
+    Empty,
+    /// Fewer frames than `animation.json` says are there.
+    Waiting,
+    /// Frames are being drawn.
+    Rendering,
+    /// Everything has been tried, and something cannot be drawn or understood: there will be no GIF.
+    Failed,
+    /// All frames are drawn, but they cannot be assembled: there will be no GIF.
+    Refused,
+    /// All frames are drawn: there is a GIF of this generation, or there will be.
+    Done,
+}
+
+/// A frame of the animation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(from = "FrameLine", into = "FrameLine")]
+pub struct Frame {
+    /// The script that draws it.
+    pub script: ScriptName,
+    /// The script's version.
+    pub version: ETag,
+    /// Which of the script's frames it is; `None` when the script is one frame, or has not been read yet.
+    pub part: Part,
+    /// What came of it.
+    pub state: FrameState,
+}
+
+/// What came of a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FrameState {
+    /// Nothing yet.
+    Pending,
+    /// It is drawn.
+    Done {
+        /// The renderer's pixel version that is used.
+        pixels: u32,
+    },
+    /// It cannot be drawn.
+    Failed(Fault),
+}
+
+/// Why something cannot be had, and the receipt that says so.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Fault {
+    /// The receipt's version.
+    pub receipt: ETag,
+    /// What the receipt says. Never missing in a manifest that is not rendering or waiting.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<Reason>,
+}
+
+/// A reason for people, with the diagnostics that it rests on; the body of an error receipt.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Reason {
+    /// One line: of a script's first error `<file>:<line>:<column>: <message>`.
+    pub message: String,
+    /// The script's diagnostics, or the first of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub diagnostics: Vec<Diagnostic>,
+    /// How many more diagnostics there are.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub omitted: usize,
+}
+
+/// A file that is meant as a script but cannot be one.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Rejected {
+    /// Its key.
+    pub key: String,
+    /// What is wrong with it.
+    pub problem: String,
+}
+
+/// The animation's settings as they were found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// The version of `animation.json`; `None` when there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub version: Option<ETag>,
+    /// The settings; `None` exactly when `fault` says why.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<AnimationSettings>,
+    /// What is wrong with `animation.json`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fault: Option<Reason>,
+}
+
+/// What an invocation wants the manifest to show before it may leave.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Fact {
+    /// Nothing in particular: fold in any case.
+    Fold,
+    /// There is no such script.
+    Absent(ScriptName),
+    /// The script is known in this version.
+    Version(ScriptName, ETag),
+    /// `animation.json` is known in this version.
+    Settings(Option<ETag>),
+    /// The script's frame, or this part of it, is drawn with this pixel version or a newer one.
+    Drawn(ScriptName, ETag, Part, u32),
+    /// The script's frame, or this part of it, cannot be drawn, as this receipt says.
+    Faulty(ScriptName, ETag, Part, ETag),
+    /// The script has several frames.
+    Split(ScriptName, ETag),
+}
+
+impl Head {
+    /// Every expected frame is done or failed: nothing will come unless the user changes something.
+    pub fn is_terminal(&self) -> bool {
+        !matches!(self.status, Status::Waiting | Status::Rendering)
+    }
+
+    /// How many frames are expected and not there yet.
+    pub fn missing(&self) -> u64 {
+        let expected = self.settings.value.as_ref().and_then(AnimationSettings::frames).unwrap_or(0);
+        self.pending + expected.saturating_sub(self.total)
+    }
+}
+
+impl Manifest {
+    /// Says the same as `other`, whoever wrote it and whatever reasons it repeats.
+    pub fn agrees_with(&self, other: &Manifest) -> bool {
+        let (a, b) = (&self.head, &other.head);
+        let receipt = |fault: &Option<Fault>| fault.as_ref().map(|fault| fault.receipt.clone());
+        a.status == b.status
+            && a.generation == b.generation
+            && a.settings == b.settings
+            && a.rejected == b.rejected
+            && receipt(&a.refusal) == receipt(&b.refusal)
+            && self.frames.len() == other.frames.len()
+            && self.frames.iter().zip(&other.frames).all(|(a, b)| a.agrees_with(b))
+    }
+
+    /// Whether it shows the fact.
+    pub fn shows(&self, fact: &Fact) -> bool {
+        let of = |name: &ScriptName, version: &ETag| {
+            let (name, version) = (name.clone(), version.clone());
+            self.frames.iter().filter(move |frame| frame.script == name && frame.version == version)
+        };
+        match fact {
+            Fact::Fold => false,
+            Fact::Absent(name) => self.frames.iter().all(|frame| frame.script != *name),
+            Fact::Version(name, version) => of(name, version).next().is_some(),
+            Fact::Settings(version) => self.head.settings.version == *version,
+            Fact::Drawn(name, version, part, pixels) => of(name, version).any(|frame| {
+                frame.part == *part
+                    && matches!(frame.state, FrameState::Done { pixels: used } if used >= *pixels)
+            }),
+            Fact::Faulty(name, version, part, receipt) => of(name, version).any(|frame| {
+                frame.part == *part
+                    && match &frame.state {
+                        FrameState::Pending => false,
+                        FrameState::Done { .. } => true,
+                        FrameState::Failed(fault) => fault.receipt == *receipt,
+                    }
+            }),
+            Fact::Split(name, version) => of(name, version).any(|frame| frame.part.is_some()),
+        }
+    }
+
+    /// The document.
+    pub fn encode(&self) -> Result<Bytes> {
+        let malformed = |source: serde_json::Error| self.malformed(source);
+        let mut text = serde_json::to_string(&self.head).map_err(malformed)?;
+        text.pop();
+        text.push_str(",\n\"frames\":[");
+        for (place, frame) in self.frames.iter().enumerate() {
+            text.push_str(if place == 0 { "\n" } else { ",\n" });
+            text.push_str(&serde_json::to_string(frame).map_err(malformed)?);
+        }
+        text.push_str("\n]}\n");
+        Ok(Bytes::from(text))
+    }
+
+    /// Reads the document.
+    pub fn decode(animation: &Animation, body: &[u8]) -> Result<Self> {
+        let malformed = |source| Error::Malformed { key: animation.manifest(), source };
+        #[derive(Deserialize)]
+        struct Form {
+            schema: u32,
+        }
+        let form: Form = serde_json::from_slice(body).map_err(|source| malformed(source.into()))?;
+        if form.schema > SCHEMA {
+            return Err(malformed(format!("schema {} is newer than {SCHEMA}", form.schema).into()));
+        }
+        serde_json::from_slice(body).map_err(|source| malformed(source.into()))
+    }
+
+    fn malformed(&self, source: serde_json::Error) -> Error {
+        Error::Malformed { key: self.head.animation.manifest(), source: source.into() }
+    }
+}
+
+impl Frame {
+    fn agrees_with(&self, other: &Frame) -> bool {
+        let same_state = match (&self.state, &other.state) {
+            (FrameState::Failed(a), FrameState::Failed(b)) => a.receipt == b.receipt,
+            (a, b) => a == b,
+        };
+        same_state && self.script == other.script && self.version == other.version && self.part == other.part
+    }
+}
+
+impl Settings {
+    /// As when there is no `animation.json`.
+    pub fn absent() -> Self {
+        Settings { version: None, value: Some(AnimationSettings::default()), fault: None }
+    }
+
+    /// Reads `animation.json`.
+    pub fn parse(version: ETag, body: &[u8]) -> Self {
+        let parsed = rayfold_scene::parse_settings("animation.json", body);
+        let fault = match &parsed.settings {
+            Some(_) => None,
+            None => Some(Reason::from_diagnostics(parsed.diagnostics).shortened()),
+        };
+        Settings { version: Some(version), value: parsed.settings, fault }
+    }
+}
+
+impl Reason {
+    /// A reason without diagnostics.
+    pub fn new(message: impl Into<String>) -> Self {
+        Reason { message: message.into(), diagnostics: Vec::new(), omitted: 0 }
+    }
+
+    /// The errors among a script's diagnostics, up to 100 of them.
+    pub fn from_diagnostics(diagnostics: Vec<Diagnostic>) -> Self {
+        let mut errors: Vec<_> = diagnostics.into_iter().filter(Diagnostic::is_error).collect();
+        let message = match errors.first() {
+            Some(first) => {
+                let Diagnostic { file, line, column, message, .. } = first;
+                format!("{file}:{line}:{column}: {message}")
+            }
+            None => "the script cannot be read".to_owned(),
+        };
+        let omitted = errors.len().saturating_sub(100);
+        errors.truncate(100);
+        Reason { message, diagnostics: errors, omitted }
+    }
+
+    /// As the manifest repeats it.
+    pub fn shortened(mut self) -> Self {
+        self.omitted += self.diagnostics.len().saturating_sub(DIAGNOSTICS_SHOWN);
+        self.diagnostics.truncate(DIAGNOSTICS_SHOWN);
+        self
+    }
+}
+
+/// A frame as its line in the document holds it.
+#[derive(Serialize, Deserialize)]
+struct FrameLine {
+    script: ScriptName,
+    version: ETag,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    part: Part,
+    state: Word,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pixels: Option<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    receipt: Option<ETag>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    reason: Option<Reason>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Word {
+    Pending,
+    Done,
+    Failed,
+}
+
+impl From<Frame> for FrameLine {
+    fn from(frame: Frame) -> Self {
+        let Frame { script, version, part, state } = frame;
+        let (state, pixels, receipt, reason) = match state {
+            FrameState::Pending => (Word::Pending, None, None, None),
+            FrameState::Done { pixels } => (Word::Done, Some(pixels), None, None),
+            FrameState::Failed(fault) => (Word::Failed, None, Some(fault.receipt), fault.reason),
+        };
+        FrameLine { script, version, part, state, pixels, receipt, reason }
+    }
+}
+
+impl From<FrameLine> for Frame {
+    fn from(line: FrameLine) -> Self {
+        let state = match line.state {
+            Word::Pending => FrameState::Pending,
+            Word::Done => FrameState::Done { pixels: line.pixels.unwrap_or(0) },
+            Word::Failed => FrameState::Failed(Fault {
+                receipt: line.receipt.unwrap_or_else(|| ETag::new("")),
+                reason: line.reason,
+            }),
+        };
+        Frame { script: line.script, version: line.version, part: line.part, state }
+    }
+}
+
+/// The number of a part, for frames counted from 1.
+pub fn part(number: u64) -> Part {
+    NonZeroU64::new(number)
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+fn is_zero(number: &usize) -> bool {
+    *number == 0
+}

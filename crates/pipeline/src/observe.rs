@@ -1,0 +1,296 @@
+//! Listing an animation: both prefixes at once, in ranges side by side when it is large, and what the listing alone
+//! does not show (settings, the parts of split scripts, the reasons of faults).
+
+use std::collections::BTreeMap;
+
+use futures_util::future::try_join;
+use futures_util::stream::{self, StreamExt, TryStreamExt};
+
+use crate::invocation::{Invocation, Known};
+use crate::keys::{Animation, Key, Part, Receipt, ScriptName, Tag};
+use crate::manifest::{Fault, FrameState, Manifest, Reason, Rejected, Settings};
+use crate::reconcile::{MARK_EVERY, ReceiptFound, Results, ScriptFound, Scripts, reconcile};
+use crate::store::{ETag, ListRequest, Listed, Store};
+use crate::{Clock, Error, Result, Timestamp};
+
+/// A listing of an animation and what it amounts to.
+#[derive(Debug)]
+pub(crate) struct Observation {
+    pub(crate) scripts: Scripts,
+    pub(crate) results: Results,
+    pub(crate) manifest: Manifest,
+}
+
+impl Observation {
+    /// When the newest script was uploaded.
+    pub(crate) fn newest_script(&self) -> Option<Timestamp> {
+        self.scripts.found.iter().map(|script| script.modified).max()
+    }
+}
+
+impl<S: Store, C: Clock> Invocation<'_, S, C> {
+    /// Lists an animation and reconciles the listing. `known` is the manifest as last read: it saves requests, and
+    /// has no say in the outcome.
+    pub(crate) async fn observe(&self, animation: &Animation, known: Option<&Known>) -> Result<Observation> {
+        loop {
+            let marks = known.map_or(&[][..], |known| &known.manifest.head.marks);
+            let (scripts, receipts) =
+                try_join(self.list_scripts(animation, marks), self.list_receipts(animation, marks)).await?;
+            let (scripts, settings) = scripts;
+            let settings = self.settings(animation, settings, known).await?;
+            let mut results = Results { receipts };
+            self.add_parts(animation, &scripts, &mut results).await?;
+            let mut manifest = reconcile(animation, &scripts, &results, &settings);
+            if self.add_reasons(animation, &results, known, &mut manifest).await? {
+                return Ok(Observation { scripts, results, manifest });
+            }
+        }
+    }
+
+    async fn list_scripts(
+        &self,
+        animation: &Animation,
+        marks: &[ScriptName],
+    ) -> Result<(Scripts, Option<ETag>)> {
+        let bounds = marks.iter().map(|name| animation.script(name)).collect();
+        let mut scripts = Scripts::default();
+        let mut settings = None;
+        for listed in self.list_level(animation.scripts(), bounds).await? {
+            match listed.key.parse() {
+                Ok(Key::Script { name, .. }) => {
+                    scripts.found.push(ScriptFound { name, version: listed.etag, modified: listed.modified });
+                }
+                Ok(Key::Settings { .. }) => settings = Some(listed.etag),
+                Err(Error::Key { key, problem }) if key.ends_with(".txt") => {
+                    scripts.rejected.push(Rejected { key, problem: problem.to_owned() });
+                }
+                _ => {}
+            }
+        }
+        Ok((scripts, settings))
+    }
+
+    async fn list_receipts(&self, animation: &Animation, marks: &[ScriptName]) -> Result<Vec<ReceiptFound>> {
+        let prefix = animation.frames();
+        let bounds = marks.iter().map(|name| format!("{prefix}{name}@")).collect();
+        Ok(self.list_level(prefix, bounds).await?.into_iter().filter_map(receipt).collect())
+    }
+
+    /// The objects right below a prefix, the ranges between the bounds side by side.
+    async fn list_level(&self, prefix: String, mut bounds: Vec<String>) -> Result<Vec<Listed>> {
+        bounds.sort();
+        self.list_ranges(ListRequest::level(prefix), bounds).await
+    }
+
+    /// Reads a listing to its end, the ranges between the sorted bounds side by side.
+    pub(crate) async fn list_ranges(&self, request: ListRequest, bounds: Vec<String>) -> Result<Vec<Listed>> {
+        let starts = std::iter::once(None).chain(bounds.iter().cloned().map(Some));
+        let ends = bounds.iter().cloned().map(Some).chain(std::iter::once(None));
+        let ranges = starts
+            .zip(ends)
+            .map(|(start, end)| self.list_range(ListRequest { start_after: start, ..request.clone() }, end));
+        let ranges: Vec<_> = ranges.collect();
+        let pages: Vec<Vec<Listed>> =
+            stream::iter(ranges).buffered(self.policy.concurrency).try_collect().await?;
+        Ok(pages.into_iter().flatten().collect())
+    }
+
+    /// Reads a listing up to and including `end`.
+    async fn list_range(&self, mut request: ListRequest, end: Option<String>) -> Result<Vec<Listed>> {
+        let beyond = |key: &str| end.as_deref().is_some_and(|end| key > end);
+        let mut listed = Vec::new();
+        loop {
+            let page = self.list(request.clone()).await?;
+            let last = page.objects.last().map(|object| object.key.as_str());
+            let at_end = last
+                .max(page.prefixes.last().map(String::as_str))
+                .is_some_and(|last| end.as_deref().is_some_and(|end| last >= end));
+            listed.extend(page.objects.into_iter().filter(|object| !beyond(&object.key)));
+            match page.next {
+                Some(next) if !at_end => request.continuation = Some(next),
+                _ => return Ok(listed),
+            }
+        }
+    }
+
+    /// Reads `animation.json`, unless the manifest has it in this version.
+    async fn settings(
+        &self,
+        animation: &Animation,
+        version: Option<ETag>,
+        known: Option<&Known>,
+    ) -> Result<Settings> {
+        let Some(version) = version else { return Ok(Settings::absent()) };
+        if let Some(known) = known.filter(|known| known.manifest.head.settings.version == Some(version)) {
+            return Ok(known.manifest.head.settings.clone());
+        }
+        Ok(match self.get(&animation.settings()).await? {
+            None => Settings::absent(),
+            Some(object) => Settings::parse(object.info.etag, &object.body),
+        })
+    }
+
+    /// Lists the parts of scripts that are split.
+    async fn add_parts(&self, animation: &Animation, scripts: &Scripts, results: &mut Results) -> Result<()> {
+        let current: BTreeMap<&ScriptName, &ETag> =
+            scripts.found.iter().map(|script| (&script.name, &script.version)).collect();
+        let splits = results.receipts.iter().filter_map(|found| match &found.receipt {
+            Receipt::Split { name, tag, count } if current.get(name) == Some(&&tag.version) => {
+                Some((name, tag, count.get()))
+            }
+            _ => None,
+        });
+        let frames = animation.frames();
+        let listings = splits.map(|(name, tag, count)| {
+            let below = format!("{frames}{name}@{tag}/");
+            let prefix = format!("{frames}{}", Tag::receipts_of(name, &tag.version));
+            let bounds = if count > MARK_EVERY as u64 {
+                let mut files: Vec<String> =
+                    (1..=count).map(|number| format!("{below}{number}.png")).collect();
+                files.sort();
+                files.into_iter().skip(MARK_EVERY - 1).step_by(MARK_EVERY).collect()
+            } else {
+                Vec::new()
+            };
+            self.list_ranges(ListRequest::all(prefix), bounds)
+        });
+        let listings: Vec<_> = listings.collect();
+        let listed: Vec<Vec<Listed>> =
+            stream::iter(listings).buffered(self.policy.concurrency).try_collect().await?;
+        let parts = listed.into_iter().flatten().filter_map(receipt);
+        results.receipts.extend(parts.filter(|found| match &found.receipt {
+            Receipt::Frame { part, .. } | Receipt::Fault { part, .. } => part.is_some(),
+            _ => false,
+        }));
+        Ok(())
+    }
+
+    /// Adds the reasons of faults: those that the manifest has, and when nothing is left to come all others. Says
+    /// whether they could be had; if not, the listing is out of date.
+    async fn add_reasons(
+        &self,
+        animation: &Animation,
+        results: &Results,
+        known: Option<&Known>,
+        manifest: &mut Manifest,
+    ) -> Result<bool> {
+        let faulty = manifest.head.failed > 0 || manifest.head.refusal.is_some();
+        if !faulty {
+            return Ok(true);
+        }
+        let told: BTreeMap<&ETag, &Reason> =
+            known.into_iter().flat_map(|known| faults(&known.manifest)).collect();
+        for fault in faults_mut(manifest) {
+            fault.reason = told.get(&fault.receipt).map(|reason| (*reason).clone());
+        }
+        if !manifest.head.is_terminal() {
+            return Ok(true);
+        }
+        let keys: BTreeMap<&ETag, String> = results
+            .receipts
+            .iter()
+            .filter(|found| matches!(found.receipt, Receipt::Fault { .. } | Receipt::Refusal { .. }))
+            .map(|found| (&found.etag, animation.receipt(&found.receipt)))
+            .collect();
+        let mut missing: Vec<ETag> = faults_mut(manifest)
+            .filter(|fault| fault.reason.is_none())
+            .map(|fault| fault.receipt.clone())
+            .collect();
+        missing.sort();
+        missing.dedup();
+        let reads = missing.iter().filter_map(|etag| keys.get(etag)).map(|key| async move {
+            let object = self.get(key).await?;
+            object.map(|object| Ok((object.info.etag, reason(key, &object.body)?))).transpose()
+        });
+        let reads: Vec<_> = reads.collect();
+        let read: Vec<Option<(ETag, Reason)>> =
+            stream::iter(reads).buffered(self.policy.concurrency).try_collect().await?;
+        let read: BTreeMap<ETag, Reason> = read.into_iter().flatten().collect();
+        for fault in faults_mut(manifest).filter(|fault| fault.reason.is_none()) {
+            match read.get(&fault.receipt) {
+                Some(reason) => fault.reason = Some(reason.clone().shortened()),
+                None => return Ok(false),
+            }
+        }
+        Ok(true)
+    }
+}
+
+fn receipt(listed: Listed) -> Option<ReceiptFound> {
+    match listed.key.parse() {
+        Ok(Key::Receipt { receipt, .. }) => {
+            Some(ReceiptFound { receipt, etag: listed.etag, modified: listed.modified })
+        }
+        _ => None,
+    }
+}
+
+fn reason(key: &str, body: &[u8]) -> Result<Reason> {
+    serde_json::from_slice(body)
+        .map_err(|source| Error::Malformed { key: key.to_owned(), source: source.into() })
+}
+
+fn faults(manifest: &Manifest) -> impl Iterator<Item = (&ETag, &Reason)> {
+    let frames = manifest.frames.iter().filter_map(|frame| match &frame.state {
+        FrameState::Failed(fault) => Some(fault),
+        _ => None,
+    });
+    frames.chain(&manifest.head.refusal).filter_map(|fault| Some((&fault.receipt, fault.reason.as_ref()?)))
+}
+
+fn faults_mut(manifest: &mut Manifest) -> impl Iterator<Item = &mut Fault> {
+    let frames = manifest.frames.iter_mut().filter_map(|frame| match &mut frame.state {
+        FrameState::Failed(fault) => Some(fault),
+        _ => None,
+    });
+    frames.chain(&mut manifest.head.refusal)
+}
+
+/// What has come of one script's version, from the receipts of one listing.
+pub(crate) fn standing(receipts: &[ReceiptFound], part: Part) -> Option<Standing> {
+    let mut standing = None;
+    for found in receipts {
+        let next = match &found.receipt {
+            Receipt::Split { .. } if part.is_none() => Standing::Split,
+            Receipt::Frame { tag, part: of, .. } if *of == part => Standing::Drawn(tag.pixels),
+            Receipt::Fault { part: of, .. } if *of == part => Standing::Faulty(found.etag.clone()),
+            _ => continue,
+        };
+        standing = standing.max(Some(next));
+    }
+    standing
+}
+
+/// What a script's version has come to, the stronger the later.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Standing {
+    /// An error receipt.
+    Faulty(ETag),
+    /// A frame of this pixel version.
+    Drawn(u32),
+    /// Several frames.
+    Split,
+}
+
+impl<S: Store, C: Clock> Invocation<'_, S, C> {
+    /// What has come of a script's version, or of a part of it: one request.
+    pub(crate) async fn standing(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        version: &ETag,
+        part: Part,
+    ) -> Result<Option<Standing>> {
+        let frames = animation.frames();
+        let request = match part {
+            None => ListRequest::level(format!("{frames}{}", Tag::receipts_of(name, version))),
+            Some(number) => {
+                let tag = Tag { version: version.clone(), pixels: self.policy.pixels };
+                ListRequest::all(format!("{frames}{name}@{tag}/{number}."))
+            }
+        };
+        let page = self.list(request).await?;
+        let receipts: Vec<ReceiptFound> = page.objects.into_iter().filter_map(receipt).collect();
+        Ok(standing(&receipts, part))
+    }
+}

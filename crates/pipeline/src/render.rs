@@ -1,0 +1,275 @@
+//! The render step: one event, one frame.
+//!
+//! An event only says where to look. The invocation reads the script as it is now, so that a superseded event is an
+//! event for the current version; looks whether that version has a result already; draws it, puts the result under a
+//! key that names script and version, only if it is not there yet; and folds.
+
+use std::future::Future;
+use std::num::NonZeroU64;
+use std::pin::pin;
+use std::time::Duration;
+
+use bytes::Bytes;
+use futures_util::future::{Either, select};
+use futures_util::stream::{self, StreamExt, TryStreamExt};
+
+use crate::fold::Folded;
+use crate::invocation::Invocation;
+use crate::keys::{Animation, Key, Part, Receipt, ScriptName, Tag};
+use crate::manifest::{Fact, Reason};
+use crate::observe::Standing;
+use crate::store::{ETag, Store};
+use crate::{Clock, Error, Result};
+
+/// What draws. The functions bring [`crate::studio::Studio`], the simulation something smaller.
+pub trait Renderer: Send + Sync {
+    /// Draws the script's one frame (`part` is `None`) or one of several.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfTime`] when it was stopped before the deadline. What is wrong with the script is no error but a
+    /// [`Drawing::Fault`].
+    fn draw(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+    ) -> impl Future<Output = Result<Drawing>> + Send;
+}
+
+/// What came of a script.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Drawing {
+    /// The frame, as PNG.
+    Frame(Bytes),
+    /// The script is this many frames, two or more; only when no part was asked for.
+    Split(NonZeroU64),
+    /// There is no frame and never will be.
+    Fault(Reason),
+}
+
+/// What an invocation of the render function did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rendered {
+    /// The animation.
+    pub animation: Animation,
+    /// The script; `None` for an event of `animation.json`.
+    pub script: Option<ScriptName>,
+    /// What came of it.
+    pub outcome: Outcome,
+    /// How the fold ended.
+    pub folded: Folded,
+    /// Where the time went.
+    pub stages: Stages,
+}
+
+/// What came of an event.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// The script is gone.
+    Gone,
+    /// The event was about settings.
+    Settings,
+    /// A part of a version that is no longer current: another event draws the current one.
+    Superseded,
+    /// The result was there already.
+    Present,
+    /// The frame was drawn.
+    Drawn,
+    /// The script was split into this many parts.
+    Split(NonZeroU64),
+    /// The script gives no frame, as the receipt now says.
+    Faulty(Reason),
+}
+
+/// Time by stage of an invocation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Stages {
+    /// Reading the script and looking for a result.
+    pub read: Duration,
+    /// Drawing.
+    pub draw: Duration,
+    /// Putting the result.
+    pub put: Duration,
+    /// Folding.
+    pub fold: Duration,
+}
+
+/// Works on one event of the render function, given the key that it is about.
+///
+/// # Errors
+///
+/// [`Error::Key`] for a key that wakes no rendering: nothing was done, and a retry would not help. Others are the
+/// store's and the renderer's: the platform should try again.
+pub async fn render_frame<S: Store, C: Clock, R: Renderer>(
+    invocation: &Invocation<'_, S, C>,
+    renderer: &R,
+    key: &str,
+) -> Result<Rendered> {
+    match key.parse()? {
+        Key::Script { animation, name } => invocation.render(renderer, animation, name, None, None).await,
+        Key::Retry { animation, name, tag, part, .. } => {
+            let version = part.map(|_| tag.version);
+            invocation.render(renderer, animation, name, part, version).await
+        }
+        Key::Part { animation, name, tag, number } => {
+            invocation.render(renderer, animation, name, Some(number), Some(tag.version)).await
+        }
+        Key::Settings { animation } => invocation.follow_settings(animation).await,
+        _ => Err(Error::key(key, "this key wakes no rendering")),
+    }
+}
+
+impl<S: Store, C: Clock> Invocation<'_, S, C> {
+    async fn follow_settings(&self, animation: Animation) -> Result<Rendered> {
+        let start = self.clock.now();
+        let version = self.head(&animation.settings()).await?.map(|info| info.etag);
+        let read = self.clock.now();
+        let folded = self.fold(&animation, &Fact::Settings(version)).await?;
+        let stages =
+            Stages { read: read.since(start), fold: self.clock.now().since(read), ..Stages::default() };
+        Ok(Rendered { animation, script: None, outcome: Outcome::Settings, folded, stages })
+    }
+
+    /// `only` is the version that a part belongs to.
+    async fn render<R: Renderer>(
+        &self,
+        renderer: &R,
+        animation: Animation,
+        name: ScriptName,
+        part: Part,
+        only: Option<ETag>,
+    ) -> Result<Rendered> {
+        let mut stages = Stages::default();
+        let start = self.clock.now();
+        let script = self.get(&animation.script(&name)).await?;
+        let (outcome, fact) = match script {
+            None => (Outcome::Gone, Fact::Absent(name.clone())),
+            Some(script) if only.is_some_and(|only| only != script.info.etag) => {
+                (Outcome::Superseded, Fact::Version(name.clone(), script.info.etag))
+            }
+            Some(script) => {
+                let version = script.info.etag;
+                match self.standing(&animation, &name, &version, part).await? {
+                    Some(standing) => (Outcome::Present, standing.fact(name.clone(), version, part)),
+                    None => {
+                        let read = self.clock.now();
+                        let drawing = self.draw(renderer, &name, script.body, part).await?;
+                        let drawn = self.clock.now();
+                        stages.draw = drawn.since(read);
+                        let put = self.put_drawing(&animation, &name, version, part, drawing).await?;
+                        stages.put = self.clock.now().since(drawn);
+                        put
+                    }
+                }
+            }
+        };
+        let before_fold = self.clock.now();
+        stages.read = before_fold.since(start).saturating_sub(stages.draw + stages.put);
+        let folded = self.fold(&animation, &fact).await?;
+        stages.fold = self.clock.now().since(before_fold);
+        Ok(Rendered { animation, script: Some(name), outcome, folded, stages })
+    }
+
+    /// Draws, but not beyond the deadline: what is killed cannot say why.
+    async fn draw<R: Renderer>(
+        &self,
+        renderer: &R,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+    ) -> Result<Drawing> {
+        let Some(deadline) = self.deadline else { return renderer.draw(name, script, part).await };
+        let left = deadline.since(self.clock.now()).saturating_sub(self.policy.draw_margin);
+        let drawing = pin!(renderer.draw(name, script, part));
+        let alarm = pin!(self.clock.sleep(left));
+        match select(drawing, alarm).await {
+            Either::Left((drawing, _)) => drawing,
+            Either::Right(_) => {
+                let milliseconds = left.as_millis();
+                Err(Error::OutOfTime { what: format!("{name} is not drawn after {milliseconds} ms") })
+            }
+        }
+    }
+
+    async fn put_drawing(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        version: ETag,
+        part: Part,
+        drawing: Drawing,
+    ) -> Result<(Outcome, Fact)> {
+        let tag = Tag { version: version.clone(), pixels: self.policy.pixels };
+        let name = name.clone();
+        Ok(match drawing {
+            Drawing::Frame(image) => {
+                let receipt = Receipt::Frame { name: name.clone(), tag, part };
+                self.put_receipt(&animation.receipt(&receipt), image, "image/png").await?;
+                (Outcome::Drawn, Fact::Drawn(name, version, part, self.policy.pixels))
+            }
+            Drawing::Split(count) => {
+                self.put_parts(animation, &name, &tag, count).await?;
+                let receipt = Receipt::Split { name: name.clone(), tag, count };
+                self.put_receipt(&animation.receipt(&receipt), Bytes::new(), "text/plain").await?;
+                (Outcome::Split(count), Fact::Split(name, version))
+            }
+            Drawing::Fault(reason) => {
+                let fact = match self.put_fault(animation, &name, &tag, part, &reason).await? {
+                    Some(receipt) => Fact::Faulty(name, version, part, receipt),
+                    None => Fact::Fold,
+                };
+                (Outcome::Faulty(reason), fact)
+            }
+        })
+    }
+
+    /// Puts an error receipt; `None` when there is one already.
+    pub(crate) async fn put_fault(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        tag: &Tag,
+        part: Part,
+        reason: &Reason,
+    ) -> Result<Option<ETag>> {
+        let receipt = Receipt::Fault { name: name.clone(), tag: tag.clone(), part };
+        let key = animation.receipt(&receipt);
+        let body = serde_json::to_vec(reason)
+            .map_err(|source| Error::Malformed { key: key.clone(), source: source.into() })?;
+        self.put_receipt(&key, body.into(), "application/json").await
+    }
+
+    /// Wakes an invocation for each part. Parts that are there have had their event.
+    async fn put_parts(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        tag: &Tag,
+        count: NonZeroU64,
+    ) -> Result<()> {
+        let parts = (1..=count.get()).filter_map(NonZeroU64::new).map(|number| async move {
+            let body = serde_json::json!({
+                "script": animation.script(name),
+                "version": tag.version,
+                "trace": number,
+                "of": count,
+            });
+            let (animation, name, tag) = (animation.clone(), name.clone(), tag.clone());
+            let key = Key::Part { animation, name, tag, number }.to_string();
+            self.put_receipt(&key, body.to_string().into(), "application/json").await.map(drop)
+        });
+        let concurrency = self.policy.concurrency;
+        stream::iter(parts).map(Ok).try_for_each_concurrent(concurrency, |part| part).await
+    }
+}
+
+impl Standing {
+    pub(crate) fn fact(self, name: ScriptName, version: ETag, part: Part) -> Fact {
+        match self {
+            Standing::Split => Fact::Split(name, version),
+            Standing::Drawn(pixels) => Fact::Drawn(name, version, part, pixels),
+            Standing::Faulty(receipt) => Fact::Faulty(name, version, part, receipt),
+        }
+    }
+}

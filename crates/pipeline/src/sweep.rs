@@ -1,0 +1,319 @@
+//! The sweep heals what events cannot: events that were lost, retries that ran out, writes that landed after their
+//! writer was killed.
+//!
+//! It visits every animation that has a script or a manifest, finished or not, and compares the manifest and the GIF
+//! with a listing. It wakes pending frames of an animation in which nothing has happened for a while, by objects below
+//! `retries/`, gives a frame up with an error receipt after a bounded number of wakings, claims wherever manifest or
+//! GIF differ from the listing, and deletes what has long been superseded. It never writes below `scripts/`.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::num::NonZeroU64;
+
+use futures_util::stream::{self, StreamExt, TryStreamExt};
+
+use crate::assemble::generation_of;
+use crate::invocation::{Invocation, Known};
+use crate::keys::{Animation, Key, MANIFESTS, Part, Receipt, SCRIPTS, ScriptName, Tag};
+use crate::manifest::{Frame, FrameState, Manifest, Reason, Status};
+use crate::observe::Observation;
+use crate::reconcile::ReceiptFound;
+use crate::store::{ETag, ListRequest, Listed, Store};
+use crate::{Clock, Error, Result, Timestamp};
+
+/// How many animations are visited side by side.
+const VISITS: usize = 8;
+
+/// What a sweep did.
+#[derive(Debug, Default)]
+pub struct Swept {
+    /// Each animation with what was done for it, in the order of the visits.
+    pub visits: Vec<(Animation, Result<Visit>)>,
+    /// Keys below `scripts/` that are meant as scripts but belong to no animation, with what is wrong with them.
+    pub rejected: Vec<(String, &'static str)>,
+    /// Animations that there was no time left for.
+    pub unvisited: usize,
+}
+
+/// What a sweep did for one animation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Visit {
+    /// Frames that were woken.
+    pub woken: u64,
+    /// Frames that were given up.
+    pub given_up: u64,
+    /// A claim was put.
+    pub claimed: bool,
+    /// Superseded objects that were deleted.
+    pub deleted: u64,
+}
+
+/// How often and when last a frame was woken.
+#[derive(Clone, Copy)]
+struct Wakings {
+    attempts: u64,
+    last: Timestamp,
+}
+
+/// Visits all animations.
+///
+/// # Errors
+///
+/// When the animations cannot be listed. What goes wrong with one of them is in its visit, and the others go on.
+pub async fn sweep<S: Store, C: Clock>(invocation: &Invocation<'_, S, C>) -> Result<Swept> {
+    invocation.sweep().await
+}
+
+/// Visits one animation.
+///
+/// # Errors
+///
+/// Those of the store.
+pub async fn visit<S: Store, C: Clock>(
+    invocation: &Invocation<'_, S, C>,
+    animation: &Animation,
+) -> Result<Visit> {
+    invocation.visit(animation).await
+}
+
+impl<S: Store, C: Clock> Invocation<'_, S, C> {
+    async fn sweep(&self) -> Result<Swept> {
+        let mut swept = Swept::default();
+        let mut animations = BTreeSet::new();
+        for prefix in [SCRIPTS, MANIFESTS] {
+            for listed in self.list_ranges(ListRequest::all(prefix), Vec::new()).await? {
+                match listed.key.parse::<Key>() {
+                    Ok(
+                        Key::Script { animation, .. }
+                        | Key::Settings { animation }
+                        | Key::Manifest { animation },
+                    ) => {
+                        animations.insert(animation);
+                    }
+                    Err(Error::Key { problem, .. }) if listed.key.ends_with(".txt") => {
+                        match listed.key[prefix.len()..]
+                            .rsplit_once('/')
+                            .map(|(above, _)| Animation::new(above))
+                        {
+                            Some(Ok(animation)) => drop(animations.insert(animation)),
+                            _ => swept.rejected.push((listed.key, problem)),
+                        }
+                    }
+                    _ => {}
+                }
+            }
+        }
+        let mut animations: Vec<Animation> = animations.into_iter().collect();
+        // If the time is too short for all, it is not always the same ones that wait.
+        let start = self.random.below(animations.len() as u64);
+        animations.rotate_left(usize::try_from(start).unwrap_or(0));
+        let visits = animations.into_iter().map(|animation| async move {
+            if self.deadline.is_some_and(|deadline| self.clock.now().after(self.policy.margin) >= deadline) {
+                return None;
+            }
+            let visit = self.visit(&animation).await;
+            Some((animation, visit))
+        });
+        let mut visits = stream::iter(visits).buffered(VISITS);
+        while let Some(visit) = visits.next().await {
+            match visit {
+                Some(visit) => swept.visits.push(visit),
+                None => swept.unvisited += 1,
+            }
+        }
+        Ok(swept)
+    }
+
+    async fn visit(&self, animation: &Animation) -> Result<Visit> {
+        let known = self.manifest(animation).await?;
+        let gif = self.head(&animation.gif()).await?;
+        let observation = self.observe(animation, known.as_ref()).await?;
+        let mut visit = Visit::default();
+        self.wake(animation, &observation, &mut visit).await?;
+        let head = &observation.manifest.head;
+        let manifest_differs =
+            !known.as_ref().is_some_and(|known| known.manifest.agrees_with(&observation.manifest));
+        let gif_differs = match head.status {
+            Status::Done => generation_of(gif.as_ref()) != Some(head.generation.as_str()),
+            Status::Empty | Status::Failed | Status::Refused => gif.is_some(),
+            Status::Waiting | Status::Rendering => false,
+        };
+        let nothing_at_all = known.is_none() && head.status == Status::Empty && gif.is_none();
+        if (manifest_differs || gif_differs || visit.given_up > 0) && !nothing_at_all {
+            self.claim(&claimable(&observation.manifest, known.as_ref())).await?;
+            visit.claimed = true;
+        }
+        self.tidy(animation, &observation, &mut visit).await?;
+        Ok(visit)
+    }
+
+    /// Wakes what is pending, or gives it up.
+    async fn wake(&self, animation: &Animation, observation: &Observation, visit: &mut Visit) -> Result<()> {
+        let pending: Vec<&Frame> =
+            observation.manifest.frames.iter().filter(|frame| frame.state == FrameState::Pending).collect();
+        let now = self.clock.now();
+        let last = self.last_progress(observation);
+        if pending.is_empty() || now.since(last) < self.policy.stuck_after {
+            return Ok(());
+        }
+        let wakings = self.wakings(animation).await?;
+        let steps = pending.into_iter().map(|frame| {
+            let waking = wakings.get(&(frame.script.clone(), frame.version.clone(), frame.part)).copied();
+            self.wake_frame(animation, frame, waking, now)
+        });
+        let steps: Vec<_> = steps.collect();
+        let mut steps = stream::iter(steps).buffer_unordered(self.policy.concurrency);
+        while let Some(step) = steps.try_next().await? {
+            visit.woken += u64::from(step == Step::Woken);
+            visit.given_up += u64::from(step == Step::GivenUp);
+        }
+        Ok(())
+    }
+
+    /// When a script was uploaded or a result written last: while that goes on nothing is stuck, only queued.
+    fn last_progress(&self, observation: &Observation) -> Timestamp {
+        let results = observation.results.receipts.iter().map(|found| found.modified).max();
+        observation.newest_script().max(results).unwrap_or_default()
+    }
+
+    async fn wake_frame(
+        &self,
+        animation: &Animation,
+        frame: &Frame,
+        waking: Option<Wakings>,
+        now: Timestamp,
+    ) -> Result<Step> {
+        let Wakings { attempts, last } =
+            waking.unwrap_or(Wakings { attempts: 0, last: Timestamp::default() });
+        let doublings = u32::try_from(attempts.saturating_sub(1)).unwrap_or(u32::MAX);
+        let patience = self.policy.stuck_after.saturating_mul(2_u32.saturating_pow(doublings));
+        if attempts > 0 && now.since(last) < patience {
+            return Ok(Step::Patient);
+        }
+        let tag = Tag { version: frame.version.clone(), pixels: self.policy.pixels };
+        if attempts >= self.policy.attempts {
+            let reason = Reason::new(format!("no result in each of {attempts} attempts"));
+            self.put_fault(animation, &frame.script, &tag, frame.part, &reason).await?;
+            return Ok(Step::GivenUp);
+        }
+        self.put_retry(animation, &frame.script, tag, frame.part, attempts + 1).await?;
+        Ok(Step::Woken)
+    }
+
+    /// Wakes an invocation for a frame.
+    pub(crate) async fn put_retry(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        tag: Tag,
+        part: Part,
+        attempt: u64,
+    ) -> Result<()> {
+        let (animation, name) = (animation.clone(), name.clone());
+        let attempt = NonZeroU64::new(attempt).unwrap_or(NonZeroU64::MIN);
+        let key = Key::Retry { animation, name, tag, part, attempt }.to_string();
+        let body = serde_json::json!({ "woken_by": self.request_id() });
+        self.put(&key, body.to_string().into()).await.map(drop)
+    }
+
+    /// How often each frame of an animation was woken.
+    async fn wakings(&self, animation: &Animation) -> Result<BTreeMap<(ScriptName, ETag, Part), Wakings>> {
+        let mut wakings = BTreeMap::new();
+        for listed in self.retries(animation).await? {
+            if let Ok(Key::Retry { name, tag, part, attempt, .. }) = listed.key.parse() {
+                let waking: &mut Wakings = wakings
+                    .entry((name, tag.version, part))
+                    .or_insert(Wakings { attempts: 0, last: listed.modified });
+                waking.attempts = waking.attempts.max(attempt.get());
+                waking.last = waking.last.max(listed.modified);
+            }
+        }
+        Ok(wakings)
+    }
+
+    /// The objects below `retries/<animation>/` that are this animation's, not one's below it.
+    pub(crate) async fn retries(&self, animation: &Animation) -> Result<Vec<Listed>> {
+        let mut listed = self.list_ranges(ListRequest::all(animation.retries()), Vec::new()).await?;
+        listed.retain(|listed| listed.key.parse::<Key>().is_ok_and(|key| key.animation() == animation));
+        Ok(listed)
+    }
+
+    /// Deletes results of versions that are no longer current, once they are old, and the parts that led to them.
+    async fn tidy(&self, animation: &Animation, observation: &Observation, visit: &mut Visit) -> Result<()> {
+        let now = self.clock.now();
+        let current: BTreeMap<&ScriptName, &ETag> =
+            observation.scripts.found.iter().map(|script| (&script.name, &script.version)).collect();
+        let used = used_pixels(&observation.manifest);
+        let superseded = |found: &&ReceiptFound| match &found.receipt {
+            Receipt::Refusal { generation } => *generation != observation.manifest.head.generation,
+            Receipt::Split { name, tag, .. } | Receipt::Fault { name, tag, .. } => {
+                current.get(name) != Some(&&tag.version)
+            }
+            Receipt::Frame { name, tag, part } => match used.get(&(name, *part)) {
+                _ if current.get(name) != Some(&&tag.version) => true,
+                Some(used) => tag.pixels < *used,
+                None => false,
+            },
+        };
+        let old = |modified: Timestamp| now.since(modified) >= self.policy.superseded_after;
+        let mut doomed: Vec<String> = Vec::new();
+        let mut split_before = false;
+        for found in observation.results.receipts.iter().filter(superseded) {
+            if old(found.modified) {
+                split_before |= matches!(found.receipt, Receipt::Split { .. });
+                doomed.push(animation.receipt(&found.receipt));
+            }
+        }
+        if split_before {
+            let parts = self.list_ranges(ListRequest::all(animation.parts()), Vec::new()).await?;
+            let frames = self.list_ranges(ListRequest::all(animation.frames()), Vec::new()).await?;
+            for listed in parts.into_iter().chain(frames).filter(|listed| old(listed.modified)) {
+                if let Ok(key) = listed.key.parse::<Key>()
+                    && key.animation() == animation
+                    && let Some((name, version)) = part_of(&key)
+                    && current.get(name) != Some(&version)
+                {
+                    doomed.push(listed.key);
+                }
+            }
+        }
+        visit.deleted = doomed.len() as u64;
+        let deletions: Vec<_> = doomed.iter().map(|key| self.delete(key)).collect();
+        stream::iter(deletions).buffer_unordered(self.policy.concurrency).try_collect::<Vec<()>>().await?;
+        Ok(())
+    }
+}
+
+#[derive(PartialEq, Eq)]
+enum Step {
+    Patient,
+    Woken,
+    GivenUp,
+}
+
+/// The pixel version that each drawn frame uses.
+fn used_pixels(manifest: &Manifest) -> BTreeMap<(&ScriptName, Part), u32> {
+    let drawn = manifest.frames.iter().filter_map(|frame| match frame.state {
+        FrameState::Done { pixels } => Some(((&frame.script, frame.part), pixels)),
+        _ => None,
+    });
+    drawn.collect()
+}
+
+/// The script and version that a part, or a part's receipt, belongs to.
+fn part_of(key: &Key) -> Option<(&ScriptName, &ETag)> {
+    match key {
+        Key::Part { name, tag, .. } => Some((name, &tag.version)),
+        Key::Receipt {
+            receipt: Receipt::Frame { name, tag, part: Some(_) } | Receipt::Fault { name, tag, part: Some(_) },
+            ..
+        } => Some((name, &tag.version)),
+        _ => None,
+    }
+}
+
+/// What a claim names when no one commits: the revision that stands, and the generation that should.
+fn claimable(observed: &Manifest, known: Option<&Known>) -> Manifest {
+    let mut head = observed.head.clone();
+    head.revision = known.map_or(0, |known| known.manifest.head.revision);
+    Manifest { head, frames: Vec::new() }
+}
