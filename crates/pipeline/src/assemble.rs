@@ -213,8 +213,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             .content_type("image/gif")
             .metadata(GENERATION, head.generation.as_str());
         let mut upload = self.store.upload(&animation.gif(), options).await?;
-        let keys = manifest.frames.iter().filter_map(|frame| frame_key(animation, frame));
-        let fetches = keys.map(|key| async move { self.get(&key).await });
+        let keys: Vec<String> =
+            manifest.frames.iter().filter_map(|frame| frame_key(animation, frame)).collect();
+        let fetches = keys.into_iter().map(|key| async move { self.get(&key).await });
         let mut images = stream::iter(fetches).buffered(self.policy.prefetch);
         let start = self.clock.now();
         let mut pushed = 0_u64;

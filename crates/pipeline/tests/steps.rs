@@ -71,7 +71,7 @@ impl World {
         let id = format!("request-{}", self.events);
         let invocation = Invocation::new(&self.store, &self.clock, &self.random, &self.policy, &id);
         // The functions run on runtimes that move futures between threads.
-        let rendering = require_send(render_frame(&invocation, &STUDIO, key)).await;
+        let rendering = require_send(render_frame(&invocation, &*STUDIO, key)).await;
         let outcome = rendering.unwrap().outcome;
         Box::pin(self.deliver()).await;
         outcome
@@ -87,7 +87,7 @@ impl World {
                 if prefix == "assemblies/" {
                     let invocation =
                         Invocation::new(&self.store, &self.clock, &self.random, &self.policy, &listed.key);
-                    require_send(assemble(&invocation, &STUDIO, &listed.key)).await.unwrap();
+                    require_send(assemble(&invocation, &*STUDIO, &listed.key)).await.unwrap();
                 } else {
                     self.event(&listed.key).await;
                 }
