@@ -17,6 +17,7 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-lambda", &["rayfold-pipeline"]),
     ("rayfold-local", &["rayfold-pipeline"]),
     ("rayfold", &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline", "rayfold-local"]),
+    ("rayfold-xtask", &[]),
     (
         "rayfold-bench",
         &[

@@ -20,7 +20,7 @@ locals {
 
   packages = coalesce(var.packages, {
     for function in ["render", "assemble"] :
-    function => "${path.module}/../../target/lambda/${var.architecture}/rayfold-${function}.zip"
+    function => "${path.module}/../../target/packages/${var.architecture}/rayfold-${function}.zip"
   })
 
   functions = {

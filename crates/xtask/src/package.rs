@@ -1,0 +1,178 @@
+//! From the sources to the zip files that Lambda runs.
+//!
+//! Invariant: the same sources, lock file and Rust release give the same bytes, wherever the checkout, Cargo's home and
+//! the user's are. `--verify` builds a second time, from a copy elsewhere, and compares.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, bail, ensure};
+use clap::ValueEnum;
+
+use crate::archive;
+use crate::glibc::{AMAZON_LINUX_2023, Needs};
+use crate::toolchain::{self, Toolchain, say};
+
+/// The package and the binaries in it that are functions.
+const PACKAGE: &str = "rayfold-lambda";
+const FUNCTIONS: [&str; 2] = ["rayfold-render", "rayfold-assemble"];
+
+/// A package is read at each cold start, before the program runs.
+const LARGEST_ZIP_MB: f64 = 8.0;
+
+/// What to build.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Instruction set to build for; another than this machine's needs `rustup target add`
+    #[arg(long, value_enum, default_value = "x86_64")]
+    architecture: Architecture,
+    /// Build a second time, from a copy of the sources in another folder, and compare the files
+    #[arg(long)]
+    verify: bool,
+}
+
+/// As Lambda calls them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Architecture {
+    #[value(name = "x86_64")]
+    X86_64,
+    #[value(name = "arm64")]
+    Arm64,
+}
+
+impl Architecture {
+    fn name(self) -> &'static str {
+        match self {
+            Self::X86_64 => "x86_64",
+            Self::Arm64 => "arm64",
+        }
+    }
+
+    /// The Rust target.
+    fn target(self) -> &'static str {
+        match self {
+            Self::X86_64 => "x86_64-unknown-linux-gnu",
+            Self::Arm64 => "aarch64-unknown-linux-gnu",
+        }
+    }
+}
+
+/// Builds, checks and writes both packages.
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    let root = root()?;
+    let toolchain = Toolchain::get()?;
+    let folder = root.join("target/packages").join(args.architecture.name());
+    let zips = build(&toolchain, &root, &root.join("target/packages/build"), args.architecture)?;
+    if args.verify {
+        verify(&toolchain, &root, args.architecture, &zips)?;
+    }
+    fs::create_dir_all(&folder)?;
+    for (function, zip) in zips {
+        let path = folder.join(format!("{function}.zip"));
+        fs::write(&path, &zip).with_context(|| format!("cannot write {}", path.display()))?;
+        say(&format!("{} ({:.2} MB)", path.strip_prefix(&root).unwrap_or(&path).display(), megabytes(&zip)));
+    }
+    Ok(())
+}
+
+/// The zip file of each function, built from the checkout at `root` into `target`.
+fn build(
+    toolchain: &Toolchain,
+    root: &Path,
+    target: &Path,
+    architecture: Architecture,
+) -> anyhow::Result<Vec<(&'static str, Vec<u8>)>> {
+    let triple = architecture.target();
+    let mut command = toolchain.cargo_zigbuild()?;
+    command
+        .args(["--locked", "--profile", "lambda", "--package", PACKAGE, "--bins"])
+        .args(["--target", &format!("{triple}.{AMAZON_LINUX_2023}")])
+        .arg("--target-dir")
+        .arg(target)
+        .current_dir(root)
+        .env("CARGO_ENCODED_RUSTFLAGS", remapped(root)?.join("\x1f"))
+        .env_remove("RUSTFLAGS");
+    toolchain::run(&mut command)?;
+    FUNCTIONS
+        .into_iter()
+        .map(|function| {
+            let path = target.join(triple).join("lambda").join(function);
+            let program = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+            let newest =
+                Needs::of(&program).and_then(|needs| needs.newest()).with_context(|| function.to_owned())?;
+            let zip = archive::zip(&program)?;
+            ensure!(
+                megabytes(&zip) <= LARGEST_ZIP_MB,
+                "{function} is {:.2} MB zipped, more than {LARGEST_ZIP_MB} MB",
+                megabytes(&zip)
+            );
+            match newest {
+                Some(version) => say(&format!("{function} needs glibc {version}")),
+                None => say(&format!("{function} needs no glibc")),
+            }
+            Ok((function, zip))
+        })
+        .collect()
+}
+
+/// Names of folders go into panic messages; these take them out.
+fn remapped(root: &Path) -> anyhow::Result<Vec<String>> {
+    let home = std::env::home_dir().context("no home folder")?;
+    let cargo = std::env::var_os("CARGO_HOME").map_or_else(|| home.join(".cargo"), PathBuf::from);
+    let rustup = std::env::var_os("RUSTUP_HOME").map_or_else(|| home.join(".rustup"), PathBuf::from);
+    // Of several that match, the last counts.
+    Ok([(rustup.as_path(), "/rustup"), (cargo.as_path(), "/cargo"), (root, "/rayfold")]
+        .map(|(from, to)| format!("--remap-path-prefix={}={to}", from.display()))
+        .to_vec())
+}
+
+/// Builds what Git knows of `root` again in another folder.
+fn verify(
+    toolchain: &Toolchain,
+    root: &Path,
+    architecture: Architecture,
+    expected: &[(&str, Vec<u8>)],
+) -> anyhow::Result<()> {
+    let elsewhere = tempfile::tempdir()?;
+    let copy = elsewhere.path().join("a folder of another name");
+    copy_sources(root, &copy)?;
+    let again = build(toolchain, &copy, &elsewhere.path().join("target"), architecture)?;
+    for ((function, first), (_, second)) in expected.iter().zip(&again) {
+        ensure!(first == second, "{function}: a build from another folder differs");
+        say(&format!("{function}: a build from another folder is the same"));
+    }
+    Ok(())
+}
+
+fn copy_sources(root: &Path, copy: &Path) -> anyhow::Result<()> {
+    let listing = Command::new("git")
+        .args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"])
+        .current_dir(root)
+        .output()
+        .context("cannot run git")?;
+    ensure!(listing.status.success(), "git ls-files: {}", listing.status);
+    for name in String::from_utf8(listing.stdout)?.split_terminator('\0') {
+        let (from, to) = (root.join(name), copy.join(name));
+        // Deleted, and not yet committed.
+        if !from.exists() {
+            continue;
+        }
+        fs::create_dir_all(to.parent().context("a file without a folder")?)?;
+        fs::copy(&from, &to).with_context(|| format!("cannot copy {name}"))?;
+    }
+    Ok(())
+}
+
+/// The checkout, two folders above this crate.
+fn root() -> anyhow::Result<PathBuf> {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
+    match own.ancestors().nth(2) {
+        Some(root) => Ok(root.to_owned()),
+        None => bail!("{} lies in no checkout", own.display()),
+    }
+}
+
+fn megabytes(bytes: &[u8]) -> f64 {
+    bytes.len() as f64 / 1e6
+}

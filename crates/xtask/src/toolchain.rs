@@ -1,0 +1,83 @@
+//! The linker: zig, which can link against a glibc older than the machine's, driven by cargo-zigbuild.
+//!
+//! Both are pinned, as other versions may give other bytes, and kept in the user's cache apart from anything else.
+
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, bail, ensure};
+
+const ZIG: &str = "0.15.2";
+const CARGO_ZIGBUILD: &str = "0.24.0";
+
+/// The installed tools.
+pub(crate) struct Toolchain {
+    binaries: PathBuf,
+}
+
+impl Toolchain {
+    /// Those of the cache, installed first if they are missing.
+    pub(crate) fn get() -> anyhow::Result<Self> {
+        let folder = cache()?.join(format!("zig-{ZIG}-zigbuild-{CARGO_ZIGBUILD}"));
+        let binaries = folder.join("bin");
+        if !binaries.join("cargo-zigbuild").is_file() {
+            say(&format!(
+                "installing zig {ZIG} and cargo-zigbuild {CARGO_ZIGBUILD} into {}",
+                folder.display()
+            ));
+            install(&folder).context("zig and cargo-zigbuild come by pip, which needs Python 3 with venv")?;
+        }
+        Ok(Self { binaries })
+    }
+
+    /// `cargo zigbuild`.
+    pub(crate) fn cargo_zigbuild(&self) -> anyhow::Result<Command> {
+        let mut path = vec![self.binaries.clone()];
+        path.extend(env::split_paths(&env::var_os("PATH").unwrap_or_default()));
+        let mut command = Command::new(self.binaries.join("cargo-zigbuild"));
+        command.arg("zigbuild").env("PATH", env::join_paths(path)?);
+        // Another zig or python on the PATH would be taken before the one beside cargo-zigbuild.
+        command.env("CARGO_ZIGBUILD_PYTHON_PATH", self.binaries.join("python"));
+        command.env_remove("CARGO_ZIGBUILD_ZIG_PATH");
+        Ok(command)
+    }
+}
+
+/// Into a folder beside it first: what is there is whole.
+fn install(folder: &Path) -> anyhow::Result<()> {
+    let parent = folder.parent().context("the cache has no parent")?;
+    std::fs::create_dir_all(parent)?;
+    if folder.exists() {
+        std::fs::remove_dir_all(folder)?;
+    }
+    // A virtual environment cannot be moved, so its marker, cargo-zigbuild, is what comes last.
+    run(Command::new("python3").args(["-m", "venv"]).arg(folder))?;
+    let pip = folder.join("bin/pip");
+    for package in [format!("ziglang=={ZIG}"), format!("cargo-zigbuild=={CARGO_ZIGBUILD}")] {
+        run(Command::new(&pip).args(["install", "--quiet", "--no-deps", &package]))?;
+    }
+    Ok(())
+}
+
+fn cache() -> anyhow::Result<PathBuf> {
+    let named = |name| env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    match (named("XDG_CACHE_HOME"), named("HOME")) {
+        (Some(cache), _) => Ok(cache.join("rayfold")),
+        (None, Some(home)) => Ok(home.join(".cache/rayfold")),
+        (None, None) => bail!("neither XDG_CACHE_HOME nor HOME is set"),
+    }
+}
+
+/// Runs to the end, and fails as the command does.
+pub(crate) fn run(command: &mut Command) -> anyhow::Result<()> {
+    let status = command.status().with_context(|| format!("cannot run {:?}", command.get_program()))?;
+    ensure!(status.success(), "{:?}: {status}", command.get_program());
+    Ok(())
+}
+
+/// A line for people.
+#[expect(clippy::print_stderr, reason = "this is a program's own output")]
+pub(crate) fn say(line: &str) {
+    eprintln!("{line}");
+}
