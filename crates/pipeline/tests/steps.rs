@@ -1,6 +1,8 @@
 //! The steps with the real renderer and encoder on a store in memory, events delivered by hand: what a bucket holds
 //! after the things that users do.
 
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
+
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, LazyLock};
