@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Context;
-use rayfold_scene::{AnimationSettings, Diagnostic, Limits, Parsed, Script, Severity, parse_settings};
+use rayfold_scene::{AnimationSettings, Code, Diagnostic, Limits, Parsed, Script, Severity, parse_settings};
 use rayon::prelude::*;
 
 use crate::console::Console;
@@ -88,6 +88,10 @@ impl Faults {
             if diagnostic.is_error() || !console.quiet {
                 console.say(format_args!("{}\n", diagnostic.render(console.color)));
             }
+        }
+        let too_large = |d: &Diagnostic| d.code == Code::LimitExceeded && d.message.contains("pixels");
+        if self.diagnostics.iter().any(too_large) {
+            console.note("--max-pixels sets the limit on pixels");
         }
     }
 

@@ -157,7 +157,7 @@ fn animation(
 
 fn tell(path: &Path, summary: &Summary, settings: &AnimationSettings, took: Duration, console: &Console) {
     console.note(format_args!(
-        "{}: {} of {} x {}, {}, in {:.1} s",
+        "{}: {} of {} x {}, {}, in {:.2} s",
         path.display(),
         number(summary.frames as usize, "frame"),
         summary.size.0,
@@ -177,19 +177,18 @@ fn tell(path: &Path, summary: &Summary, settings: &AnimationSettings, took: Dura
 fn image(path: &Path, format: Format, plan: &Plan, console: &Console) -> anyhow::Result<()> {
     let mut jobs = plan.jobs();
     let (Some(job), None) = (jobs.next(), jobs.next()) else {
-        return Err(Usage(format!(
+        anyhow::bail!(
             "{} frames do not fit into {}: expected --frame N, a pattern such as %04d.png, or .gif",
             plan.len(),
             path.display()
-        ))
-        .into());
+        );
     };
     let progress = Progress::start(console, "frames", 1);
     // On a thread of the pool, so that it is not idle while the image is drawn.
     let file = rayon::scope(|_| format.encode(&draw(plan, &job)?))?;
     OutputFile::write(path, &file, true)?;
     let took = progress.finish().as_secs_f64();
-    console.note(format_args!("{}: {}, in {took:.1} s", path.display(), Size(file.len() as u64)));
+    console.note(format_args!("{}: {}, in {took:.2} s", path.display(), Size(file.len() as u64)));
     Ok(())
 }
 
@@ -219,7 +218,7 @@ fn images(pattern: &Pattern, format: Format, plan: &Plan, console: &Console) -> 
     })?;
     let path = |job: Option<Job>| pattern.path(job.map_or(1, |job| job.number));
     console.note(format_args!(
-        "{} to {}: {}, {}, in {took:.1} s",
+        "{} to {}: {}, {}, in {took:.2} s",
         path(plan.jobs().next()).display(),
         path(plan.jobs().last()).display(),
         number(plan.len() as usize, "frame"),

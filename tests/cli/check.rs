@@ -1,0 +1,116 @@
+//! `rayfold check`.
+
+use serde_json::Value;
+use snapbox::str;
+
+use crate::{BALL, Folder};
+
+#[test]
+fn nothing_wrong() {
+    let folder = Folder::with("scenes/a.txt", BALL.to_owned() + "Trace");
+    folder.write("scenes/b.txt", BALL);
+    folder.write("scenes/animation.json", "{\"fps\": 25}");
+    folder.rayfold("check scenes").assert().code(0).stdout_eq("").stderr_eq(str![[r#"
+3 files, 3 frames: no errors
+
+"#]]);
+    folder.rayfold("check scenes --quiet").assert().code(0).stdout_eq("").stderr_eq("");
+}
+
+#[test]
+fn a_warning_is_no_failure() {
+    let folder = Folder::with("a.txt", BALL.to_owned() + "Background 1 0 0\n");
+    folder.rayfold("check a.txt").assert().code(0).stderr_eq(str![[r#"
+warning: this has no effect: no `Trace` follows
+ --> a.txt:7:1
+  |
+7 | Background 1 0 0
+  | ^^^^^^^^^^
+  |
+  = help: `Trace` renders a frame of everything that stands before it
+
+1 file, 1 frame: no errors, 1 warning
+
+"#]]);
+}
+
+#[test]
+fn several_inputs_each_with_its_faults() {
+    let folder = Folder::with("one/a.txt", "Sreen 4 3\nTrace\n");
+    folder.write("two/b.md", "");
+    folder.write("c.txt", BALL);
+    folder.rayfold("check one two c.txt nope.txt").assert().code(1).stdout_eq("").stderr_eq(str![[r#"
+error: the folder two holds no scene scripts (*.txt)
+error: cannot read nope.txt: No such file or directory
+error: unknown command `Sreen`
+ --> one/a.txt:1:1
+  |
+1 | Sreen 4 3
+  | ^^^^^ expected a command
+  |
+  = help: did you mean `Screen`?
+
+3 errors in 3 of 4 files
+
+"#]]);
+}
+
+#[test]
+fn standard_input() {
+    let folder = Folder::new();
+    folder.rayfold("check -").stdin(BALL).assert().code(0);
+    folder.rayfold("check -").stdin("Screen 4\nTrace").assert().code(1).stderr_eq(str![[r#"
+error: `Screen` takes 2 numbers, found 1
+ --> <stdin>:1:9
+  |
+1 | Screen 4
+  |         ^ expected `ny` here
+  |
+  = help: write `Screen nx ny`
+
+1 error
+
+"#]]);
+}
+
+#[test]
+fn settings() {
+    let folder = Folder::with("animation.json", "{\n  \"fps\": \"fast\"\n}\n");
+    folder.rayfold("check animation.json").assert().code(1).stderr_eq(str![[r#"
+error: [..]
+ --> animation.json:2:[..]
+...
+1 error
+
+"#]]);
+}
+
+#[test]
+fn json_for_editors() {
+    let folder = Folder::with("a.txt", "Screen 4 3\nTrace now\n");
+    let out = folder.rayfold("check a.txt nope.txt --format json").output().unwrap();
+    assert_eq!(out.status.code(), Some(1));
+    assert_eq!(String::from_utf8_lossy(&out.stderr), "");
+    let report: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!((&report["errors"], &report["warnings"], &report["files"]), (&2.into(), &0.into(), &2.into()));
+    let fault = &report["diagnostics"][0];
+    assert_eq!((&fault["file"], &fault["severity"]), (&"a.txt".into(), &"error".into()));
+    assert_eq!((&fault["line"], &fault["column"]), (&2.into(), &7.into()));
+    assert_eq!(fault["span"], serde_json::json!({"start": 17, "end": 20}));
+    assert!(fault["message"].as_str().unwrap().contains("Trace"), "{fault}");
+    assert_eq!(report["unreadable"], serde_json::json!(["cannot read nope.txt: No such file or directory"]));
+
+    folder.write("a.txt", BALL);
+    let out = folder.rayfold("check a.txt --format json").output().unwrap();
+    let report: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!((out.status.code(), &report["errors"], &report["frames"]), (Some(0), &0.into(), &1.into()));
+}
+
+#[test]
+fn colour_only_where_it_is_wanted() {
+    let folder = Folder::with("a.txt", "Trace");
+    let plain = folder.rayfold("check a.txt").output().unwrap().stderr;
+    assert!(!plain.contains(&b'\x1b'));
+    let colored = folder.rayfold("check a.txt --color always").output().unwrap().stderr;
+    assert!(colored.contains(&b'\x1b'));
+}

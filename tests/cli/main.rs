@@ -1,0 +1,113 @@
+//! Drives the `rayfold` command from outside, as a user's shell does.
+//!
+//! Expected output stands in the tests themselves; `SNAPSHOTS=overwrite cargo test -p rayfold --test cli` renews it.
+
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
+
+mod bad_input;
+mod check;
+mod images;
+mod interrupted;
+mod render;
+mod split;
+mod usage;
+
+use std::path::{Path, PathBuf};
+
+use snapbox::cmd::Command;
+
+/// The program under test.
+pub(crate) const RAYFOLD: &str = env!("CARGO_BIN_EXE_rayfold");
+
+/// A red ball on grey, 24 x 16 pixels.
+pub(crate) const BALL: &str = "\
+Screen 24, 16
+Camera 0 0 5  0 0 -1  0 1 0  1  -.3 -.2 .3 .2
+Background .2 .2 .2
+Sphere 1  0 0 0  .1 .1 .1  .8 .2 .1
+Ilight 1 1 1  -1 -1 -1
+Trace
+";
+
+/// A folder that is gone after the test.
+pub(crate) struct Folder(tempfile::TempDir);
+
+impl Folder {
+    pub(crate) fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    /// With one file.
+    pub(crate) fn with(name: &str, text: impl AsRef<[u8]>) -> Self {
+        let folder = Self::new();
+        folder.write(name, text);
+        folder
+    }
+
+    /// Writes a file, and the folders that it lies in.
+    pub(crate) fn write(&self, name: &str, text: impl AsRef<[u8]>) {
+        let path = self.join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    }
+
+    pub(crate) fn read(&self, name: &str) -> Vec<u8> {
+        std::fs::read(self.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    pub(crate) fn join(&self, name: &str) -> PathBuf {
+        self.path().join(name)
+    }
+
+    /// Names of what lies in a folder, sorted, hidden files too.
+    pub(crate) fn list(&self, name: &str) -> Vec<String> {
+        let entries = std::fs::read_dir(self.join(name)).unwrap();
+        let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    /// `rayfold` with arguments that are separated by blanks.
+    pub(crate) fn rayfold(&self, args: &str) -> Command {
+        Command::new(RAYFOLD)
+            .args(args.split_whitespace())
+            .current_dir(self.path())
+            .env_remove("NO_COLOR")
+            .env("COLUMNS", "100")
+    }
+
+    /// An image as it was written.
+    pub(crate) fn image(&self, name: &str) -> image::RgbImage {
+        image::load_from_memory(&self.read(name)).unwrap().into_rgb8()
+    }
+}
+
+/// A ball that moves to the right by a twelfth of its size with each frame.
+pub(crate) fn ball_at(step: usize) -> String {
+    BALL.replace("0 0 0  .1", &format!("{} 0 0  .1", step as f64 / 6.0))
+}
+
+/// An animation as a viewer shows it: its frames with their delays in hundredths of a second.
+pub(crate) fn decode_gif(bytes: &[u8]) -> Vec<(image::RgbImage, u16)> {
+    let mut options = gif::DecodeOptions::new();
+    options.set_color_output(gif::ColorOutput::RGBA);
+    let mut decoder = options.read_info(bytes).unwrap();
+    let mut shown = image::RgbImage::new(decoder.width().into(), decoder.height().into());
+    let mut frames = Vec::new();
+    while let Some(frame) = decoder.read_next_frame().unwrap() {
+        assert!(matches!(frame.dispose, gif::DisposalMethod::Keep | gif::DisposalMethod::Any));
+        for (index, pixel) in frame.buffer.chunks_exact(4).enumerate() {
+            let (x, y) = (index % usize::from(frame.width), index / usize::from(frame.width));
+            if pixel[3] == 255 {
+                let place = (x as u32 + u32::from(frame.left), y as u32 + u32::from(frame.top));
+                shown.put_pixel(place.0, place.1, image::Rgb([pixel[0], pixel[1], pixel[2]]));
+            }
+        }
+        frames.push((shown.clone(), frame.delay));
+    }
+    frames
+}
