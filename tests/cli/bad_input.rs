@@ -54,7 +54,7 @@ error: the folder scenes holds no scene scripts (*.txt)
 #[test]
 fn not_utf8() {
     render(b"Screen 4 3\nSphere 1 \xff\xfe 0\nTrace\n").stderr_eq(str![[r#"
-error: not UTF-8 text: 0xFF
+error: this is not UTF-8 text: 0xFF
  --> a.txt:2:10
   |
 2 | Sphere 1 �� 0
@@ -151,7 +151,7 @@ error: `1e999` is too large
  --> a.txt:5:17
   |
 5 | Ilight NaN 1 1  1e999 -1 -1
-  |                 ^^^^^ expected `dx`, a number up to 1.7e308
+  |                 ^^^^^ expected `dx`, a number up to 1.79e308
 
 error: nothing was written: 3 errors
 
@@ -161,13 +161,13 @@ error: nothing was written: 3 errors
 #[test]
 fn no_screen() {
     render(BALL.replace("Screen 24, 16", "")).stderr_eq(str![[r#"
-error: the size of the image is not known yet
+error: the size of the image is not known
  --> a.txt:6:1
   |
 6 | Trace
-  | ^^^^^ expected a `Screen` command before this
+  | ^^^^^ expected a `Screen` before this
   |
-  = help: for example `Screen 640 480`
+  = help: write for example `Screen 640 480`
 
 error: nothing was written: 1 error
 
@@ -177,7 +177,7 @@ error: nothing was written: 1 error
 #[test]
 fn no_trace() {
     render(BALL.replace("Trace", "")).stderr_eq(str![[r#"
-error: nothing is rendered: the script has no `Trace`
+error: nothing is rendered: there is no `Trace`
  --> a.txt:7:1
   |
 7 |
@@ -193,7 +193,7 @@ error: nothing was written: 1 error
 #[test]
 fn empty_script() {
     render("").stderr_eq(str![[r#"
-error: nothing is rendered: the script has no `Trace`
+error: nothing is rendered: there is no `Trace`
  --> a.txt:1:1
   |
 1 |
@@ -213,7 +213,7 @@ error: the radius must be greater than zero
  --> a.txt:4:8
   |
 4 | Sphere 0  0 0 0  .1 .1 .1  .8 .2 .1
-  |        ^
+  |        ^ expected a number greater than 0
 
 error: nothing was written: 1 error
 
@@ -227,7 +227,7 @@ error: the light's direction must not be zero
  --> a.txt:5:15
   |
 5 | Ilight 1 1 1  0 0 0
-  |               ^^^^^
+  |               ^^^^^ expected three numbers that are not all 0
 
 error: nothing was written: 1 error
 
@@ -241,7 +241,7 @@ error: the gaze must not be zero
  --> a.txt:2:15
   |
 2 | Camera 0 0 5  0 0 0  0 1 0  1  -.3 -.2 .3 .2
-  |               ^^^^^
+  |               ^^^^^ expected three numbers that are not all 0
 
 error: nothing was written: 1 error
 
@@ -255,7 +255,7 @@ error: the gaze and the view-up must not be parallel
  --> a.txt:2:15
   |
 2 | Camera 0 0 5  0 0 -1  0 0 2  1  -.3 -.2 .3 .2
-  |               ^^^^^^^^^^^^^
+  |               ^^^^^^^^^^^^^ expected two directions that span a plane
 
 error: nothing was written: 1 error
 
@@ -269,7 +269,7 @@ error: the window must not be empty: au equals bu
  --> a.txt:2:33
   |
 2 | Camera 0 0 5  0 0 -1  0 1 0  1  -.3 -.2 -.3 .2
-  |                                 ^^^^^^^^^^^
+  |                                 ^^^^^^^^^^^ expected `au` and `bu` to differ
 
 error: nothing was written: 1 error
 
@@ -283,9 +283,9 @@ error: the image has 64,008,000 pixels, the limit is 64,000,000
  --> a.txt:1:8
   |
 1 | Screen 8001, 8000
-  |        ^^^^^^^^^^ this is too large
+  |        ^^^^^^^^^^ expected a smaller image
   |
-  = help: make it smaller, or raise the limit on pixels
+  = help: make the image smaller or raise the limit
 
 --max-pixels sets the limit on pixels
 error: nothing was written: 1 error
@@ -302,9 +302,9 @@ error: the image has 384 pixels, the limit is 383
  --> a.txt:1:8
   |
 1 | Screen 24, 16
-  |        ^^^^^^ this is too large
+  |        ^^^^^^ expected a smaller image
   |
-  = help: make it smaller, or raise the limit on pixels
+  = help: make the image smaller or raise the limit
 
 --max-pixels sets the limit on pixels
 error: nothing was written: 1 error
@@ -352,14 +352,11 @@ fn all_errors_of_all_scripts_are_shown() {
     folder.rayfold("render scenes -o out.gif").assert().code(1).stderr_eq(str![[r#"
 error: [..]`fsp`[..]
  --> scenes/animation.json:1:[..]
-...
-warning: this has no effect: no `Trace` follows
- --> scenes/f1.txt:1:1
   |
-1 | Screen 4 3
-  | ^^^^^^
+1 | {"fsp": 25}
+  |  ^^^^^ expected a field's name
   |
-  = help: `Trace` renders a frame of everything that stands before it
+  = help: did you mean `fps`?
 
 error: unknown command `Trce`
  --> scenes/f1.txt:2:1
@@ -369,13 +366,13 @@ error: unknown command `Trce`
   |
   = help: did you mean `Trace`?
 
-error: the size of the image is not known yet
+error: the size of the image is not known
  --> scenes/f10.txt:1:1
   |
 1 | Trace
-  | ^^^^^ expected a `Screen` command before this
+  | ^^^^^ expected a `Screen` before this
   |
-  = help: for example `Screen 640 480`
+  = help: write for example `Screen 640 480`
 
 error: nothing was written: 3 errors in 3 of 4 files
 

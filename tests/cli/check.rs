@@ -25,7 +25,7 @@ warning: this has no effect: no `Trace` follows
  --> a.txt:7:1
   |
 7 | Background 1 0 0
-  | ^^^^^^^^^^
+  | ^^^^^^^^^^ expected a `Trace` after this
   |
   = help: `Trace` renders a frame of everything that stands before it
 

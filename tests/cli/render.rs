@@ -47,13 +47,13 @@ fn standard_input_is_a_script() {
     folder.rayfold("render a.txt -o b.png").assert().code(0);
     assert_eq!(folder.read("a.png"), folder.read("b.png"));
     folder.rayfold("render - -o c.png").stdin("Trace").assert().code(1).stderr_eq(str![[r#"
-error: the size of the image is not known yet
+error: the size of the image is not known
  --> <stdin>:1:1
   |
 1 | Trace
-  | ^^^^^ expected a `Screen` command before this
+  | ^^^^^ expected a `Screen` before this
   |
-  = help: for example `Screen 640 480`
+  = help: write for example `Screen 640 480`
 
 error: nothing was written: 1 error
 
