@@ -150,7 +150,7 @@ impl Scene {
     /// # Errors
     /// When a channel is not finite.
     pub fn set_background(&mut self, color: DVec3) -> Result<(), InvalidValue> {
-        self.background = finite(Parameter::Background, color)?.clamp(DVec3::ZERO, DVec3::ONE);
+        self.background = displayable(finite(Parameter::Background, color)?);
         Ok(())
     }
 
@@ -541,6 +541,11 @@ fn to_unit_scale(largest: f64) -> f64 {
     }
     let exponent = ((largest.to_bits() >> 52) & 0x7ff) as i32 - 1023;
     2f64.powi(-exponent)
+}
+
+/// Each channel clamped to 0..=1, and zero without a sign.
+pub(crate) fn displayable(color: DVec3) -> DVec3 {
+    color.clamp(DVec3::ZERO, DVec3::ONE) + 0.0
 }
 
 fn finite(name: Parameter, v: DVec3) -> Result<DVec3, InvalidValue> {

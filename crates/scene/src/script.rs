@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::model::{Camera, Light, Object, Scene, Screen};
+use crate::model::{Camera, Light, Object, Scene, Screen, displayable};
 use crate::shared_slice::SharedSlice;
 
 /// The frames of a script, one for each `Trace`, at least one.
@@ -109,7 +109,7 @@ impl Recorder {
     }
 
     pub(crate) fn set_background(&mut self, color: DVec3) {
-        self.background = color.clamp(DVec3::ZERO, DVec3::ONE);
+        self.background = displayable(color);
     }
 
     pub(crate) fn clear(&mut self) {

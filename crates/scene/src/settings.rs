@@ -213,7 +213,8 @@ fn malformed(text: &str, error: &serde_json::Error, report: &mut Report<'_>) {
     let offset = if error.is_eof() {
         text.len()
     } else {
-        let line_start: usize = text.split_inclusive('\n').take(error.line() - 1).map(str::len).sum();
+        let line_start: usize =
+            text.split_inclusive('\n').take(error.line().saturating_sub(1)).map(str::len).sum();
         text.floor_char_boundary(line_start + error.column().saturating_sub(1))
     };
     let (line, start) = Line::around(text.as_bytes(), offset);

@@ -96,7 +96,8 @@ fn write_object(f: &mut Formatter<'_>, object: &Object) -> fmt::Result {
             write_number(f, o.radius())?;
             write_vector(f, o.center())?;
             write_matte(f, o.material())?;
-            if o.material().mirror() != DVec3::ZERO {
+            // A mirror of -0 is written, so that it reads back as that.
+            if o.material().mirror().to_array().map(f64::to_bits) != [0; 3] {
                 write_vector(f, o.material().mirror())?;
             }
         }
