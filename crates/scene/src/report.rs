@@ -7,6 +7,9 @@ use std::ops::Range;
 
 use crate::diagnostic::{Code, Diagnostic, Excerpt, Severity};
 
+/// What some editors put before UTF-8 text.
+pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// A line of the text that is being parsed, without its line end.
 #[derive(Clone, Copy)]
 pub(crate) struct Line<'a> {

@@ -18,11 +18,9 @@ use serde_json::value::RawValue;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::limits::Limits;
 use crate::model::{InvalidValue, Parameter};
-use crate::report::{Fault, Line, Report, quoted};
+use crate::report::{BYTE_ORDER_MARK, Fault, Line, Report, quoted};
 
 const FIELDS: [&str; 3] = ["frames", "fps", "loop"];
-
-const BYTE_ORDER_MARK: char = '\u{feff}';
 
 /// How the frames of a folder become an animation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -118,23 +116,26 @@ pub struct ParsedSettings {
 
 /// Parses the text of an `animation.json`; `name` is what diagnostics call it.
 pub fn parse_settings(name: &str, bytes: &[u8]) -> ParsedSettings {
+    let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     let mut report = Report::new(name, Limits::DESCRIBED);
-    let settings = match std::str::from_utf8(bytes) {
+    let settings = match std::str::from_utf8(text) {
         Ok(text) => settings(text, &mut report),
         Err(error) => {
-            let (line, start) = Line::around(bytes, error.valid_up_to());
+            let (line, start) = Line::around(text, error.valid_up_to());
             let end = error.error_len().map_or(line.bytes.len(), |length| start + length);
             report.error(line, start..end, || Fault::not_utf8(line, start..end, "settings"));
             None
         }
     };
-    ParsedSettings { settings, diagnostics: report.finish() }
+    let mut diagnostics = report.finish();
+    let skipped = bytes.len() - text.len();
+    for Diagnostic { span, .. } in &mut diagnostics {
+        *span = span.start + skipped..span.end + skipped;
+    }
+    ParsedSettings { settings, diagnostics }
 }
 
 fn settings(text: &str, report: &mut Report<'_>) -> Option<AnimationSettings> {
-    // Blanks in its place keep the offsets.
-    let without_mark = text.replacen(BYTE_ORDER_MARK, "   ", 1);
-    let text = if text.starts_with(BYTE_ORDER_MARK) { &without_mark } else { text };
     let entries = match serde_json::from_str::<Entries<'_>>(text) {
         Ok(entries) => entries.0,
         Err(error) => {
@@ -317,6 +318,13 @@ mod tests {
     fn a_byte_order_mark_is_skipped() {
         let parsed = parse_settings("animation.json", "\u{feff}{\"fps\": 25}".as_bytes());
         assert_eq!(parsed.settings, settings(None, 25.0, 0));
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_column() {
+        let parsed = parse_settings("animation.json", "\u{feff}}".as_bytes());
+        let places: Vec<_> = parsed.diagnostics.iter().map(|d| (d.line, d.column, d.span.clone())).collect();
+        assert_eq!(places, [(1, 1, 3..4)]);
     }
 
     #[test]

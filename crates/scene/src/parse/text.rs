@@ -3,12 +3,11 @@
 use std::ops::Range;
 
 use super::command::MAX_PARAMETERS;
-use crate::report::Line;
+use crate::report::{BYTE_ORDER_MARK, Line};
 
 /// The lines of a text without their ends and without the byte-order mark. The last one is empty when the text ends
 /// with a line feed.
 pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
-    const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
     let mut offset = if bytes.starts_with(BYTE_ORDER_MARK) { BYTE_ORDER_MARK.len() } else { 0 };
     bytes[offset..].split(|&b| b == b'\n').enumerate().map(move |(i, whole)| {
         let line = Line { number: i + 1, offset, bytes: whole.strip_suffix(b"\r").unwrap_or(whole) };
