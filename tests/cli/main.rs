@@ -6,6 +6,7 @@
 
 mod bad_input;
 mod check;
+mod cost;
 mod images;
 mod interrupted;
 mod render;

@@ -7,7 +7,7 @@ use clap::{Parser, Subcommand};
 
 use crate::console::{Color, Console};
 use crate::outcome::{Outcome, exit_code};
-use crate::{check, completions, interrupt, render, split};
+use crate::{check, completions, cost, interrupt, render, split};
 
 /// Ray-traced animations from a folder of scene scripts.
 #[derive(Debug, Parser)]
@@ -47,6 +47,7 @@ enum Command {
     Render(render::Args),
     Check(check::Args),
     Split(split::Args),
+    Cost(cost::Args),
     Completions(completions::Args),
 }
 
@@ -56,6 +57,7 @@ impl Command {
             Self::Render(args) => render::run(&args, console),
             Self::Check(args) => check::run(&args, console),
             Self::Split(args) => split::run(&args, console),
+            Self::Cost(args) => cost::run(&args, console),
             Self::Completions(args) => completions::run(&args, console),
         }
     }

@@ -10,6 +10,7 @@ mod app;
 mod check;
 mod completions;
 mod console;
+mod cost;
 mod input;
 mod interrupt;
 mod outcome;

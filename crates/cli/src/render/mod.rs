@@ -248,7 +248,8 @@ impl std::fmt::Display for Size {
     }
 }
 
-fn parse_size(text: &str) -> Result<Screen, String> {
+/// Width and height, as `640x480`.
+pub(crate) fn parse_size(text: &str) -> Result<Screen, String> {
     let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     let (width, height) = sides.ok_or("expected width and height in pixels, such as 640x480")?;
     Screen::new(width, height).map_err(|e| e.to_string())

@@ -1,0 +1,263 @@
+//! What is billed for an animation and for the stack that it is made on, line by line.
+//!
+//! Invariants: free allowances are left out, so that a bill is never higher for them; what is not known beforehand
+//! (requests a frame, sizes) is a named constant with its reason, or the caller's.
+
+use serde::Serialize;
+
+use super::prices::Prices;
+
+/// Requests a frame while it is made, of the kind that is billed as PUT, COPY, POST or LIST: the upload, the look for
+/// a result, the result, and the listings, manifests and claims of a fold, of which many frames share one.
+const PUTS_AND_LISTS_A_FRAME: f64 = 6.0;
+
+/// The same, of the kind that is billed as GET: the script, the manifest before and after the pause, and the assembler's
+/// reading of the frame.
+const GETS_A_FRAME: f64 = 4.0;
+
+/// Keys in a page of a listing.
+const PAGE: f64 = 1000.0;
+
+/// The part of a GIF that one request uploads.
+const UPLOAD_PART_MB: f64 = 8.0;
+
+/// Log lines of an invocation, the platform's own among them.
+const LOG_BYTES: f64 = 1500.0;
+
+/// Of the invocations that X-Ray samples by its default rule, beyond the first of each second.
+const TRACED: f64 = 0.05;
+
+/// Alarms of the stack.
+pub(super) const ALARMS: f64 = 11.0;
+
+/// A sweep of a bucket in which nothing is amiss.
+const SWEEP_S: f64 = 0.5;
+
+/// Lambda keeps five readers waiting at a queue, each asking every 20 s.
+const QUEUE_POLLS_A_MONTH: f64 = 5.0 * MINUTES_A_MONTH * 3.0;
+
+const MINUTES_A_MONTH: f64 = 30.0 * 24.0 * 60.0;
+
+/// What is to be made, and on what.
+#[derive(Debug, Serialize)]
+pub(super) struct Workload {
+    pub(super) frames: u64,
+    /// Of the render function, a frame.
+    pub(super) ms: f64,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) memory_mb: f64,
+    pub(super) assemble_memory_mb: f64,
+    pub(super) arm64: bool,
+    /// Of the assemble function, a frame.
+    pub(super) assemble_ms: f64,
+    /// A frame's PNG, in the mean.
+    pub(super) frame_kb: f64,
+    pub(super) gif_mb: f64,
+    pub(super) sweep_minutes: f64,
+    pub(super) customer_managed_key: bool,
+}
+
+/// Lines under one heading.
+#[derive(Debug, Serialize)]
+pub(super) struct Section {
+    pub(super) title: &'static str,
+    pub(super) lines: Vec<Line>,
+    pub(super) usd: f64,
+}
+
+/// So much of something, and what it costs.
+#[derive(Debug, Serialize)]
+pub(super) struct Line {
+    pub(super) item: &'static str,
+    pub(super) amount: f64,
+    pub(super) unit: &'static str,
+    pub(super) usd: f64,
+}
+
+impl Section {
+    fn new(title: &'static str, lines: Vec<Line>) -> Self {
+        let usd = lines.iter().map(|line| line.usd).sum();
+        Self { title, lines, usd }
+    }
+}
+
+/// Everything, in the order in which it is asked about.
+pub(super) fn estimate(work: &Workload, prices: &Prices) -> Vec<Section> {
+    vec![making(work, prices), keeping(work, prices), stack(work, prices)]
+}
+
+fn line(item: &'static str, amount: f64, unit: &'static str, price: f64) -> Line {
+    Line { item, amount, unit, usd: amount * price }
+}
+
+fn gb_second(work: &Workload, prices: &Prices) -> f64 {
+    if work.arm64 { prices.lambda.gb_second_arm64 } else { prices.lambda.gb_second_x86_64 }
+}
+
+/// Lambda counts a GB as 1,024 MB.
+fn gb_seconds(memory_mb: f64, ms: f64) -> f64 {
+    memory_mb / 1024.0 * ms / 1000.0
+}
+
+fn making(work: &Workload, prices: &Prices) -> Section {
+    let frames = work.frames as f64;
+    let compute = gb_second(work, prices);
+    let uploads = (work.gif_mb / UPLOAD_PART_MB).ceil() + 2.0;
+    // The quiet before the assembler starts, or its rounds of listings.
+    let overhead_ms = 1000.0;
+    let invocations = frames + 1.0;
+    Section::new(
+        "Making it, once",
+        vec![
+            line("Lambda: invocations", invocations, "", prices.lambda.request),
+            line("Lambda: rendering", frames * gb_seconds(work.memory_mb, work.ms), "GB-s", compute),
+            line(
+                "Lambda: assembling",
+                gb_seconds(work.assemble_memory_mb, frames * work.assemble_ms + overhead_ms),
+                "GB-s",
+                compute,
+            ),
+            line(
+                "S3: puts and lists",
+                frames * PUTS_AND_LISTS_A_FRAME + uploads,
+                "",
+                prices.s3.put_copy_post_list,
+            ),
+            line("S3: gets", frames * GETS_A_FRAME, "", prices.s3.get_and_other),
+            line("Logs", invocations * LOG_BYTES / 1e9, "GB", prices.cloudwatch.log_gb),
+            line("Traces", invocations * TRACED, "", prices.xray_trace),
+            line("Downloading the GIF once", work.gif_mb / 1e3, "GB", prices.transfer_out_gb),
+        ],
+    )
+}
+
+fn keeping(work: &Workload, prices: &Prices) -> Section {
+    let frames = work.frames as f64;
+    let sweeps = MINUTES_A_MONTH / work.sweep_minutes;
+    let pages = (frames / PAGE).ceil();
+    // Its scripts among everybody's, its scripts, and its frames; then its manifest and the head of its GIF.
+    let (lists, gets) = (frames / PAGE + 2.0 * pages, 2.0);
+    Section::new(
+        "Keeping it, each month",
+        vec![
+            line(
+                "S3: frames and GIF",
+                (frames * work.frame_kb / 1e3 + work.gif_mb) / 1e3,
+                "GB",
+                prices.s3.standard_gb_month,
+            ),
+            line("S3: lists of the sweep", sweeps * lists, "", prices.s3.put_copy_post_list),
+            line("S3: gets of the sweep", sweeps * gets, "", prices.s3.get_and_other),
+        ],
+    )
+}
+
+fn stack(work: &Workload, prices: &Prices) -> Section {
+    let sweeps = MINUTES_A_MONTH / work.sweep_minutes;
+    let mut lines = vec![
+        line("Alarms", ALARMS, "", prices.cloudwatch.alarm_month),
+        line("Dashboard", 1.0, "", prices.cloudwatch.dashboard_month),
+        line("Schedule of the sweep", sweeps, "", prices.scheduler_invocation),
+        line("Lambda: sweep invocations", sweeps, "", prices.lambda.request),
+        line(
+            "Lambda: sweeping",
+            sweeps * gb_seconds(work.assemble_memory_mb, SWEEP_S * 1000.0),
+            "GB-s",
+            gb_second(work, prices),
+        ),
+        line("S3: lists of the sweep", 2.0 * sweeps, "", prices.s3.put_copy_post_list),
+        line("Reading the failure queue", QUEUE_POLLS_A_MONTH, "", prices.sqs_request),
+    ];
+    if work.customer_managed_key {
+        lines.push(line("Key", 1.0, "", prices.kms_key_month));
+    }
+    Section::new("The stack, each month, however many animations", lines)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn prices() -> Prices {
+        serde_json::from_str(super::super::prices::BUILT_IN).unwrap()
+    }
+
+    fn work(frames: u64, ms: f64) -> Workload {
+        Workload {
+            frames,
+            ms,
+            width: 512,
+            height: 512,
+            memory_mb: 1024.0,
+            assemble_memory_mb: 2048.0,
+            arm64: false,
+            assemble_ms: 10.0,
+            frame_kb: 30.0,
+            gif_mb: 16.0,
+            sweep_minutes: 15.0,
+            customer_managed_key: false,
+        }
+    }
+
+    fn find<'a>(section: &'a Section, item: &str) -> &'a Line {
+        section.lines.iter().find(|line| line.item == item).unwrap()
+    }
+
+    fn near(a: f64, b: f64) {
+        assert!((a - b).abs() <= 1e-9 * b.abs().max(1e-6), "{a} is not {b}");
+    }
+
+    /// By hand: 1,000 frames x 2 s x 1 GB = 2,000 GB-s, at 0.0000166667.
+    #[test]
+    fn rendering_is_memory_times_time() {
+        let making = making(&work(1000, 2000.0), &prices());
+        near(find(&making, "Lambda: rendering").amount, 2000.0);
+        near(find(&making, "Lambda: rendering").usd, 0.033_333_4);
+        near(find(&making, "Lambda: invocations").amount, 1001.0);
+    }
+
+    /// By hand: 2 GB x (1,000 x 10 ms + 1 s) = 22 GB-s.
+    #[test]
+    fn assembling_takes_its_own_memory() {
+        near(find(&making(&work(1000, 2000.0), &prices()), "Lambda: assembling").amount, 22.0);
+    }
+
+    #[test]
+    fn arm64_is_cheaper_for_the_same_time() {
+        let (x86, arm) = (work(10, 100.0), Workload { arm64: true, ..work(10, 100.0) });
+        let cost = |work| find(&making(work, &prices()), "Lambda: rendering").usd;
+        near(cost(&arm) / cost(&x86), 0.000_013_333_4 / 0.000_016_666_7);
+    }
+
+    /// By hand: 16 MB in parts of 8, begun and completed: 4 requests beside the frames'.
+    #[test]
+    fn requests_grow_with_frames() {
+        let small = making(&work(100, 1.0), &prices());
+        near(find(&small, "S3: puts and lists").amount, 100.0 * PUTS_AND_LISTS_A_FRAME + 4.0);
+        near(find(&small, "S3: gets").amount, 100.0 * GETS_A_FRAME);
+    }
+
+    /// By hand: 2,880 sweeps a month, each lists its 2 pages of scripts and 2 of frames and is 1.5 pages of all scripts.
+    #[test]
+    fn a_kept_animation_is_visited_by_each_sweep() {
+        let keeping = keeping(&work(1500, 1.0), &prices());
+        near(find(&keeping, "S3: lists of the sweep").amount, 2880.0 * 5.5);
+        near(find(&keeping, "S3: gets of the sweep").amount, 2880.0 * 2.0);
+        near(find(&keeping, "S3: frames and GIF").amount, (1500.0 * 0.03 + 16.0) / 1000.0);
+    }
+
+    #[test]
+    fn a_key_is_billed_by_the_month() {
+        let with = Workload { customer_managed_key: true, ..work(10, 100.0) };
+        near(stack(&with, &prices()).usd - stack(&work(10, 100.0), &prices()).usd, 1.0);
+    }
+
+    #[test]
+    fn sections_are_the_sums_of_their_lines() {
+        for section in estimate(&work(1000, 300.0), &prices()) {
+            near(section.usd, section.lines.iter().map(|line| line.usd).sum());
+            assert!(section.lines.iter().all(|line| line.usd > 0.0), "{section:?}");
+        }
+    }
+}
