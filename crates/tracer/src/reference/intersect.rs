@@ -23,21 +23,62 @@ pub struct Surface {
 
 /// Distance to the nearest hit in front of the origin.
 pub(super) fn distance(object: &Object, ray: Ray) -> Option<f64> {
-    let distance = match object {
+    let (object, ray, scale) = ordinary(object, ray)?;
+    let distance = match &object {
         Object::Sphere(sphere) => to_sphere(sphere, ray),
         Object::Triangle(triangle) => to_triangle(triangle, ray),
         Object::Cuboid(cuboid) => to_cuboid(cuboid, ray),
-    }?;
+    }? / scale;
     (distance > 0.0 && distance.is_finite()).then_some(distance)
 }
 
 /// The surface of an object that the ray hits at `distance`.
+///
+/// # Panics
+/// When the ray does not hit the object.
 pub(super) fn surface(object: &Object, ray: Ray, distance: f64) -> Surface {
-    match object {
-        Object::Sphere(sphere) => of_sphere(sphere, ray, distance),
-        Object::Triangle(triangle) => of_triangle(triangle, ray, distance),
-        Object::Cuboid(cuboid) => of_cuboid(cuboid, ray, distance),
+    let Some((object, ray, scale)) = ordinary(object, ray) else {
+        unreachable!("the ray hits the object at {distance}")
+    };
+    let surface = match &object {
+        Object::Sphere(sphere) => of_sphere(sphere, ray, distance * scale),
+        Object::Triangle(triangle) => of_triangle(triangle, ray, distance * scale),
+        Object::Cuboid(cuboid) => of_cuboid(cuboid, ray, distance * scale),
+    };
+    Surface { point: surface.point / scale, offset: surface.offset / scale, ..surface }
+}
+
+/// The largest exponent whose fourth power leaves room for sums of products.
+const ORDINARY: i32 = 200;
+
+/// Object and ray in units in which no product overflows or vanishes: the power of two that scales world units to
+/// them, 1 for most. `None` for an object that is too small to be seen in the ray's units.
+fn ordinary(object: &Object, ray: Ray) -> Option<(Object, Ray, f64)> {
+    let extent = match object {
+        Object::Sphere(sphere) => (sphere.center() - ray.origin).abs().max_element().max(sphere.radius()),
+        Object::Triangle(triangle) => {
+            triangle.vertices().iter().fold(ray.origin.abs(), |m, v| m.max(v.abs())).max_element()
+        }
+        Object::Cuboid(cuboid) => {
+            cuboid.corners().iter().fold(ray.origin.abs(), |m, v| m.max(v.abs())).max_element()
+        }
+    };
+    if extent == 0.0 || (2f64.powi(-ORDINARY)..=2f64.powi(ORDINARY)).contains(&extent) {
+        return Some((*object, ray, 1.0));
     }
+    // One step below the exponent's range, so that the scale of the smallest number is finite.
+    let scale = 2f64.powi(-(extent.log2().floor() as i32).clamp(-1022, 1022));
+    let material = *object.material();
+    let object = match object {
+        Object::Sphere(s) => {
+            Object::Sphere(Sphere::new(s.radius() * scale, s.center() * scale, material).ok()?)
+        }
+        Object::Triangle(t) => {
+            Object::Triangle(Triangle::new(t.vertices().map(|v| v * scale), material).ok()?)
+        }
+        Object::Cuboid(c) => Object::Cuboid(Cuboid::new(c.corners().map(|v| v * scale), material).ok()?),
+    };
+    Some((object, Ray { origin: ray.origin * scale, ..ray }, scale))
 }
 
 /// Haines, Günther, Akenine-Möller, "Precision improvements for ray/sphere intersection", Ray Tracing Gems ch. 7.
@@ -290,6 +331,24 @@ mod tests {
         assert_eq!(distance(&t, ray([0.25, 0.25, -1.0], [0.0, 0.0, 1.0])), Some(1.0));
         assert_eq!(distance(&t, ray([-1.0, 0.25, 0.0], [1.0, 0.0, 0.0])), None);
         assert_eq!(distance(&t, ray([0.75, 0.75, 1.0], [0.0, 0.0, -1.0])), None);
+    }
+
+    #[test]
+    fn objects_of_any_size_are_hit_alike() {
+        let origin = DVec3::new(0.3, 0.2, 3.0);
+        for exponent in [-1000, -500, 500, 1000] {
+            let scale = 2f64.powi(exponent);
+            let [p, q, r] =
+                [[-1.0, -1.0, 0.0], [2.0, -1.0, 0.0], [-1.0, 2.0, 0.5]].map(|v| v.map(|x| scale * x));
+            for object in [sphere(scale, [0.0; 3]), cuboid(p, [scale; 3]), triangle(p, q, r)] {
+                let r = Ray { origin: scale * origin, direction: DVec3::NEG_Z };
+                let t = distance(&object, r).unwrap();
+                let s = surface(&object, r, t);
+                assert!((1.0..4.0).contains(&(t / scale)), "{t:e} at 2^{exponent}");
+                assert!((s.point.z - (r.origin.z - t)).abs() <= 1e-14 * scale);
+                assert!((s.normal.length() - 1.0).abs() < 1e-14 && s.normal.z > 0.0);
+            }
+        }
     }
 
     #[test]

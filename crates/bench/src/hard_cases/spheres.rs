@@ -1,0 +1,237 @@
+//! Spheres that are far away, huge, only touched, or around the eye.
+
+use anyhow::Result;
+use glam::DVec3;
+use rayfold_scene::{Cuboid, Material, Object, Sphere};
+
+use super::{Figures, Size, aimed, direction, objects_only, random, truths, unless_single, worse};
+use crate::oracle::{nearest, sphere_clearance};
+use crate::scenes::single;
+use crate::tracers::{Arithmetic, Ray, Tracer};
+
+fn sphere(radius: f64, center: DVec3) -> Result<Sphere> {
+    Ok(Sphere::new(radius, center, Material::default())?)
+}
+
+/// Wrong only within 4 ulp (of the origin's distance, the largest number that takes part) of the limb; the error of the
+/// distance for rays through the inner 0.99 r.
+pub(super) fn distant(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    for distance in [1e1, 1e2, 1e3, 1e4, 1e6] {
+        let mut rng = random(1);
+        let (spheres, each) = (size.pick(5, 100), size.pick(40, 200));
+        let mut worst = vec![(0f64, 0f64); tracers.len()];
+        for _ in 0..spheres {
+            let origin = single(direction(&mut rng));
+            let ball = sphere(1.0, single(origin + distance * direction(&mut rng)))?;
+            let objects = [Object::Sphere(ball)];
+            let rays: Vec<Ray> = (0..each)
+                .map(|k| {
+                    // Every other ray goes for the limb, where the others seldom pass.
+                    let reach = if k % 2 == 0 { rng.f64().sqrt() } else { 0.98 + 0.04 * rng.f64() };
+                    let aside = direction(&mut rng).cross((ball.center() - origin).normalize());
+                    aimed(origin, ball.center() + reach * aside.normalize_or_zero())
+                })
+                .collect();
+            let truths = truths(&objects, &rays);
+            let scene = objects_only(objects.to_vec())?;
+            for (tracer, worst) in tracers.iter().zip(&mut worst) {
+                for ((ray, truth), hit) in rays.iter().zip(&truths).zip(tracer.nearest(&scene, &rays)) {
+                    let clearance = sphere_clearance(&ball, ray.origin, ray.direction);
+                    match (truth, hit) {
+                        (Some(truth), Some(hit)) if clearance < -0.01 => {
+                            let error = (hit.t - truth.t).abs() * ray.direction.length();
+                            worst.1 = worse(worst.1, error);
+                        }
+                        (Some(_), Some(_)) | (None, None) => {}
+                        _ => worst.0 = worse(worst.0, clearance.abs() / tracer.ulp(distance)),
+                    }
+                }
+            }
+        }
+        for (tracer, (limb, error)) in tracers.iter().zip(worst) {
+            let all = spheres * each;
+            // Beyond 1e4 radii `f32` alone promises nothing: there the program chooses `f64`.
+            let near = distance <= 1e4;
+            let double = tracer.arithmetic == Arithmetic::Double || !near;
+            let bound = if double { 1e-8 } else { 1e-6 * distance };
+            let promised = |bound| if near { Some(bound) } else { unless_single(tracer, bound) };
+            figures.add(
+                tracer,
+                format!("at {distance:e} r, wrong hit or miss off the limb, ulp of the distance"),
+                all,
+                limb,
+                promised(4.0),
+            );
+            figures.add(tracer, format!("at {distance:e} r, dt/r"), all, error, promised(bound));
+        }
+    }
+    Ok(())
+}
+
+/// The relative error of the distance to the ground.
+pub(super) fn horizon(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    const RADIUS: f64 = 1e7;
+    let objects = [Object::Sphere(sphere(RADIUS, DVec3::new(0.0, -RADIUS, 0.0))?)];
+    let scene = objects_only(objects.to_vec())?;
+    let mut rng = random(3);
+    // Down to the horizon at a depression of 4.5e-4; from 0.1 on downwards for `f32` by force.
+    for (what, least) in [("steeper than 0.1", 0.1f64), ("down to 1.1 of the horizon's depression", 4.92e-4)]
+    {
+        let rays: Vec<Ray> = (0..size.pick(400, 20_000))
+            .map(|_| {
+                let depression = least * (1.5 / least).powf(rng.f64());
+                let turn = rng.f64() * std::f64::consts::TAU;
+                let along = DVec3::new(turn.cos(), 0.0, turn.sin()) * depression.cos();
+                aimed(DVec3::Y, DVec3::Y + along - DVec3::Y * depression.sin())
+            })
+            .collect();
+        let truths = truths(&objects, &rays);
+        for tracer in tracers {
+            let worst =
+                truths.iter().zip(tracer.nearest(&scene, &rays)).fold(0.0, |worst, pair| match pair {
+                    (Some(truth), Some(hit)) => worse(worst, (hit.t - truth.t).abs() / truth.t),
+                    (None, None) => worst,
+                    _ => f64::INFINITY,
+                });
+            let bound = if least < 0.1 { unless_single(tracer, 5e-6) } else { Some(5e-6) };
+            figures.add(tracer, format!("relative t, {what}"), rays.len(), worst, bound);
+        }
+    }
+    Ok(())
+}
+
+/// Rays whose line passes the centre at r + k ulp: along the axes, where the ray is exact, and askew.
+pub(super) fn tangent(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    for tracer in tracers {
+        let (mut axial, mut askew, mut invalid, mut count) = (0f64, 0f64, 0, 0);
+        let mut rng = random(4);
+        for radius in [1.0, 3.0, single(DVec3::splat(0.1)).x, 1e3, 12_345.0] {
+            let ball = sphere(radius, DVec3::ZERO)?;
+            let objects = [Object::Sphere(ball)];
+            let scene = objects_only(objects.to_vec())?;
+            let ulp = tracer.ulp(radius);
+            let mut rays = Vec::new();
+            for k in -16..=16 {
+                let aside = radius + f64::from(k) * ulp;
+                for axis in 0..3 {
+                    for far in [1.5, 8.0] {
+                        let origin = DVec3::AXES[axis] * aside + DVec3::AXES[(axis + 1) % 3] * far * radius;
+                        rays.push(Ray { origin, direction: -DVec3::AXES[(axis + 1) % 3] });
+                    }
+                }
+            }
+            let exact = rays.len();
+            for _ in 0..size.pick(200, 20_000) {
+                let towards = direction(&mut rng);
+                let aside = direction(&mut rng).cross(towards).normalize_or_zero();
+                let graze = 1.0 + (rng.f64() - 0.5) * 64.0 * ulp / radius;
+                let (eye, goal) = (radius * (1.5 * towards), radius * (graze * aside - 0.2 * towards));
+                rays.push(match tracer.arithmetic {
+                    Arithmetic::Double => Ray { origin: eye, direction: (goal - eye).normalize() },
+                    Arithmetic::Single | Arithmetic::Chosen => aimed(eye, goal),
+                });
+            }
+            let truths = truths(&objects, &rays);
+            for (k, ((ray, truth), hit)) in
+                rays.iter().zip(&truths).zip(tracer.nearest(&scene, &rays)).enumerate()
+            {
+                count += 1;
+                if hit.is_some_and(|hit| !hit.t.is_finite() || !hit.normal.is_finite()) {
+                    invalid += 1;
+                }
+                if hit.is_some() != truth.is_some() {
+                    let off = sphere_clearance(&ball, ray.origin, ray.direction).abs() / ulp;
+                    let worst = if k < exact { &mut axial } else { &mut askew };
+                    *worst = worse(*worst, off);
+                }
+            }
+        }
+        figures.add(tracer, "along an axis, wrong at k ulp of r", count, axial, 4.0);
+        figures.add(tracer, "askew, wrong at k ulp of r", count, askew, 4.0);
+        figures.add(tracer, "NaN", count, f64::from(invalid), 0.0);
+    }
+    Ok(())
+}
+
+/// The right one of two roots, from points that are exactly on the surface and from the inside.
+pub(super) fn inside(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    let mut rng = random(5);
+    let mut sets: Vec<(Object, Vec<Ray>)> = Vec::new();
+    for (radius, center) in [(5.0, DVec3::ZERO), (5.0, DVec3::new(64.0, -3.0, 8.0)), (0.625, DVec3::Y)] {
+        let on = [[3.0, 4.0, 0.0], [0.0, -3.0, 4.0], [-5.0, 0.0, 0.0], [-4.0, 0.0, 3.0]];
+        let on = on.map(|p| DVec3::from(p) * (radius / 5.0));
+        let mut rays = Vec::new();
+        for _ in 0..size.pick(30, 3000) {
+            let towards = single(direction(&mut rng));
+            rays.extend(on.map(|p| Ray { origin: center + p, direction: towards }));
+            rays.extend(on.map(|p| Ray { origin: center + p, direction: -p }));
+            let depth = radius * rng.f64() * 0.99;
+            rays.push(Ray { origin: single(center + depth * direction(&mut rng)), direction: towards });
+        }
+        sets.push((Object::Sphere(sphere(radius, center)?), rays));
+    }
+    let corners = [DVec3::new(-1.0, -2.0, -3.0), DVec3::new(1.0, 2.0, 4.0)];
+    let mut rays = Vec::new();
+    for _ in 0..size.pick(100, 10_000) {
+        let part = DVec3::new(rng.f64(), rng.f64(), rng.f64());
+        let within = single(corners[0] + (corners[1] - corners[0]) * part);
+        let towards = single(direction(&mut rng));
+        rays.push(Ray { origin: within, direction: towards });
+        for axis in 0..3 {
+            let mut on = within;
+            on[axis] = corners[rng.usize(0..2)][axis];
+            rays.push(Ray { origin: on, direction: towards });
+            rays.push(Ray { origin: on, direction: DVec3::AXES[axis] });
+        }
+    }
+    sets.push((Object::Cuboid(Cuboid::new(corners, Material::default())?), rays));
+    for tracer in tracers {
+        let (mut wrong, mut count) = (0, 0);
+        for (object, rays) in &sets {
+            let scene = objects_only(vec![*object])?;
+            for (ray, hit) in rays.iter().zip(tracer.nearest(&scene, rays)) {
+                count += 1;
+                let truth = nearest(&[*object], ray.origin, ray.direction).map(|hit| hit.t.to_f64());
+                let right = match (truth, hit) {
+                    (Some(t), Some(hit)) => (hit.t - t).abs() * ray.direction.length() < 1e-4,
+                    (None, None) => true,
+                    _ => false,
+                };
+                wrong += usize::from(!right);
+            }
+        }
+        figures.add(tracer, "wrong roots", count, wrong as f64, 0.0);
+    }
+    Ok(())
+}
+
+/// Each pixel shows an object that the oracle sees within half a pixel of it.
+pub(super) fn giant_and_dwarf(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    let objects = [
+        Object::Sphere(sphere(1e7, DVec3::new(0.0, -1e7, 0.0))?),
+        Object::Sphere(sphere(1.0, DVec3::new(0.5, 1.5, -6.0))?),
+    ];
+    let scene = objects_only(objects.to_vec())?;
+    let side = size.pick(96, 512);
+    let pixel = 0.8 / f64::from(side);
+    let ray = |i: f64, j: f64| {
+        let across = DVec3::new((i + 0.5) * pixel - 0.4, (j + 0.5) * pixel - 0.4, -1.0);
+        Ray { origin: DVec3::new(0.0, 2.0, 0.0), direction: across.normalize() }
+    };
+    let seen = |ray: Ray| nearest(&objects, ray.origin, ray.direction).map(|hit| hit.object);
+    let places: Vec<(f64, f64)> =
+        (0..side * side).map(|k| (f64::from(k % side), f64::from(k / side))).collect();
+    let rays: Vec<Ray> = places.iter().map(|&(i, j)| ray(i, j)).collect();
+    let truths: Vec<_> = rays.iter().map(|&ray| seen(ray)).collect();
+    for tracer in tracers {
+        let hits = tracer.nearest(&scene, &rays);
+        let off = places.iter().zip(&truths).zip(&hits).filter(|((place, truth), hit)| {
+            let shown = hit.map(|hit| hit.object);
+            let near = |turn: f64| ray(place.0 + 0.5 * turn.cos(), place.1 + 0.5 * turn.sin());
+            shown != **truth
+                && (0..32).all(|k| seen(near(f64::from(k) * std::f64::consts::TAU / 32.0)) != shown)
+        });
+        figures.add(tracer, "pixels off by more than half a pixel", places.len(), off.count() as f64, 0.0);
+    }
+    Ok(())
+}

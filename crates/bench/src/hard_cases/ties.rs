@@ -1,0 +1,77 @@
+//! Objects at the same distance.
+
+use anyhow::Result;
+use glam::DVec3;
+use rayfold_scene::{Cuboid, Material, Object, Sphere, Triangle};
+
+use super::{Figures, Size, aimed, direction, objects_only, random};
+use crate::tracers::Tracer;
+
+/// Each object of a scene several times over, in mixed order: every hit is that of the first copy.
+pub(super) fn identical(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    let mut rng = random(24);
+    for copies in [2, 30] {
+        let mut kinds = Vec::new();
+        for k in 0..9 {
+            let spot = 3.0 * direction(&mut rng);
+            let surface = Material::default();
+            let corner = |rng: &mut fastrand::Rng| spot + direction(rng);
+            let vertices = [corner(&mut rng), corner(&mut rng), corner(&mut rng)];
+            kinds.push(match k % 3 {
+                0 => Object::Sphere(Sphere::new(0.8, spot, surface)?),
+                1 => Object::Cuboid(Cuboid::new([spot - 0.7, spot + 0.7], surface)?),
+                _ => Object::Triangle(Triangle::new(vertices, surface)?),
+            });
+        }
+        let mut order: Vec<usize> = (0..kinds.len() * copies).map(|k| k % kinds.len()).collect();
+        rng.shuffle(&mut order);
+        let scene = objects_only(order.iter().map(|&kind| kinds[kind]).collect())?;
+        let rays: Vec<_> = (0..size.pick(4000, 1_000_000))
+            .map(|_| aimed(7.0 * direction(&mut rng), 3.0 * direction(&mut rng)))
+            .collect();
+        let first = |object: usize| order.iter().position(|&kind| kind == order[object]);
+        for tracer in tracers {
+            let hits = tracer.nearest(&scene, &rays);
+            let late = hits.iter().flatten().filter(|hit| first(hit.object) != Some(hit.object)).count();
+            figures.add(
+                tracer,
+                format!("hits on a later copy, {} objects", order.len()),
+                rays.len(),
+                late as f64,
+                0.0,
+            );
+            anyhow::ensure!(4 * hits.iter().flatten().count() > rays.len(), "too few rays meet anything");
+        }
+    }
+    faces(tracers, size, figures)
+}
+
+/// Faces of two boxes and two triangles in one plane that is square to the rays: computed distances are equal.
+fn faces(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    let surface = Material::default();
+    let cuboid = |u: [f64; 3], v: [f64; 3]| Cuboid::new([u.into(), v.into()], surface).map(Object::Cuboid);
+    let big = cuboid([-4.0, -4.0, -2.0], [4.0, 4.0, 0.0])?;
+    let small = cuboid([-1.0, -1.0, -1.0], [1.0, 1.0, 0.0])?;
+    let ball = Object::Sphere(Sphere::new(1.0, DVec3::new(3.0, 3.0, -1.0), surface)?);
+    let mut rng = random(240);
+    let rays: Vec<_> = (0..size.pick(500, 100_000))
+        .map(|k| {
+            let place = DVec3::new(rng.f64() * 2.0 - 1.0, rng.f64() * 2.0 - 1.0, 5.0);
+            let from = if k % 50 == 0 { DVec3::new(3.0, 3.0, 5.0) } else { place };
+            aimed(from, from - DVec3::Z)
+        })
+        .collect();
+    for tracer in tracers {
+        let mut late = 0;
+        for objects in [vec![big, small, ball], vec![small, ball, big], vec![ball, small, big]] {
+            let at = |object: Object| objects.iter().position(|&o| o == object);
+            let scene = objects_only(objects.clone())?;
+            for (ray, hit) in rays.iter().zip(tracer.nearest(&scene, &rays)) {
+                let other = if ray.origin.x == 3.0 { ball } else { small };
+                late += usize::from(hit.map(|hit| hit.object) != at(big).min(at(other)));
+            }
+        }
+        figures.add(tracer, "not the first of those in one plane", 3 * rays.len(), late as f64, 0.0);
+    }
+    Ok(())
+}

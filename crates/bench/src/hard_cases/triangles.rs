@@ -1,0 +1,250 @@
+//! Edges, vertices, needles, and triangles seen from the side.
+
+use anyhow::Result;
+use glam::DVec3;
+use rayfold_scene::{Limits, Material, Object, Triangle};
+
+use super::{Figures, Size, aimed, direction, objects_only, random, truths, unless_single, worse};
+use crate::oracle::edge_clearance;
+use crate::scenes::{icosphere, single};
+use crate::tracers::{Arithmetic, Ray, Tracer};
+
+fn triangle(vertices: [DVec3; 3]) -> Result<Object> {
+    Ok(Object::Triangle(Triangle::new(vertices, Material::default())?))
+}
+
+/// How many rays at a time: what a harness may hold in memory.
+const BATCH: usize = 1 << 16;
+
+/// A closed surface around the eye, of corners that all arithmetics hold.
+fn shell(count: usize, rng: &mut fastrand::Rng) -> Result<(Vec<[DVec3; 3]>, Vec<Object>)> {
+    let offset = DVec3::new(rng.f64(), rng.f64(), rng.f64()) * 4.0;
+    let faces: Vec<_> =
+        icosphere(count).into_iter().map(|face| face.map(|p| single(3.0 * p + offset))).collect();
+    let objects = faces.iter().map(|&face| triangle(face)).collect::<Result<_>>()?;
+    Ok((faces, objects))
+}
+
+/// Counts the rays that escape from a closed surface; `target` picks a point of a face.
+fn escapes(
+    tracers: &[Tracer],
+    (count, rays): (usize, usize),
+    seed: u64,
+    what: &str,
+    figures: &mut Figures,
+    target: impl Fn(&[DVec3; 3], &mut fastrand::Rng) -> DVec3,
+) -> Result<()> {
+    let (faces, objects) = shell(count, &mut random(seed))?;
+    let centre = faces.iter().flatten().sum::<DVec3>() / (3 * faces.len()) as f64;
+    let scene = objects_only(objects)?;
+    for tracer in tracers {
+        let mut rng = random(seed);
+        let (mut left, mut escaped) = (rays, 0);
+        while left > 0 {
+            let batch: Vec<Ray> = (0..left.min(BATCH))
+                .map(|_| {
+                    aimed(centre + direction(&mut rng), target(&faces[rng.usize(0..faces.len())], &mut rng))
+                })
+                .collect();
+            escaped += tracer.nearest(&scene, &batch).iter().filter(|hit| hit.is_none()).count();
+            left -= batch.len();
+        }
+        figures.add(tracer, format!("cracks in {} faces, {what}", faces.len()), rays, escaped as f64, 0.0);
+    }
+    Ok(())
+}
+
+/// From inside a closed surface towards its edges.
+pub(super) fn shared_edges(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    for sizes in [(20, size.pick(40_000, 100_000_000)), (size.pick(320, 20_480), size.pick(8_000, 100_000))] {
+        escapes(tracers, sizes, 10, "towards edges", figures, |face, rng| {
+            let k = rng.usize(0..3);
+            face[k].lerp(face[(k + 1) % 3], rng.f64())
+        })?;
+    }
+    Ok(())
+}
+
+/// From inside a closed surface towards its corners.
+pub(super) fn shared_vertices(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    for sizes in [(20, size.pick(20_000, 10_000_000)), (size.pick(320, 20_480), size.pick(4_000, 20_000))] {
+        escapes(tracers, sizes, 11, "towards corners", figures, |face, rng| face[rng.usize(0..3)])?;
+    }
+    Ok(())
+}
+
+/// Long thin triangles in any position: the oracle's hits but within 4 ulp of an edge, distances to 16 ulp.
+pub(super) fn needles(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    let mut rng = random(12);
+    let mut worst = vec![(0f64, 0f64); tracers.len()];
+    let (needles, each) = (size.pick(40, 1000), size.pick(40, 200));
+    for _ in 0..needles {
+        let tip = direction(&mut rng);
+        let along = direction(&mut rng);
+        let across = direction(&mut rng).cross(along).normalize_or_zero() * 1e-6;
+        let vertices = [tip, tip + along, tip + along + across].map(single);
+        let needle = Triangle::new(vertices, Material::default())?;
+        if needle.is_degenerate() {
+            continue;
+        }
+        let objects = [Object::Triangle(needle)];
+        let scene = objects_only(objects.to_vec())?;
+        let eye = 3.0 * direction(&mut rng);
+        let rays: Vec<Ray> = (0..each)
+            .map(|_| aimed(eye, tip + rng.f64() * along + (rng.f64() * 1.4 - 0.2) * across))
+            .collect();
+        let truths = truths(&objects, &rays);
+        for (tracer, worst) in tracers.iter().zip(&mut worst) {
+            for ((ray, truth), hit) in rays.iter().zip(&truths).zip(tracer.nearest(&scene, &rays)) {
+                let largest = vertices.iter().fold(0.0, |m: f64, v| m.max((*v - ray.origin).length()));
+                match (truth, hit) {
+                    (Some(truth), Some(hit)) => {
+                        worst.1 = worse(worst.1, (hit.t - truth.t).abs() / tracer.ulp(truth.t));
+                    }
+                    (None, None) => {}
+                    _ => {
+                        let off = edge_clearance(&needle, ray.origin, ray.direction).unwrap_or(0.0);
+                        worst.0 = worse(worst.0, off / tracer.ulp(largest));
+                    }
+                }
+            }
+        }
+    }
+    for (tracer, (edge, t)) in tracers.iter().zip(worst) {
+        figures.add(
+            tracer,
+            "wrong hit or miss off the edge, ulp",
+            needles * each,
+            edge,
+            unless_single(tracer, 4.0),
+        );
+        figures.add(tracer, "t, ulp", needles * each, t, unless_single(tracer, 16.0));
+    }
+    Ok(())
+}
+
+/// Triangles whose corners lie on a line: a warning when read, and no ray hits them.
+pub(super) fn degenerate(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    let mut rng = random(13);
+    let mut flat: Vec<[DVec3; 3]> = vec![
+        [DVec3::ZERO; 3],
+        [DVec3::splat(0.1), DVec3::splat(0.2), DVec3::splat(0.3)].map(single),
+        [DVec3::ZERO, DVec3::X, DVec3::X],
+    ];
+    for _ in 0..30 {
+        let whole = |rng: &mut fastrand::Rng| {
+            DVec3::from_array(std::array::from_fn(|_| f64::from(rng.i32(-999..999))))
+        };
+        let (start, step) = (whole(&mut rng), whole(&mut rng));
+        flat.push([start, start + f64::from(rng.i32(1..9)) * step, start + f64::from(rng.i32(-9..0)) * step]);
+    }
+    let mut unreported = 0;
+    for vertices in &flat {
+        let [u, v, w] = vertices.map(|p| format!("{:?} {:?} {:?}", p.x, p.y, p.z));
+        let text = format!("Screen 2 2\nTriangle {u} {v} {w} 0 0 0 1 1 1\nTrace");
+        let parsed = rayfold_scene::parse("flat.txt", text.as_bytes(), &Limits::default());
+        unreported += usize::from(parsed.script.is_none() || parsed.diagnostics.len() != 1);
+    }
+    let mut sets = Vec::new();
+    for vertices in &flat {
+        let rays: Vec<Ray> = (0..size.pick(100, 20_000))
+            .map(|_| {
+                let on = vertices[0].lerp(vertices[1], rng.f64());
+                let eye = on + (1.0 + 10.0 * rng.f64()) * direction(&mut rng);
+                aimed(eye, on)
+            })
+            .collect();
+        sets.push((objects_only(vec![triangle(*vertices)?])?, rays));
+    }
+    for tracer in tracers {
+        let hits = sets
+            .iter()
+            .map(|(scene, rays)| tracer.nearest(scene, rays).iter().flatten().count())
+            .sum::<usize>();
+        let rays = sets.iter().map(|(_, rays)| rays.len()).sum();
+        figures.add(tracer, "hits", rays, hits as f64, 0.0);
+        figures.add(tracer, "not reported when read", flat.len(), unreported as f64, 0.0);
+    }
+    Ok(())
+}
+
+/// Rays that lie in the plane exactly, also after their direction is normalised: along axes and diagonals.
+pub(super) fn in_plane(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    let mut rng = random(14);
+    let mut sets = Vec::new();
+    for axis in 0..3 {
+        let (right, up) = (DVec3::AXES[(axis + 1) % 3], DVec3::AXES[(axis + 2) % 3]);
+        let level = 0.375 * DVec3::AXES[axis];
+        let square = [level, level + 2.0 * right, level + 2.0 * up];
+        // The plane x + y + z = 3 holds the diagonals.
+        let tilted = [DVec3::new(3.0, 0.0, 0.0), DVec3::new(0.0, 3.0, 0.0), DVec3::new(0.0, 0.0, 3.0)];
+        let mut rays = [Vec::new(), Vec::new()];
+        for _ in 0..size.pick(100, 10_000) {
+            let (p, q) = (single(DVec3::splat(rng.f64())).x, single(DVec3::splat(rng.f64())).x);
+            for sign in [1.0, -1.0] {
+                let origin = level + p * right + q * up;
+                let towards = [right, up, right + up, right - up, right + single(DVec3::splat(q)).x * up];
+                rays[0].extend(towards.map(|d| Ray { origin: origin - 3.0 * d * sign, direction: d * sign }));
+                let (a, b) = (f64::from(rng.i32(-5..6)), f64::from(rng.i32(-5..6)));
+                let origin = DVec3::new(a, b, 3.0 - a - b);
+                rays[1].push(Ray { origin, direction: (right - up) * sign });
+            }
+        }
+        for (vertices, rays) in [square, tilted].into_iter().zip(rays) {
+            let objects = vec![triangle(vertices)?];
+            anyhow::ensure!(truths(&objects, &rays).iter().all(Option::is_none), "a ray out of the plane");
+            sets.push((objects_only(objects)?, rays));
+        }
+    }
+    for tracer in tracers {
+        let hits = sets
+            .iter()
+            .map(|(scene, rays)| tracer.nearest(scene, rays).iter().flatten().count())
+            .sum::<usize>();
+        let rays = sets.iter().map(|(_, rays)| rays.len()).sum();
+        figures.add(tracer, "hits", rays, hits as f64, 0.0);
+    }
+    Ok(())
+}
+
+/// Every way against the first of the same arithmetic: with or without a tree, in packets of any width, the same
+/// object. Against the plain tracer, whose arithmetic may differ, only off the edges and where depths are apart.
+pub(super) fn tree_or_not(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    let mut rng = random(17);
+    let objects: Vec<Object> = (0..1000)
+        .map(|_| {
+            let spot = 4.0 * direction(&mut rng);
+            let reach = 0.1 + rng.f64();
+            triangle([(); 3].map(|()| single(spot + reach * direction(&mut rng))))
+        })
+        .collect::<Result<_>>()?;
+    let scene = objects_only(objects)?;
+    let total = size.pick(4000, 2_000_000);
+    let mut different = vec![0; tracers.len()];
+    let mut left = total;
+    while left > 0 {
+        let rays: Vec<Ray> = (0..left.min(BATCH))
+            .map(|_| aimed(8.0 * direction(&mut rng), 4.0 * direction(&mut rng)))
+            .collect();
+        let mut firsts: Vec<(Arithmetic, Vec<Option<usize>>)> = Vec::new();
+        for (tracer, different) in tracers.iter().zip(&mut different) {
+            let hits: Vec<_> =
+                tracer.nearest(&scene, &rays).iter().map(|hit| hit.map(|hit| hit.object)).collect();
+            match firsts.iter().find(|(arithmetic, _)| *arithmetic == tracer.arithmetic) {
+                Some((_, first)) => *different += hits.iter().zip(first).filter(|(a, b)| a != b).count(),
+                None => firsts.push((tracer.arithmetic, hits)),
+            }
+        }
+        left -= rays.len();
+    }
+    for (tracer, different) in tracers.iter().zip(different) {
+        figures.add(
+            tracer,
+            "another object than the first way of its arithmetic",
+            total,
+            f64::from(different as u32),
+            0.0,
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,216 @@
+//! Scenes to measure on, made from a seed.
+
+use anyhow::{Context, Result};
+use glam::{DVec2, DVec3};
+use rayfold_scene::{
+    Camera, Cuboid, DirectionalLight, InvalidValue, Light, Material, Object, Pinhole, Scene, Screen, Sphere,
+    Triangle,
+};
+
+/// A camera at `eye` that looks at `target` and sees `width` world units a unit of distance from side to side.
+///
+/// # Errors
+/// When eye and target coincide or lie above one another.
+pub fn looking_at(eye: DVec3, target: DVec3, width: f64, screen: Screen) -> Result<Camera, InvalidValue> {
+    let half = DVec2::new(0.5, 0.5 * f64::from(screen.height()) / f64::from(screen.width())) * width;
+    Pinhole::new(eye, target - eye, DVec3::Y, 1.0, -half, half).map(Camera::Pinhole)
+}
+
+/// A surface that scatters and mirrors.
+///
+/// # Errors
+/// When a number is not finite.
+pub fn material(diffuse: DVec3, mirror: f64) -> Result<Material, InvalidValue> {
+    Material::new(0.15 * diffuse, diffuse, DVec3::splat(mirror))
+}
+
+/// A light at infinity.
+///
+/// # Errors
+/// When the direction is zero.
+pub fn light(color: f64, direction: [f64; 3]) -> Result<Light, InvalidValue> {
+    DirectionalLight::new(DVec3::splat(color), direction.into()).map(Light::Directional)
+}
+
+/// 22 spheres, most of them mirrors, over a floor: 2 boxes, 2 triangles, 2 lights.
+///
+/// # Errors
+/// Never for a screen of ordinary size.
+pub fn table(width: u32, height: u32) -> Result<Scene> {
+    let screen = Screen::new(width, height)?;
+    let mut scene = Scene::new(screen, looking_at(DVec3::new(0.0, 4.5, 9.0), DVec3::ZERO, 1.1, screen)?);
+    scene.set_background(DVec3::new(0.25, 0.35, 0.55))?;
+    let mut objects = vec![
+        cuboid([-6.0, -1.2, -6.0], [6.0, -1.0, 6.0], DVec3::new(0.6, 0.6, 0.55))?,
+        cuboid([-3.4, -1.0, -4.4], [-2.6, 1.6, -3.6], DVec3::new(0.7, 0.3, 0.2))?,
+        triangle([[2.0, -1.0, -4.5], [4.5, -1.0, -3.0], [3.2, 2.2, -4.0]], DVec3::new(0.2, 0.5, 0.3))?,
+        triangle([[-5.5, -0.9, 1.0], [-4.2, -0.9, 2.4], [-4.9, 1.4, 1.6]], DVec3::new(0.5, 0.5, 0.1))?,
+    ];
+    let mut rng = fastrand::Rng::with_seed(22);
+    for k in 0..22 {
+        let radius = 0.35 + 0.3 * rng.f64();
+        let spot = DVec3::new(f64::from(k % 6) * 1.5 - 3.7, radius - 1.0, f64::from(k / 6) * 1.6 - 2.4);
+        let jitter = DVec3::new(rng.f64() - 0.5, 0.0, rng.f64() - 0.5) * 0.4;
+        let color = DVec3::new(rng.f64(), rng.f64(), rng.f64()) * 0.6 + 0.1;
+        let mirror = if k % 4 == 3 { 0.0 } else { 0.2 + 0.4 * rng.f64() };
+        objects.push(Object::Sphere(Sphere::new(radius, spot + jitter, material(color, mirror)?)?));
+    }
+    scene.objects = objects.into();
+    scene.lights = vec![light(0.7, [-1.0, -2.0, -1.0])?, light(0.4, [1.5, -1.0, -0.5])?].into();
+    Ok(scene)
+}
+
+/// `count` spheres of which about as many are seen whatever the count: they fill the same cube ever more finely.
+///
+/// # Errors
+/// Never for a screen of ordinary size.
+pub fn cloud(count: u32, width: u32, height: u32) -> Result<Scene> {
+    let screen = Screen::new(width, height)?;
+    let mut scene = Scene::new(screen, looking_at(DVec3::new(0.0, 0.5, 6.0), DVec3::ZERO, 0.8, screen)?);
+    scene.set_background(DVec3::splat(0.1))?;
+    let mut rng = fastrand::Rng::with_seed(u64::from(count));
+    let radius = 0.9 / f64::from(count).cbrt();
+    let objects: Result<Vec<_>> = (0..count)
+        .map(|k| {
+            let center = DVec3::new(rng.f64(), rng.f64(), rng.f64()) * 4.0 - 2.0;
+            let color = DVec3::new(rng.f64(), rng.f64(), rng.f64());
+            let mirror = if k % 4 == 0 { 0.3 } else { 0.0 };
+            Ok(Object::Sphere(Sphere::new(radius, center, material(color, mirror)?)?))
+        })
+        .collect();
+    scene.objects = objects?.into();
+    scene.lights = vec![light(0.9, [-1.0, -2.0, -1.5])?].into();
+    Ok(scene)
+}
+
+/// A closed, wrinkled surface around the origin of at least `count` triangles, seen and lit from outside.
+///
+/// # Errors
+/// Never for a screen of ordinary size.
+pub fn rock(count: usize, width: u32, height: u32) -> Result<Scene> {
+    let screen = Screen::new(width, height)?;
+    let mut scene = Scene::new(screen, looking_at(DVec3::new(0.5, 1.0, 3.0), DVec3::ZERO, 0.8, screen)?);
+    scene.set_background(DVec3::splat(0.1))?;
+    let surface = material(DVec3::new(0.7, 0.65, 0.5), 0.0)?;
+    let faces = icosphere(count);
+    let objects: Result<Vec<_>> = faces
+        .iter()
+        .map(|face| Ok(Object::Triangle(Triangle::new(face.map(|p| single(wrinkled(p))), surface)?)))
+        .collect();
+    scene.objects = objects?.into();
+    scene.lights = vec![light(0.9, [-1.0, -2.0, -1.5])?].into();
+    Ok(scene)
+}
+
+/// The icosahedron, its faces quartered until there are at least `count`; corners on the unit sphere, shared bit for
+/// bit between neighbours.
+pub fn icosphere(count: usize) -> Vec<[DVec3; 3]> {
+    let golden = 0.5 + 1.25f64.sqrt();
+    let corners: Vec<DVec3> = [(-1.0, golden), (1.0, golden), (-1.0, -golden), (1.0, -golden)]
+        .into_iter()
+        .flat_map(|(a, b)| [DVec3::new(a, b, 0.0), DVec3::new(0.0, a, b), DVec3::new(b, 0.0, a)])
+        .map(DVec3::normalize)
+        .collect();
+    // The 20 triples of mutual neighbours, which are nearer to each other than any others.
+    let near = |a: DVec3, b: DVec3| a.distance(b) < 1.1;
+    let mut faces = Vec::new();
+    for a in 0..12 {
+        for b in a + 1..12 {
+            for c in b + 1..12 {
+                let [p, q, r] = [corners[a], corners[b], corners[c]];
+                if near(p, q) && near(q, r) && near(r, p) {
+                    faces.push([p, q, r]);
+                }
+            }
+        }
+    }
+    while faces.len() < count {
+        faces = faces.into_iter().flat_map(quartered).collect();
+    }
+    faces
+}
+
+fn quartered([p, q, r]: [DVec3; 3]) -> [[DVec3; 3]; 4] {
+    // A sum of two commutes, so both neighbours get the same midpoint.
+    let [a, b, c] = [(p + q).normalize(), (q + r).normalize(), (r + p).normalize()];
+    [[p, a, c], [a, q, b], [c, b, r], [a, b, c]]
+}
+
+fn wrinkled(p: DVec3) -> DVec3 {
+    let waves =
+        (7.0 * p.x + 3.0 * p.y).sin() * (5.0 * p.y - 4.0 * p.z).sin() + 0.3 * (31.0 * p.z + 17.0 * p.x).sin();
+    p * (1.0 + 0.08 * waves)
+}
+
+/// The nearest vector of `f32`s: what every arithmetic holds exactly.
+pub fn single(v: DVec3) -> DVec3 {
+    v.as_vec3().as_dvec3()
+}
+
+/// The scene with every position `p` moved to `scale · p + offset`, seen from the eye that moved along.
+///
+/// # Errors
+/// When a number overflows, or the camera is not a pinhole.
+pub fn moved(scene: &Scene, scale: f64, offset: DVec3) -> Result<Scene> {
+    let place = |p: DVec3| scale * p + offset;
+    let Camera::Pinhole(pinhole) = scene.camera else { anyhow::bail!("only a pinhole camera moves") };
+    let mut moved = scene.clone();
+    moved.camera = Camera::Pinhole(Pinhole::new(
+        place(pinhole.eye()),
+        pinhole.gaze(),
+        pinhole.up(),
+        pinhole.distance(),
+        pinhole.lower_left(),
+        pinhole.upper_right(),
+    )?);
+    let objects: Result<Vec<_>, InvalidValue> = scene
+        .objects
+        .iter()
+        .map(|object| {
+            Ok(match object {
+                Object::Sphere(s) => {
+                    Object::Sphere(Sphere::new(scale * s.radius(), place(s.center()), *s.material())?)
+                }
+                Object::Triangle(t) => {
+                    Object::Triangle(Triangle::new(t.vertices().map(place), *t.material())?)
+                }
+                Object::Cuboid(c) => Object::Cuboid(Cuboid::new(c.corners().map(place), *c.material())?),
+            })
+        })
+        .collect();
+    moved.objects = objects.context("the moved scene")?.into();
+    Ok(moved)
+}
+
+fn cuboid(u: [f64; 3], v: [f64; 3], color: DVec3) -> Result<Object> {
+    Ok(Object::Cuboid(Cuboid::new([u.into(), v.into()], material(color, 0.0)?)?))
+}
+
+fn triangle(vertices: [[f64; 3]; 3], color: DVec3) -> Result<Object> {
+    Ok(Object::Triangle(Triangle::new(vertices.map(DVec3::from), material(color, 0.0)?)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use super::*;
+
+    #[test]
+    fn an_icosphere_is_closed() {
+        for count in [20, 21, 320] {
+            let faces = icosphere(count);
+            assert!(faces.len() >= count && faces.len() < 4 * count.max(20));
+            let bits = |p: DVec3| p.to_array().map(f64::to_bits);
+            let mut edges: HashMap<_, u32> = HashMap::new();
+            for [p, q, r] in faces {
+                for (a, b) in [(p, q), (q, r), (r, p)] {
+                    *edges
+                        .entry(if bits(a) < bits(b) { (bits(a), bits(b)) } else { (bits(b), bits(a)) })
+                        .or_default() += 1;
+                }
+            }
+            assert!(edges.values().all(|&uses| uses == 2));
+        }
+    }
+}
