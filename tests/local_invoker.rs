@@ -100,7 +100,7 @@ async fn an_event_that_fails_is_tried_three_times_under_one_id_and_then_delivere
     assert_eq!(tries.iter().map(|(id, ..)| id).collect::<BTreeSet<_>>().len(), 1);
     assert_eq!(tries.iter().map(|(.., pid)| pid).collect::<BTreeSet<_>>().len(), 3);
     // The delivered record holds the event, so the obedient function crashes on it too, and the queue gives it up.
-    assert_eq!(started(&seen, Function::Assemble).len(), 3);
+    assert_eq!(started(&seen, Function::Assemble).len(), 5);
     let letters: Vec<&String> = seen
         .iter()
         .filter_map(|observation| match &observation.seen {

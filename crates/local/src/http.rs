@@ -76,6 +76,14 @@ impl Server {
     }
 }
 
+impl Server {
+    /// Closes the listener and every connection, and returns when they are closed.
+    pub(crate) async fn stop(mut self) {
+        self.0.abort();
+        let _ = (&mut self.0).await;
+    }
+}
+
 impl Drop for Server {
     fn drop(&mut self) {
         self.0.abort();

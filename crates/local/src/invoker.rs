@@ -14,12 +14,13 @@ mod pool;
 mod runtime_api;
 mod sandbox;
 
+use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use bytes::Bytes;
-use serde_json::json;
+use tokio::net::TcpListener;
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio::sync::oneshot;
 use tokio::task::JoinSet;
@@ -27,14 +28,20 @@ use tokio::task::JoinSet;
 pub use chaos::{Chaos, Fate, Fates};
 pub use pool::Ramp;
 
-use crate::Result;
 use crate::functions::Functions;
-use crate::http::Server;
-use crate::minio::REGION;
+use crate::http::{Server, listen};
+
 use crate::observation::{Observation, Observer, Outcome};
 use crate::routes::Function;
+use crate::{Error, Result};
 use events::Pools;
 use pool::{Caller, Job, Pending, Workers};
+
+/// What the schedule of `infra/terraform` sends.
+const SWEEP: &str = r#"{"sweep":true}"#;
+
+/// The same when nobody has listened for events: what is pending is not on its way.
+const CATCH_UP: &str = r#"{"sweep":true,"catch_up":true}"#;
 
 /// What an invoker needs to know.
 #[derive(Clone)]
@@ -43,6 +50,8 @@ pub struct Settings {
     pub functions: Functions,
     /// The processes' environment, beyond what Lambda sets.
     pub environment: Vec<(String, String)>,
+    /// What differs by function, such as credentials of its own.
+    pub environment_of: BTreeMap<Function, Vec<(String, String)>>,
     /// The store's S3 endpoint.
     pub store: SocketAddr,
     /// Where to listen for events.
@@ -73,6 +82,7 @@ impl Settings {
         Self {
             functions,
             environment: Vec::new(),
+            environment_of: BTreeMap::new(),
             store,
             webhook,
             webhook_token,
@@ -93,8 +103,8 @@ pub struct Invoker {
     pools: Pools,
     pending: Pending,
     webhook: SocketAddr,
-    _server: Server,
-    _tasks: JoinSet<()>,
+    server: Server,
+    tasks: JoinSet<()>,
 }
 
 impl Invoker {
@@ -103,7 +113,20 @@ impl Invoker {
     /// # Errors
     /// [`Error::NoFunction`](crate::Error::NoFunction), [`Error::Listen`](crate::Error::Listen).
     pub async fn start(settings: Settings, observer: Option<UnboundedSender<Observation>>) -> Result<Self> {
+        let (listener, _) = listen(settings.webhook).await?;
+        Self::start_on(listener, settings, observer)
+    }
+
+    /// The same on a listener that is there already.
+    pub(crate) fn start_on(
+        listener: TcpListener,
+        settings: Settings,
+        observer: Option<UnboundedSender<Observation>>,
+    ) -> Result<Self> {
         settings.functions.check()?;
+        let webhook = listener
+            .local_addr()
+            .map_err(|source| Error::Listen { address: settings.webhook.to_string(), source })?;
         let observer = Observer(observer);
         let dice = Arc::new(chaos::Dice::new(settings.chaos.clone()));
         let pending = Pending::default();
@@ -123,27 +146,32 @@ impl Invoker {
         });
         tasks.spawn(failures::deliver(failed, assemble.clone(), pending.clone(), observer.clone()));
         let pools = Pools { render, assemble };
-        let (server, webhook) = events::receive(
-            settings.webhook,
+        let server = events::receive(
+            listener,
             &settings.webhook_token,
             pools.clone(),
             dice,
             observer,
             pending.clone(),
             &mut tasks,
-        )
-        .await?;
-        pools.assemble.submit(Job::event(schedule()));
+        );
+        pools.assemble.submit(Job::event(CATCH_UP));
         if let Some(pause) = settings.sweep_every {
             let assemble = pools.assemble.clone();
             tasks.spawn(async move {
                 loop {
                     tokio::time::sleep(pause).await;
-                    assemble.submit(Job::event(schedule()));
+                    assemble.submit(Job::event(SWEEP));
                 }
             });
         }
-        Ok(Self { pools, pending, webhook, _server: server, _tasks: tasks })
+        Ok(Self { pools, pending, webhook, server, tasks })
+    }
+
+    /// Kills every process, and returns when no event can be heard any more.
+    pub async fn stop(mut self) {
+        self.tasks.shutdown().await;
+        self.server.stop().await;
     }
 
     /// Where events are heard.
@@ -153,7 +181,7 @@ impl Invoker {
 
     /// The schedule's event, now.
     pub fn sweep(&self) {
-        self.pools.assemble.submit(Job::event(schedule()));
+        self.pools.assemble.submit(Job::event(SWEEP));
     }
 
     /// Invokes as an event does: tried again when it fails, then delivered to the failure queue.
@@ -177,22 +205,6 @@ impl Invoker {
     pub fn pending(&self) -> usize {
         self.pending.count()
     }
-}
-
-/// What EventBridge Scheduler sends when a schedule gives no input of its own.
-fn schedule() -> String {
-    json!({
-        "version": "0",
-        "id": random_id(),
-        "detail-type": "Scheduled Event",
-        "source": "aws.scheduler",
-        "account": "000000000000",
-        "time": failures::timestamp(SystemTime::now()),
-        "region": REGION,
-        "resources": [format!("arn:aws:scheduler:{REGION}:000000000000:schedule/default/rayfold-sweep")],
-        "detail": "{}",
-    })
-    .to_string()
 }
 
 /// An identifier in the shape of a version-4 UUID.

@@ -2,8 +2,10 @@
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use rayfold_pipeline::store::{Connection, Notification, S3Store};
+use tokio::net::TcpListener;
 use tokio::sync::mpsc::UnboundedSender;
 
 use crate::functions::Functions;
@@ -13,6 +15,9 @@ use crate::minio::{Minio, QUEUE_ARN, REGION, Webhook, any_port, find_or_install,
 use crate::observation::Observation;
 use crate::routes::Routes;
 use crate::{Error, Result};
+
+/// How long MinIO may take to know its webhook.
+const QUEUE_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// What a platform is made of.
 #[derive(Clone, Debug)]
@@ -30,6 +35,8 @@ pub struct Plan {
 /// MinIO with a bucket whose events reach an invoker.
 pub struct Platform {
     invoker: Option<Invoker>,
+    /// Until the first invoker takes it, so that nobody else gets the port that MinIO was told.
+    listener: Option<TcpListener>,
     minio: Minio,
     store: S3Store,
     settings: Settings,
@@ -49,9 +56,7 @@ impl Platform {
     ) -> Result<Self> {
         plan.functions.check()?;
         let binary = find_or_install(say)?;
-        // The port is kept for the invoker, which may come and go while MinIO runs.
         let (listener, webhook) = listen(any_port()).await?;
-        drop(listener);
         let secret = token(16)?;
         let hook = Webhook { url: format!("http://{webhook}/events"), token: secret.clone() };
         let minio = Minio::start(&binary, &plan.data, plan.address, Some(&hook)).await?;
@@ -66,12 +71,12 @@ impl Platform {
                 queue_arn: QUEUE_ARN.to_owned(),
             })
             .collect();
-        store.notify(&notifications).await.map_err(failed)?;
+        notify(&store, &notifications).await.map_err(failed)?;
         let mut settings = Settings::new(plan.functions.clone(), minio.address(), webhook, secret);
         settings.environment = minio.environment();
         settings.environment.push(("RAYFOLD_BUCKET".into(), plan.bucket.clone()));
         change(&mut settings);
-        Ok(Self { invoker: None, minio, store, settings })
+        Ok(Self { invoker: None, listener: Some(listener), minio, store, settings })
     }
 
     /// Starts the invoker, which sweeps up what happened while there was none.
@@ -82,14 +87,32 @@ impl Platform {
         &mut self,
         observer: Option<UnboundedSender<Observation>>,
     ) -> Result<&Invoker> {
-        self.invoker = None;
-        let invoker = Invoker::start(self.settings.clone(), observer).await?;
+        self.stop_invoker().await;
+        let listener = match self.listener.take() {
+            Some(listener) => listener,
+            None => self.listen_again().await?,
+        };
+        let invoker = Invoker::start_on(listener, self.settings.clone(), observer)?;
         Ok(self.invoker.insert(invoker))
     }
 
+    /// On the same port, which an outgoing connection of anybody may have for a moment.
+    async fn listen_again(&self) -> Result<TcpListener> {
+        let start = Instant::now();
+        loop {
+            match listen(self.settings.webhook).await {
+                Ok((listener, _)) => return Ok(listener),
+                Err(error) if start.elapsed() > QUEUE_TIMEOUT => return Err(error),
+                Err(_) => tokio::time::sleep(Duration::from_millis(50)).await,
+            }
+        }
+    }
+
     /// Stops the invoker and its processes; MinIO goes on.
-    pub fn stop_invoker(&mut self) {
-        self.invoker = None;
+    pub async fn stop_invoker(&mut self) {
+        if let Some(invoker) = self.invoker.take() {
+            invoker.stop().await;
+        }
     }
 
     /// The invoker, while there is one.
@@ -110,6 +133,21 @@ impl Platform {
     /// The S3 server.
     pub fn minio(&self) -> &Minio {
         &self.minio
+    }
+}
+
+/// MinIO says that it is ready some moments before it knows its webhooks, and refuses their queues until then.
+async fn notify(store: &S3Store, notifications: &[Notification]) -> rayfold_pipeline::Result<()> {
+    let start = Instant::now();
+    loop {
+        match store.notify(notifications).await {
+            Err(rayfold_pipeline::Error::Refused { source, .. })
+                if source.to_string().contains("ARN") && start.elapsed() < QUEUE_TIMEOUT =>
+            {
+                tokio::time::sleep(Duration::from_millis(20)).await;
+            }
+            answer => return answer,
+        }
     }
 }
 

@@ -3,7 +3,6 @@
 //! Events are forwarded as MinIO writes them; the functions read AWS's shape and MinIO's. Chaos lives here: an event may
 //! be lost, doubled, late, or one of a bunch that is delivered newest first.
 
-use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -14,14 +13,14 @@ use hyper::header::AUTHORIZATION;
 use hyper::{Method, Request, Response, StatusCode};
 use percent_encoding::percent_decode_str;
 use serde_json::{Value, json};
+use tokio::net::TcpListener;
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::timeout;
 
 use super::chaos::Dice;
 use super::pool::{Job, Pending, Pool};
-use crate::Result;
-use crate::http::{Body, Server, json, listen};
+use crate::http::{Body, Server, json};
 use crate::observation::{Observer, Seen};
 use crate::routes::{Function, Routes};
 
@@ -46,27 +45,25 @@ struct Event {
     payload: Bytes,
 }
 
-/// Listens on `address` for events that carry `token`, and delivers them.
-pub(crate) async fn receive(
-    address: SocketAddr,
+/// Hears events that carry `token` on `listener`, and delivers them.
+pub(crate) fn receive(
+    listener: TcpListener,
     token: &str,
     pools: Pools,
     dice: Arc<Dice>,
     observer: Observer,
     pending: Pending,
     tasks: &mut JoinSet<()>,
-) -> Result<(Server, SocketAddr)> {
-    let (listener, address) = listen(address).await?;
+) -> Server {
     let (sender, events) = mpsc::unbounded_channel();
     tasks.spawn(deliver(events, pools, dice, pending.clone()));
     let routes = Arc::new(Routes::shared());
     let expected: Arc<str> = format!("Bearer {token}").into();
-    let server = Server::start(listener, move |request| {
+    Server::start(listener, move |request| {
         let (sender, observer, pending) = (sender.clone(), observer.clone(), pending.clone());
         let (routes, expected) = (routes.clone(), expected.clone());
         async move { Some(take(request, &expected, &routes, &observer, &pending, &sender).await) }
-    });
-    Ok((server, address))
+    })
 }
 
 async fn take(

@@ -18,8 +18,8 @@ use crate::routes::Function;
 /// SQS's largest batch for a function.
 const BATCH: usize = 10;
 
-/// A message that failed so often is given up.
-const MAX_RECEIVES: u32 = 3;
+/// A message that failed so often is given up (`maxReceiveCount` in `infra/terraform`).
+const MAX_RECEIVES: u32 = 5;
 
 /// Instead of the queue's visibility timeout.
 const PAUSE: Duration = Duration::from_millis(500);
@@ -163,7 +163,7 @@ fn failed_items(answer: &str) -> Vec<String> {
 }
 
 /// ISO 8601 in UTC, to the millisecond.
-pub(crate) fn timestamp(at: SystemTime) -> String {
+fn timestamp(at: SystemTime) -> String {
     let since = at.duration_since(UNIX_EPOCH).unwrap_or_default();
     let (days, seconds) = ((since.as_secs() / 86_400) as i64, since.as_secs() % 86_400);
     // Days since 0000-03-01 to a date of the Gregorian calendar: Hinnant, "chrono-compatible low-level date algorithms".

@@ -49,7 +49,8 @@ impl Sandbox {
         let started = Instant::now();
         let mut child = Command::new(&program)
             .env_clear()
-            .envs(settings.environment.iter().map(|(name, value)| (name, value)))
+            .envs(settings.environment.iter().cloned())
+            .envs(settings.environment_of.get(&function).into_iter().flatten().cloned())
             .env("AWS_ENDPOINT_URL", meter.endpoint())
             .env("AWS_LAMBDA_RUNTIME_API", api.address.to_string())
             .env("AWS_LAMBDA_FUNCTION_NAME", &name)

@@ -1,0 +1,80 @@
+//! What a function answers: an outcome for each record, or the failure that makes the platform try again.
+//!
+//! What would be the same at the next try (a bad script, a key of no interest, an unreadable event) is written down and
+//! is no failure. Only what may pass is one, and then the whole batch comes again: records that are done cost a few
+//! requests and no work.
+
+use rayfold_pipeline::Error;
+use serde::Serialize;
+
+/// The answer of a call that the platform need not repeat.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Answer {
+    /// In the order of the records.
+    pub outcomes: Vec<Outcome>,
+    /// Messages of the failure queue that are to come again.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub batch_item_failures: Vec<BatchItem>,
+}
+
+/// What came of a record.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Outcome {
+    /// The key, or the animation that was swept.
+    pub of: String,
+    /// In a word or a sentence.
+    pub what: String,
+}
+
+/// A message that is to come again.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct BatchItem {
+    /// Its id.
+    pub item_identifier: String,
+}
+
+/// At least one record could not be worked on for now.
+#[derive(Debug, thiserror::Error)]
+#[error("{}", .0.iter().map(|(key, error)| format!("{}: {key}", chain(error))).collect::<Vec<_>>().join("; "))]
+pub struct Failed(pub Vec<(String, Error)>);
+
+/// An error with its causes. Starts with the error's own words: the platform hands them to whoever records the failure.
+pub(crate) fn chain(error: &Error) -> String {
+    let mut text = error.to_string();
+    let mut source = std::error::Error::source(error);
+    while let Some(cause) = source {
+        text.push_str(": ");
+        text.push_str(&cause.to_string());
+        source = cause.source();
+    }
+    text
+}
+
+/// Whether another try could end otherwise.
+pub(crate) fn may_pass(error: &Error) -> bool {
+    !matches!(error, Error::Key { .. })
+}
+
+impl From<Failed> for lambda_runtime::Diagnostic {
+    fn from(failed: Failed) -> Self {
+        Self { error_type: "Rayfold.TryAgain".into(), error_message: failed.to_string() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_starts_with_the_words_of_its_first_error() {
+        let late = Error::OutOfTime { what: "drawing f".into() };
+        let busy = Error::Throttled { key: "k".into(), source: "SlowDown".into() };
+        let failed = Failed(vec![("scripts/a/f.txt".into(), late), ("scripts/a/g.txt".into(), busy)]);
+        assert_eq!(
+            failed.to_string(),
+            "out of time: drawing f: scripts/a/f.txt; the store is busy: k: SlowDown: scripts/a/g.txt"
+        );
+    }
+}

@@ -1,0 +1,5 @@
+//! The assemble function.
+
+fn main() -> anyhow::Result<()> {
+    rayfold_lambda::run(rayfold_lambda::Function::Assemble)
+}

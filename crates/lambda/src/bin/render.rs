@@ -1,0 +1,5 @@
+//! The render function.
+
+fn main() -> anyhow::Result<()> {
+    rayfold_lambda::run(rayfold_lambda::Function::Render)
+}

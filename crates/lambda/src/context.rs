@@ -1,0 +1,84 @@
+//! What a process makes once, at its cold start, and keeps while it is warm.
+
+use std::env;
+use std::str::FromStr;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use rayfold_pipeline::store::{S3Store, Store};
+use rayfold_pipeline::studio::Studio;
+use rayfold_pipeline::{Invocation, Policy, Randomness, SystemClock, Timestamp};
+
+/// The store's client and what the steps are given.
+#[derive(Debug)]
+pub struct Context<S> {
+    /// The bucket.
+    pub store: S,
+    /// Its name: events of others are not ours.
+    pub bucket: String,
+    /// Draws and encodes.
+    pub studio: Studio,
+    /// The numbers of the protocol.
+    pub policy: Policy,
+    /// Spreads the invocations that would collide.
+    pub random: Randomness,
+}
+
+/// One call of the function.
+#[derive(Clone, Debug)]
+pub struct Call {
+    /// The platform's name for the event; its retries share it.
+    pub request_id: String,
+    /// When the platform kills the process.
+    pub deadline: Timestamp,
+}
+
+impl Context<S3Store> {
+    /// From the function's environment: `RAYFOLD_BUCKET`, and the standard AWS variables for who and where.
+    ///
+    /// `RAYFOLD_QUIET_MS` and `RAYFOLD_STUCK_AFTER_MS` change the pauses of the protocol, `RAYFOLD_ATTEMPTS` how often
+    /// the sweep wakes a frame before it gives it up; `RAYFOLD_SEED` makes random pauses repeatable.
+    ///
+    /// # Errors
+    /// What is missing in the environment, or unreadable.
+    pub async fn from_environment() -> anyhow::Result<Self> {
+        let bucket = env::var("RAYFOLD_BUCKET").context("RAYFOLD_BUCKET must name the bucket")?;
+        let store = S3Store::from_environment(&bucket).await?;
+        let mut policy = Policy::default();
+        if let Some(ms) = number("RAYFOLD_QUIET_MS")? {
+            policy.quiet = Duration::from_millis(ms);
+        }
+        if let Some(ms) = number("RAYFOLD_STUCK_AFTER_MS")? {
+            policy.stuck_after = Duration::from_millis(ms);
+        }
+        if let Some(attempts) = number("RAYFOLD_ATTEMPTS")? {
+            policy.attempts = attempts;
+        }
+        let seed = match number("RAYFOLD_SEED")? {
+            Some(seed) => seed,
+            None => getrandom::u64().context("no randomness from the system")?,
+        };
+        Ok(Self { store, bucket, studio: Studio::default(), policy, random: Randomness::seeded(seed) })
+    }
+}
+
+impl<S: Store> Context<S> {
+    /// What the pipeline's steps work with during a call.
+    pub(crate) fn invocation<'a>(
+        &'a self,
+        policy: &'a Policy,
+        call: &'a Call,
+    ) -> Invocation<'a, S, SystemClock> {
+        Invocation::new(&self.store, &SystemClock, &self.random, policy, &call.request_id)
+            .until(call.deadline)
+    }
+}
+
+fn number<T: FromStr<Err: std::error::Error + Send + Sync + 'static>>(
+    name: &str,
+) -> anyhow::Result<Option<T>> {
+    match env::var(name) {
+        Ok(text) => Ok(Some(text.parse().with_context(|| format!("{name}={text} is no number"))?)),
+        Err(_) => Ok(None),
+    }
+}

@@ -1,0 +1,244 @@
+//! A stage for end-to-end tests: MinIO, the invoker and the unmodified function binaries, with scripts going in and GIFs
+//! coming out. Everything is started fresh for each test, on free loopback ports, and ends with it.
+
+#![allow(dead_code, unreachable_pub, reason = "a module of several test files, which use each a part of it")]
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use rayfold_local::invoker::{Invoker, Settings};
+use rayfold_local::observation::{Observation, Requests, Seen};
+use rayfold_local::routes::Function;
+use rayfold_local::{Functions, Plan, Platform};
+use rayfold_pipeline::assemble::generation_of;
+use rayfold_pipeline::keys::Animation;
+use rayfold_pipeline::manifest::{Manifest, Status};
+use rayfold_pipeline::store::{ObjectInfo, PutOptions, S3Store, Store};
+use rayfold_scene::{AnimationSettings, Limits, natural_cmp, parse, parse_settings};
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+
+/// Longer than anything here takes on a loaded machine.
+pub const PATIENCE: Duration = Duration::from_secs(120);
+
+pub struct Stage {
+    pub platform: Platform,
+    sender: UnboundedSender<Observation>,
+    seen: UnboundedReceiver<Observation>,
+    data: tempfile::TempDir,
+}
+
+/// Starts everything; `change` alters the invoker's settings.
+pub async fn stage(functions: &Path, change: impl FnOnce(&mut Settings)) -> Stage {
+    let data = tempfile::tempdir().unwrap();
+    let plan = Plan::new(data.path(), Functions::in_folder(functions));
+    let settings = |settings: &mut Settings| {
+        settings.concurrency = 4;
+        settings.retry_pauses = vec![Duration::from_millis(50), Duration::from_millis(100)];
+        settings.sweep_every = None;
+        settings.timeout = Duration::from_secs(60);
+        settings.environment.push(("RAYFOLD_QUIET_MS".into(), "1500".into()));
+        change(settings);
+    };
+    let mut platform = Platform::start(&plan, settings, &mut |line| eprintln!("{line}")).await.unwrap();
+    let (sender, seen) = unbounded_channel();
+    platform.start_invoker(Some(sender.clone())).await.unwrap();
+    let mut stage = Stage { platform, sender, seen, data };
+    stage.settle().await;
+    stage
+}
+
+impl Stage {
+    pub fn store(&self) -> &S3Store {
+        self.platform.store()
+    }
+
+    pub fn invoker(&self) -> &Invoker {
+        self.platform.invoker().unwrap()
+    }
+
+    pub async fn restart_invoker(&mut self) {
+        let sender = self.sender.clone();
+        self.platform.start_invoker(Some(sender)).await.unwrap();
+    }
+
+    pub async fn put(&self, key: &str, body: impl Into<Bytes>) {
+        self.store().put(key, body.into(), PutOptions::always()).await.unwrap();
+    }
+
+    pub async fn upload(&self, animation: &str, files: &[(&str, String)]) {
+        for (name, text) in files {
+            self.put(&format!("scripts/{animation}/{name}"), text.clone()).await;
+        }
+    }
+
+    pub async fn remove(&self, animation: &str, name: &str) {
+        self.store().delete(&format!("scripts/{animation}/{name}")).await.unwrap();
+    }
+
+    pub async fn manifest(&self, animation: &str) -> Option<Manifest> {
+        let animation = Animation::new(animation).unwrap();
+        match self.store().get(&animation.manifest()).await {
+            Ok(object) => Some(Manifest::decode(&animation, &object.body).unwrap()),
+            Err(error) => {
+                assert!(error.is_not_found(), "{error:?}");
+                None
+            }
+        }
+    }
+
+    pub async fn gif_info(&self, animation: &str) -> Option<ObjectInfo> {
+        match self.store().head(&Animation::new(animation).unwrap().gif()).await {
+            Ok(info) => Some(info),
+            Err(error) => {
+                assert!(error.is_not_found(), "{error:?}");
+                None
+            }
+        }
+    }
+
+    pub async fn gif(&self, animation: &str) -> Bytes {
+        self.store().get(&Animation::new(animation).unwrap().gif()).await.unwrap().body
+    }
+
+    /// Waits until nothing is on its way any more: all invocations have ended, and MinIO has no event left to tell.
+    pub async fn settle(&mut self) {
+        let start = Instant::now();
+        let mut quiet = 0;
+        while quiet < 4 {
+            assert!(start.elapsed() < PATIENCE, "invocations never end:\n{}", self.story());
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            quiet = if self.invoker().pending() == 0 { quiet + 1 } else { 0 };
+        }
+    }
+
+    /// Waits until the animation stands as wanted, and settles.
+    pub async fn until(&mut self, animation: &str, wanted: Status) -> Manifest {
+        let start = Instant::now();
+        loop {
+            let manifest = self.manifest(animation).await;
+            if let Some(manifest) = manifest {
+                let gif = self.gif_info(animation).await;
+                let is_current = generation_of(gif.as_ref()) == Some(manifest.head.generation.as_str());
+                if manifest.head.status == wanted && (wanted != Status::Done || is_current) {
+                    break;
+                }
+            }
+            if start.elapsed() > PATIENCE {
+                let manifest = self.manifest(animation).await;
+                panic!("{animation} is not {wanted:?}: {manifest:#?}\n{}", self.story());
+            }
+            tokio::time::sleep(Duration::from_millis(25)).await;
+        }
+        self.settle().await;
+        let manifest = self.manifest(animation).await.unwrap();
+        assert_eq!(manifest.head.status, wanted, "it did not stay so");
+        manifest
+    }
+
+    /// The animation is done, its GIF has exactly the bytes that these scripts give locally.
+    pub async fn until_gif_of(&mut self, animation: &str, files: &[(&str, String)]) -> Manifest {
+        let manifest = self.until(animation, Status::Done).await;
+        assert!(self.gif(animation).await == locally(files), "the GIF of {animation} is not the local one");
+        manifest
+    }
+
+    /// What was seen since the last look.
+    pub fn seen(&mut self) -> Vec<Observation> {
+        std::iter::from_fn(|| self.seen.try_recv().ok()).collect()
+    }
+
+    /// The next observation.
+    pub async fn next(&mut self) -> Observation {
+        tokio::time::timeout(PATIENCE, self.seen.recv()).await.expect("something happens").unwrap()
+    }
+
+    /// What was seen, for a person who has to find out why a test failed.
+    pub fn story(&mut self) -> String {
+        let lines = self.seen().into_iter().map(|observation| match observation.seen {
+            Seen::Event { name, key, .. } => format!("event {name} {key}"),
+            Seen::Started(attempt) => format!("started {attempt:?}"),
+            Seen::Finished { attempt, outcome, .. } => format!("finished {} {outcome:?}", attempt.request_id),
+            Seen::Requested { attempt, request } => format!("  {} {request:?}", attempt.request_id),
+            Seen::Log { line, .. } => format!("  log {line}"),
+            Seen::DeadLetter { body } => format!("dead letter {body}"),
+        });
+        lines.collect::<Vec<_>>().join("\n")
+    }
+}
+
+/// How many frames were drawn.
+pub fn drawn(seen: &[Observation]) -> usize {
+    outcomes(seen).get("drawn").copied().unwrap_or(0)
+}
+
+/// How many GIFs were built.
+pub fn built(seen: &[Observation]) -> u64 {
+    logged(seen).iter().filter_map(|line| line["built"].as_u64()).sum()
+}
+
+/// The outcomes that render logged, by how often.
+pub fn outcomes(seen: &[Observation]) -> BTreeMap<String, usize> {
+    let mut outcomes = BTreeMap::new();
+    for line in logged(seen).iter().filter(|line| line["message"] == "rendered") {
+        *outcomes.entry(line["outcome"].as_str().unwrap().to_owned()).or_default() += 1;
+    }
+    outcomes
+}
+
+/// What the functions logged.
+pub fn logged(seen: &[Observation]) -> Vec<serde_json::Value> {
+    let lines = seen.iter().filter_map(|observation| match &observation.seen {
+        Seen::Log { line, .. } => Some(line),
+        _ => None,
+    });
+    lines.map(|line| serde_json::from_str(line).unwrap_or_else(|_| panic!("no JSON: {line}"))).collect()
+}
+
+/// Requests of a function's invocations, one by one.
+pub fn requests(seen: &[Observation], of: Function) -> Vec<Requests> {
+    let ended = seen.iter().filter_map(|observation| match &observation.seen {
+        Seen::Finished { attempt, requests, .. } if attempt.function == of => Some(*requests),
+        _ => None,
+    });
+    ended.collect()
+}
+
+/// A small scene that differs by `x`.
+pub fn scene(x: f64) -> String {
+    format!(
+        "Screen 24 18\nBackground .1 .2 .3\nSphere 6 {x} 9 -9 .2 .2 .2 .7 .6 .5\nIlight 1 1 1 .2 -.3 -1\nTrace\n"
+    )
+}
+
+/// `animation.json` that waits for this many frames.
+pub fn frames(count: usize) -> (&'static str, String) {
+    ("animation.json", format!("{{\"frames\": {count}}}"))
+}
+
+/// The GIF that the scripts give without any bucket: parsed, traced and encoded right here.
+pub fn locally(files: &[(&str, String)]) -> Vec<u8> {
+    let limits = Limits::default();
+    let mut settings = AnimationSettings::default();
+    let mut scripts = Vec::new();
+    for (name, text) in files {
+        if *name == "animation.json" {
+            settings = parse_settings(name, text.as_bytes()).settings.unwrap();
+        } else {
+            scripts.push((*name, parse(name, text.as_bytes(), &limits).script.unwrap()));
+        }
+    }
+    scripts.sort_by(|(a, _), (b, _)| natural_cmp(a, b));
+    let mut gif = Vec::new();
+    let settings = rayfold_gif::Settings { fps: settings.fps(), loops: settings.loops() };
+    let mut encoder = rayfold_gif::Encoder::new(&mut gif, settings).unwrap();
+    for (_, script) in &scripts {
+        for scene in script.frames() {
+            let options = rayfold_tracer::RenderOptions::default();
+            encoder.push(rayfold_tracer::render(&scene, &options).unwrap()).unwrap();
+        }
+    }
+    encoder.finish().unwrap();
+    gif
+}
