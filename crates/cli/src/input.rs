@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context;
-use rayfold_scene::{Limits, Parsed, natural_cmp};
+use rayfold_scene::{Limits, Parsed, natural_cmp, script_name};
 
 use crate::outcome::Usage;
 
@@ -154,7 +154,7 @@ fn folder(path: &Path) -> anyhow::Result<Input> {
     if scripts.is_empty() {
         anyhow::bail!("the folder {shown} holds no scene scripts (*.txt)");
     }
-    scripts.sort_by(|(a, _), (b, _)| natural_cmp(a, b));
+    scripts.sort_by(|(a, _), (b, _)| natural_cmp(script_name(a).unwrap_or(a), script_name(b).unwrap_or(b)));
     Ok(Input { scripts: scripts.into_iter().map(|(_, script)| script).collect(), settings })
 }
 

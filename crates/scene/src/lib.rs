@@ -30,7 +30,7 @@ pub use model::{
     Camera, Cuboid, DirectionalLight, InvalidValue, Light, Material, Object, Parameter, Pinhole, Scene,
     Screen, Sphere, Triangle,
 };
-pub use natural::natural_cmp;
+pub use natural::{SETTINGS_FILE, natural_cmp, script_name};
 pub use parse::{Parsed, parse};
 pub use script::Script;
 pub use settings::{AnimationSettings, ParsedSettings, parse_settings};

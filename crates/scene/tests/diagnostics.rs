@@ -513,11 +513,13 @@ fn a_script_larger_than_the_limit() {
         "Screen 4 3\nTrace\n",
         limits,
         expect![[r#"
-            error: the script has 17 bytes, the limit is 16
+            error: the script is larger than 16 bytes
              --> a.txt:1:1
               |
             1 | Screen 4 3
-              | ^ expected a smaller script"#]],
+              | ^ expected a smaller script
+              |
+              = help: split it into several scripts or raise the limit"#]],
     );
 }
 

@@ -41,10 +41,9 @@ pub struct Parsed {
 /// The `Trace` commands become the frames of the script; there is at least one.
 pub fn parse(name: &str, bytes: &[u8], limits: &Limits) -> Parsed {
     let mut report = Report::new(name, limits.max_described);
-    let size = bytes.len();
-    if size > limits.max_script_bytes {
+    if bytes.len() > limits.max_script_bytes {
         if let Some(line) = lines(bytes).next() {
-            report.error(line, 0..0, || wording::too_large(size, limits.max_script_bytes));
+            report.error(line, 0..0, || wording::too_large(limits.max_script_bytes));
         }
     } else if let Some(mark @ (b"\xff\xfe" | b"\xfe\xff")) = bytes.get(..2) {
         report.error(Line { number: 1, offset: 0, bytes: mark }, 0..2, wording::utf16);

@@ -10,10 +10,11 @@ use crate::report::{Fault, grouped, quoted};
 /// What `Trace` is for.
 const TRACE_HELP: &str = "`Trace` renders a frame of everything that stands before it";
 
-pub(super) fn too_large(size: usize, limit: usize) -> Fault {
-    let [size, limit] = [size, limit].map(|bytes| grouped(bytes as u64));
-    Fault::new(Code::TextTooLarge, format!("the script has {size} bytes, the limit is {limit}"))
+pub(super) fn too_large(limit: usize) -> Fault {
+    let limit = grouped(limit as u64);
+    Fault::new(Code::TextTooLarge, format!("the script is larger than {limit} bytes"))
         .expected("expected a smaller script")
+        .help("split it into several scripts or raise the limit")
 }
 
 pub(super) fn utf16() -> Fault {
