@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::cloud::{fetch, remove, retry, status, submit};
 use crate::console::{Color, Console};
 use crate::outcome::{Outcome, exit_code};
 use crate::{check, completions, cost, interrupt, render, split};
@@ -48,6 +49,11 @@ enum Command {
     Check(check::Args),
     Split(split::Args),
     Cost(cost::Args),
+    Submit(submit::Args),
+    Status(status::Args),
+    Fetch(fetch::Args),
+    Retry(retry::Args),
+    Remove(remove::Args),
     Completions(completions::Args),
 }
 
@@ -58,6 +64,11 @@ impl Command {
             Self::Check(args) => check::run(&args, console),
             Self::Split(args) => split::run(&args, console),
             Self::Cost(args) => cost::run(&args, console),
+            Self::Submit(args) => submit::run(&args, console),
+            Self::Status(args) => status::run(&args, console),
+            Self::Fetch(args) => fetch::run(&args, console),
+            Self::Retry(args) => retry::run(&args, console),
+            Self::Remove(args) => remove::run(&args, console),
             Self::Completions(args) => completions::run(&args, console),
         }
     }

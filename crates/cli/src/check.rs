@@ -9,8 +9,9 @@ use serde::Serialize;
 use crate::console::{Console, describe};
 use crate::input::{Input, SETTINGS};
 use crate::outcome::Outcome;
-use crate::survey::{Faults, number, parse_all};
+use crate::survey::{Faults, parse_all};
 use crate::threads::Threads;
+use crate::wording::number;
 
 /// Show what is wrong with scripts, without rendering them
 #[derive(Debug, clap::Args)]
@@ -113,12 +114,12 @@ fn tell(faults: &Faults, frames: usize, console: &Console) {
     faults.show(console);
     let warnings = match faults.warnings() {
         0 => String::new(),
-        n => format!(", {}", number(n, "warning")),
+        n => format!(", {}", number(n as u64, "warning")),
     };
     if faults.bad > 0 {
         console.note(format_args!("{}{warnings}", faults.count()));
     } else {
-        let files = number(faults.files, "file");
-        console.note(format_args!("{files}, {}: no errors{warnings}", number(frames, "frame")));
+        let files = number(faults.files as u64, "file");
+        console.note(format_args!("{files}, {}: no errors{warnings}", number(frames as u64, "frame")));
     }
 }

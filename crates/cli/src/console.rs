@@ -67,8 +67,16 @@ impl Console {
 
     /// An error and its causes, on one line: `error: cannot read a.txt: permission denied`.
     pub(crate) fn error(&self, error: &anyhow::Error) {
-        let label = if self.color { "\x1b[1;31merror\x1b[0m" } else { "error" };
-        self.say(format_args!("{label}: {}", describe(error)));
+        self.say(format_args!("{}: {}", self.label(), describe(error)));
+    }
+
+    /// An error that was found elsewhere: `error: <what>: <why>`.
+    pub(crate) fn fault(&self, what: &str, why: &str) {
+        self.say(format_args!("{}: {what}: {why}", self.label()));
+    }
+
+    fn label(&self) -> &'static str {
+        if self.color { "\x1b[1;31merror\x1b[0m" } else { "error" }
     }
 
     /// Diagnostics and other text that must be seen. There is nowhere left to report that standard error is gone.

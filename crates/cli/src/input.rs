@@ -144,7 +144,7 @@ fn folder(path: &Path) -> anyhow::Result<Input> {
         let name = entry.file_name().to_string_lossy().into_owned();
         if name == SETTINGS {
             settings = Some(path);
-        } else if is_script_name(&name) && !path.is_dir() {
+        } else if name.ends_with(".txt") && !path.is_dir() {
             scripts.push((name, ScriptFile::at(path)));
         }
     }
@@ -156,9 +156,4 @@ fn folder(path: &Path) -> anyhow::Result<Input> {
     }
     scripts.sort_by(|(a, _), (b, _)| natural_cmp(script_name(a).unwrap_or(a), script_name(b).unwrap_or(b)));
     Ok(Input { scripts: scripts.into_iter().map(|(_, script)| script).collect(), settings })
-}
-
-/// Whether a file of a folder is one of its scripts. Hidden files are what editors and file managers leave behind.
-fn is_script_name(name: &str) -> bool {
-    name.ends_with(".txt") && !name.starts_with('.')
 }

@@ -8,6 +8,7 @@ use std::process::ExitCode;
 
 mod app;
 mod check;
+mod cloud;
 mod completions;
 mod console;
 mod cost;
@@ -15,11 +16,13 @@ mod input;
 mod interrupt;
 mod outcome;
 mod output;
+mod plan;
 mod progress;
 mod render;
 mod split;
 mod survey;
 mod threads;
+mod wording;
 
 fn main() -> ExitCode {
     app::run(std::env::args_os())

@@ -40,6 +40,14 @@ impl Progress {
         Self { of, total, done: 0, start, shown }
     }
 
+    /// There turn out to be more, or fewer.
+    pub(crate) fn resize(&mut self, total: u64) {
+        self.total = total;
+        if let Shown::Bar(bar) = &self.shown {
+            bar.set_length(total);
+        }
+    }
+
     /// Sets how many are done.
     pub(crate) fn set(&mut self, console: &Console, done: u64) {
         self.done = done;

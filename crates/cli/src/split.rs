@@ -11,7 +11,8 @@ use crate::input::{Input, SETTINGS};
 use crate::interrupt;
 use crate::outcome::Outcome;
 use crate::output::OutputFile;
-use crate::survey::{Faults, number};
+use crate::survey::Faults;
+use crate::wording::number;
 
 /// Split a script with many Traces into one script a frame
 ///
@@ -57,7 +58,11 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         OutputFile::write(folder.join(name(number)), scene.to_string().as_bytes(), false)?;
     }
     let first = folder.join(name(1));
-    console.note(format_args!("{}: {} and on", number(script.frame_count(), "script"), first.display()));
+    console.note(format_args!(
+        "{}: {} and on",
+        number(script.frame_count() as u64, "script"),
+        first.display()
+    ));
     Ok(Outcome::Done)
 }
 

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use crate::console::Console;
 use crate::input::ScriptFile;
 use crate::interrupt;
+use crate::wording::number;
 
 /// What is wrong with a number of scripts, in their order.
 #[derive(Debug, Default)]
@@ -97,14 +98,9 @@ impl Faults {
 
     /// `3 errors in 2 of 50 files`.
     pub(crate) fn count(&self) -> String {
-        let errors = number(self.errors(), "error");
+        let errors = number(self.errors() as u64, "error");
         if self.files == 1 { errors } else { format!("{errors} in {} of {} files", self.bad, self.files) }
     }
-}
-
-/// `1 frame`, `2 frames`.
-pub(crate) fn number(count: usize, of: &str) -> String {
-    format!("{count} {of}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Parses all scripts side by side and takes each to what `map` makes of it, in their order.

@@ -19,15 +19,14 @@ use crate::input::Input;
 use crate::interrupt;
 use crate::outcome::{Outcome, Usage};
 use crate::output::{OutputError, OutputFile, probe};
+use crate::plan::{Job, Plan, Wishes};
 use crate::progress::Progress;
-use crate::survey::number;
 use crate::threads::Threads;
+use crate::wording::{Size, number};
 
 mod ahead;
-mod plan;
-mod target;
+pub(crate) mod target;
 
-use plan::{Job, Plan, Wishes};
 use target::{Format, Pattern, Target};
 
 /// Render scripts to an animation, to one image, or to many
@@ -159,7 +158,7 @@ fn tell(path: &Path, summary: &Summary, settings: &AnimationSettings, took: Dura
     console.note(format_args!(
         "{}: {} of {} x {}, {}, in {:.2} s",
         path.display(),
-        number(summary.frames as usize, "frame"),
+        number(summary.frames, "frame"),
         summary.size.0,
         summary.size.1,
         Size(summary.bytes),
@@ -168,7 +167,7 @@ fn tell(path: &Path, summary: &Summary, settings: &AnimationSettings, took: Dura
     if summary.dropped > 0 {
         console.note(format_args!(
             "{} left out: a GIF shows at most 50 frames a second, not {}",
-            number(summary.dropped as usize, "frame"),
+            number(summary.dropped, "frame"),
             settings.fps()
         ));
     }
@@ -213,15 +212,13 @@ fn images(pattern: &Pattern, format: Format, plan: &Plan, console: &Console) -> 
         },
     );
     let took = progress.finish().as_secs_f64();
-    written.with_context(|| {
-        format!("{} of {} written", files.into_inner(), number(plan.len() as usize, "frame"))
-    })?;
+    written.with_context(|| format!("{} of {} written", files.into_inner(), number(plan.len(), "frame")))?;
     let path = |job: Option<Job>| pattern.path(job.map_or(1, |job| job.number));
     console.note(format_args!(
         "{} to {}: {}, {}, in {took:.2} s",
         path(plan.jobs().next()).display(),
         path(plan.jobs().last()).display(),
-        number(plan.len() as usize, "frame"),
+        number(plan.len(), "frame"),
         Size(bytes)
     ));
     Ok(())
@@ -232,20 +229,6 @@ fn draw(plan: &Plan, job: &Job) -> anyhow::Result<RgbImage> {
     let scene = plan.scene(job)?;
     rayfold_tracer::render(&scene, &RenderOptions { cancel: Some(interrupt::flag()) })
         .with_context(|| format!("cannot render frame {} ({})", job.number, plan.name(job)))
-}
-
-/// Bytes as people read them.
-struct Size(u64);
-
-impl std::fmt::Display for Size {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self.0 {
-            n @ 0..1000 => write!(f, "{n} bytes"),
-            n @ 1000..1_000_000 => write!(f, "{:.1} kB", n as f64 / 1e3),
-            n @ 1_000_000..1_000_000_000 => write!(f, "{:.1} MB", n as f64 / 1e6),
-            n => write!(f, "{:.1} GB", n as f64 / 1e9),
-        }
-    }
 }
 
 /// Width and height, as `640x480`.
@@ -292,11 +275,5 @@ mod tests {
         for wrong in ["", "640", "640x", "0x480", "640x480x3", "-1x2", "6.4x3"] {
             assert!(parse_size(wrong).is_err(), "{wrong}");
         }
-    }
-
-    #[test]
-    fn bytes_are_rounded_for_people() {
-        assert_eq!(Size(999).to_string(), "999 bytes");
-        assert_eq!(Size(1_234_567).to_string(), "1.2 MB");
     }
 }

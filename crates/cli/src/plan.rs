@@ -11,7 +11,8 @@ use rayfold_scene::{AnimationSettings, Camera, Limits, Scene, Screen, Script};
 
 use crate::console::Console;
 use crate::input::{Input, SETTINGS, ScriptFile};
-use crate::survey::{Faults, number, parse_all};
+use crate::survey::{Faults, parse_all};
+use crate::wording::number;
 
 /// Bytes of text of which the parsed scripts are kept; they take about as much again.
 const KEPT_TEXT: usize = 64 << 20;
@@ -69,9 +70,9 @@ pub(crate) struct Wishes {
 /// Why the frames cannot be drawn although each script is fine by itself.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PlanError {
-    #[error("the input has {}: there is no frame {wanted}", number(*.frames as usize, "frame"))]
+    #[error("the input has {}: there is no frame {wanted}", number(*.frames, "frame"))]
     NoSuchFrame { frames: u64, wanted: u64 },
-    #[error("{SETTINGS} says {}, but the scripts give {frames}", number(*.expected as usize, "frame"))]
+    #[error("{SETTINGS} says {}, but the scripts give {frames}", number(*.expected, "frame"))]
     TooFew { frames: u64, expected: u64 },
     #[error(
         "--size needs a pinhole camera: frame {frame} ({name}) is drawn by Orthocamera, whose pixels are world units"

@@ -1,0 +1,80 @@
+//! What a manifest says, for people.
+
+use rayfold_pipeline::manifest::{Fault, Frame, FrameState, Manifest, Reason, Status};
+
+use crate::console::Console;
+use crate::wording::number;
+
+/// A status as a word.
+pub(crate) fn word(status: Status) -> &'static str {
+    match status {
+        Status::Empty => "empty",
+        Status::Waiting => "waiting",
+        Status::Rendering => "rendering",
+        Status::Failed => "failed",
+        Status::Refused => "refused",
+        Status::Done => "done",
+    }
+}
+
+/// `48 of 50 frames, 2 failed`.
+pub(crate) fn count(manifest: &Manifest) -> String {
+    let head = &manifest.head;
+    let mut text = format!("{} of {}", head.done, number(head.total + missing_scripts(manifest), "frame"));
+    if head.failed > 0 {
+        text += &format!(", {} failed", head.failed);
+    }
+    text
+}
+
+/// Frames of scripts that have not been uploaded yet.
+fn missing_scripts(manifest: &Manifest) -> u64 {
+    manifest.head.missing() - manifest.head.pending
+}
+
+/// The script of a frame, and which of its frames it is.
+pub(crate) fn name(frame: &Frame) -> String {
+    match frame.part {
+        None => format!("{}.txt", frame.script),
+        Some(part) => format!("{}.txt, frame {part}", frame.script),
+    }
+}
+
+/// Everything that keeps the animation from being done, each with its reason.
+pub(crate) fn faults(manifest: &Manifest) -> Vec<(String, Option<&Reason>)> {
+    let mut faults = Vec::new();
+    if let Some(reason) = &manifest.head.settings.fault {
+        faults.push(("animation.json".to_owned(), Some(reason)));
+    }
+    for frame in &manifest.frames {
+        if let FrameState::Failed(Fault { reason, .. }) = &frame.state {
+            faults.push((name(frame), reason.as_ref()));
+        }
+    }
+    if let Some(Fault { reason, .. }) = &manifest.head.refusal {
+        faults.push((format!("the GIF of {}", manifest.head.animation), reason.as_ref()));
+    }
+    faults
+}
+
+/// Shows everything that keeps the animation from being done.
+pub(crate) fn show_faults(manifest: &Manifest, console: &Console) {
+    for rejected in &manifest.head.rejected {
+        console.fault(&rejected.key, &rejected.problem);
+    }
+    for (what, reason) in faults(manifest) {
+        let Some(reason) = reason else {
+            console.fault(&what, "no reason is known yet");
+            continue;
+        };
+        if reason.diagnostics.is_empty() {
+            console.fault(&what, &reason.message);
+        }
+        for diagnostic in &reason.diagnostics {
+            console.say(format_args!("{}\n", diagnostic.render(console.color)));
+        }
+        if reason.omitted > 0 {
+            console.fault(&what, &number(reason.omitted as u64, "more error"));
+        }
+    }
+}
