@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use rayfold_scene::{AnimationSettings, Camera, Limits, Scene, Screen, Script};
+use rayfold_tracer::Precision;
 
 use crate::console::Console;
 use crate::input::{Input, SETTINGS, ScriptFile};
@@ -29,6 +30,8 @@ pub(crate) struct Plan {
     selected: RangeInclusive<u64>,
     /// What the folder says about the animation.
     pub(crate) settings: AnimationSettings,
+    /// The numbers to compute with.
+    pub(crate) precision: Precision,
 }
 
 /// A frame to draw.
@@ -65,6 +68,8 @@ pub(crate) struct Wishes {
     pub(crate) size: Option<Screen>,
     /// First and last frame; beyond the ends of what there is, when they are not given.
     pub(crate) frames: (Option<u64>, Option<u64>),
+    /// The numbers to compute with.
+    pub(crate) precision: Precision,
 }
 
 /// Why the frames cannot be drawn although each script is fine by itself.
@@ -129,7 +134,14 @@ impl Plan {
         if let Some(wanted) = [first, last].into_iter().find(|n| *n < 1 || *n > frames) {
             return Err(PlanError::NoSuchFrame { frames, wanted }.into());
         }
-        let plan = Self { parts, limits: *limits, size: wishes.size, selected: first..=last, settings };
+        let plan = Self {
+            parts,
+            limits: *limits,
+            size: wishes.size,
+            selected: first..=last,
+            settings,
+            precision: wishes.precision,
+        };
         if plan.size.is_some()
             && let Some((frame, part, _)) = plan.runs().find(|(_, _, shape)| shape.orthographic)
         {

@@ -101,7 +101,7 @@ fn draw(file: &str, script: &[u8], part: Part, limits: &Limits, cancel: &AtomicB
     let Some(scene) = script.frame(place) else {
         return Ok(Drawing::Fault(Reason::new(format!("{file} has {count} frames, no frame {number}"))));
     };
-    match rayfold_tracer::render(&scene, &RenderOptions { cancel: Some(cancel) }) {
+    match rayfold_tracer::render(&scene, &RenderOptions { cancel: Some(cancel), ..Default::default() }) {
         Ok(image) => Ok(Drawing::Frame(encode(&image)?)),
         Err(RenderError::Cancelled) => {
             Err(Error::OutOfTime { what: format!("drawing {file} was cancelled") })

@@ -17,11 +17,15 @@
 //! ```
 
 mod camera;
+mod fast;
 mod parallel;
 pub mod reference;
 
+pub use fast::probe;
+
 use std::sync::atomic::AtomicBool;
 
+pub use fearless_simd::Level;
 use image::RgbImage;
 use rayfold_scene::Scene;
 
@@ -31,11 +35,33 @@ pub const PIXEL_VERSION: u32 = 1;
 /// How often light is mirrored before the mirror term is dropped.
 pub const MAX_BOUNCES: u32 = 5;
 
-/// How to render; the default renders to the end.
+/// The numbers that a picture is computed with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// `f32` where bounds on its rounding errors say that they cannot be seen, otherwise `f64`.
+    #[default]
+    Auto,
+    /// Single precision, about twice as fast.
+    F32,
+    /// Double precision.
+    F64,
+}
+
+/// How to render; the default renders to the end, as fast as the scene and the machine allow.
+///
+/// `level`, `tile` and `tree` change nothing that can be seen; they are there to prove it and to measure what they cost.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RenderOptions<'a> {
     /// Stops the rendering soon after it turns true.
     pub cancel: Option<&'a AtomicBool>,
+    /// The numbers to compute with.
+    pub precision: Precision,
+    /// The instructions to use; the best that the machine has when not set.
+    pub level: Option<Level>,
+    /// Columns and rows of the tiles that are drawn at once, multiples of 4 with a product of at most 256.
+    pub tile: Option<(u32, u32)>,
+    /// Whether to look for objects down a tree; always done for more than 64 objects.
+    pub tree: Option<bool>,
 }
 
 /// Why there is no image.
@@ -44,6 +70,9 @@ pub enum RenderError {
     /// The flag of [`RenderOptions::cancel`] was raised.
     #[error("rendering was cancelled")]
     Cancelled,
+    /// The coordinates are so large that their differences are not finite.
+    #[error("the scene is too vast: distances in it are not finite numbers")]
+    TooVast,
     /// The image does not fit into this machine's address space.
     #[error("an image of {width} x {height} pixels does not fit into memory")]
     TooLarge {
@@ -54,10 +83,18 @@ pub enum RenderError {
     },
 }
 
+/// The numbers that [`Precision::Auto`] chooses for a scene.
+///
+/// # Errors
+/// When the scene cannot be rendered at any precision.
+pub fn precision(scene: &Scene) -> Result<Precision, RenderError> {
+    fast::precision(scene)
+}
+
 /// Draws a scene, its first row at the top, on the current rayon pool.
 ///
 /// # Errors
 /// When the rendering was cancelled or the image cannot be held in memory.
 pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    reference::render(scene, options)
+    fast::render(scene, options)
 }

@@ -12,7 +12,7 @@ use anyhow::Context;
 use image::RgbImage;
 use rayfold_gif::{Encoder, Settings, Summary};
 use rayfold_scene::{AnimationSettings, Limits, Screen};
-use rayfold_tracer::RenderOptions;
+use rayfold_tracer::{Precision, RenderOptions};
 
 use crate::console::Console;
 use crate::input::Input;
@@ -60,6 +60,9 @@ pub(crate) struct Args {
     /// Draw frame N, or frames A to B, counted from 1
     #[arg(long, value_name = "N|A..B", value_parser = parse_frames)]
     frame: Option<Frames>,
+    /// The numbers to compute with; auto takes f32 where its errors cannot be seen
+    #[arg(long, value_name = "WHICH", value_parser = parse_precision, default_value = "auto")]
+    precision: Precision,
     #[command(flatten)]
     threads: Threads,
     /// The largest image that a script may ask for, in pixels
@@ -89,7 +92,8 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         .into());
     }
     args.threads.start()?;
-    let wishes = Wishes { size: args.size, frames: args.frame.unwrap_or_default() };
+    let wishes =
+        Wishes { size: args.size, frames: args.frame.unwrap_or_default(), precision: args.precision };
     match &target {
         Target::Gif(path) | Target::Image(path, _) => probe(path)?,
         Target::Images(pattern, _) => probe(&pattern.path(wishes.frames.0.unwrap_or(1)))?,
@@ -224,10 +228,21 @@ fn images(pattern: &Pattern, format: Format, plan: &Plan, console: &Console) -> 
     Ok(())
 }
 
+fn parse_precision(text: &str) -> Result<Precision, String> {
+    match text {
+        "auto" => Ok(Precision::Auto),
+        "f32" => Ok(Precision::F32),
+        "f64" => Ok(Precision::F64),
+        _ => Err("expected auto, f32 or f64".into()),
+    }
+}
+
 fn draw(plan: &Plan, job: &Job) -> anyhow::Result<RgbImage> {
     anyhow::ensure!(!interrupt::stopping(), "interrupted");
     let scene = plan.scene(job)?;
-    rayfold_tracer::render(&scene, &RenderOptions { cancel: Some(interrupt::flag()) })
+    let options =
+        RenderOptions { cancel: Some(interrupt::flag()), precision: plan.precision, ..Default::default() };
+    rayfold_tracer::render(&scene, &options)
         .with_context(|| format!("cannot render frame {} ({})", job.number, plan.name(job)))
 }
 

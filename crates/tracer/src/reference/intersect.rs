@@ -162,7 +162,7 @@ fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
 }
 
 /// Unit normal; zero where the area is nothing but rounding error.
-fn triangle_normal(triangle: &Triangle) -> DVec3 {
+pub(crate) fn triangle_normal(triangle: &Triangle) -> DVec3 {
     let [a, b, c] = *triangle.vertices();
     let (p, q) = (b - a, c - a);
     let normal = DVec3::new(

@@ -22,6 +22,7 @@ use image::RgbImage;
 use rayfold_scene::{Light, Object, Scene, model::unit};
 
 pub use intersect::Surface;
+pub(crate) use intersect::triangle_normal;
 
 use crate::camera::{Ray, Rays};
 use crate::parallel::{CHANNELS, bands};
@@ -103,7 +104,7 @@ fn color_along(scene: &Scene, ray: Ray, bounces: u32) -> DVec3 {
 }
 
 /// Display values to the levels of a channel.
-fn levels(color: DVec3) -> [u8; CHANNELS] {
+pub(crate) fn levels(color: DVec3) -> [u8; CHANNELS] {
     color.to_array().map(|channel| (255.0 * channel.clamp(0.0, 1.0)).round() as u8)
 }
 
@@ -172,7 +173,7 @@ mod tests {
     #[test]
     fn a_raised_flag_stops_the_rendering() {
         let flag = AtomicBool::new(true);
-        let options = RenderOptions { cancel: Some(&flag) };
+        let options = RenderOptions { cancel: Some(&flag), ..Default::default() };
         assert!(matches!(render(&one_pixel(vec![], None), &options), Err(RenderError::Cancelled)));
     }
 }

@@ -1,0 +1,191 @@
+//! A scene in the coordinates that the kernels work in.
+//!
+//! The origin is brought to the eye, so that numbers are as small as what is seen is near, and lengths are scaled by a
+//! power of two, so that everything lies in -1..=1: no product overflows, and a scene scaled by a power of two is the
+//! same scene bit for bit. All of it is `f64`; nothing here knows how precise the kernels are.
+
+use glam::DVec3;
+use rayfold_scene::model::unit;
+use rayfold_scene::{Camera, Light, Object, Scene, Screen};
+
+use crate::RenderError;
+
+/// The shape of an object.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Shape {
+    Sphere { center: DVec3, radius: f64 },
+    Cuboid { min: DVec3, max: DVec3 },
+    Triangle { vertices: [DVec3; 3], normal: DVec3 },
+}
+
+/// An object and its position in the script.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Solid {
+    pub(super) shape: Shape,
+    pub(super) order: usize,
+}
+
+/// Where the rays of the pixels come from.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum View {
+    /// The eye is the origin; `right`, `up` and `back` are orthonormal. The ray of column `i` and row `j` (from the
+    /// bottom) goes along `(x.0 + i·x.1)·right + (y.0 + j·y.1)·up - back`.
+    Pinhole { right: DVec3, up: DVec3, back: DVec3, x: (f64, f64), y: (f64, f64) },
+    /// The ray starts at `corner + (i·pixel, j·pixel, 0)` and goes along `(0, 0, -1)`.
+    Parallel { corner: DVec3, pixel: f64 },
+}
+
+/// A light at infinity: the unit vector towards it, and its colour.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sun {
+    pub(super) towards: DVec3,
+    pub(super) color: DVec3,
+}
+
+/// A scene, recentred and scaled.
+#[derive(Clone, Debug)]
+pub(super) struct Geometry {
+    pub(super) view: View,
+    pub(super) solids: Vec<Solid>,
+    pub(super) suns: Vec<Sun>,
+    /// A length of the scene times this is a length in here.
+    pub(super) scale: f64,
+    /// What the scene calls its origin's opposite: `(point - center) * scale` is a point in here.
+    pub(super) center: DVec3,
+}
+
+impl Geometry {
+    /// # Errors
+    /// When the scene is so large that its size is not a number.
+    pub(super) fn new(scene: &Scene) -> Result<Self, RenderError> {
+        let center = match &scene.camera {
+            Camera::Pinhole(pinhole) => pinhole.eye(),
+            Camera::Orthographic => middle(scene.screen),
+        };
+        let reach = scene.objects.iter().map(|object| reach(object, center)).fold(0.0, f64::max);
+        let reach = match scene.camera {
+            Camera::Pinhole(_) => reach,
+            Camera::Orthographic => reach.max(center.max_element()),
+        };
+        if !reach.is_finite() {
+            return Err(RenderError::TooVast);
+        }
+        let scale = power_of_two_below_inverse(reach);
+        let view = view(scene, scale);
+        let place = |point: DVec3| (point - center) * scale;
+        let solids = scene.objects.iter().enumerate();
+        let solids =
+            solids.filter_map(|(order, object)| Some(Solid { shape: shape(object, place, scale)?, order }));
+        let suns = scene
+            .lights
+            .iter()
+            .map(|Light::Directional(light)| Sun { towards: -unit(light.direction()), color: light.color() });
+        Ok(Self { view, solids: solids.collect(), suns: suns.collect(), scale, center })
+    }
+}
+
+impl Geometry {
+    /// The box of all solids.
+    pub(super) fn whole(&self) -> Solid {
+        let nothing = (DVec3::ZERO, DVec3::ZERO);
+        let join = |a: (DVec3, DVec3), b: (DVec3, DVec3)| (a.0.min(b.0), a.1.max(b.1));
+        let (min, max) = self.solids.iter().map(Solid::bounds).reduce(join).unwrap_or(nothing);
+        Solid { shape: Shape::Cuboid { min, max }, order: 0 }
+    }
+}
+
+impl Solid {
+    /// Masks count the kinds one after another: spheres, boxes, triangles.
+    pub(super) fn kind_rank(&self) -> u8 {
+        match self.shape {
+            Shape::Sphere { .. } => 0,
+            Shape::Cuboid { .. } => 1,
+            Shape::Triangle { .. } => 2,
+        }
+    }
+
+    /// The least box around it.
+    pub(super) fn bounds(&self) -> (DVec3, DVec3) {
+        match self.shape {
+            Shape::Sphere { center, radius } => (center - radius, center + radius),
+            Shape::Cuboid { min, max } => (min, max),
+            Shape::Triangle { vertices: [a, b, c], .. } => (a.min(b).min(c), a.max(b).max(c)),
+        }
+    }
+
+    /// The largest coordinate of its points, at least: what its rounding errors are relative to.
+    pub(super) fn magnitude(&self) -> f64 {
+        let (min, max) = self.bounds();
+        min.abs().max(max.abs()).max_element()
+    }
+
+    /// How far the solid reaches along `direction`: the largest `direction · point`.
+    pub(super) fn support(&self, direction: DVec3) -> f64 {
+        match self.shape {
+            Shape::Sphere { center, radius } => direction.dot(center) + radius * direction.length(),
+            Shape::Cuboid { min, max } => (direction * min).max(direction * max).element_sum(),
+            Shape::Triangle { vertices, .. } => {
+                vertices.iter().map(|v| direction.dot(*v)).fold(f64::NEG_INFINITY, f64::max)
+            }
+        }
+    }
+}
+
+fn middle(screen: Screen) -> DVec3 {
+    DVec3::new(f64::from(screen.width()), f64::from(screen.height()), 0.0) / 2.0
+}
+
+/// The largest distance along an axis from `center` to a point of the object.
+fn reach(object: &Object, center: DVec3) -> f64 {
+    let from = |point: DVec3| (point - center).abs().max_element();
+    match object {
+        Object::Sphere(sphere) => from(sphere.center()) + sphere.radius(),
+        Object::Cuboid(cuboid) => from(cuboid.min()).max(from(cuboid.max())),
+        Object::Triangle(triangle) => triangle.vertices().iter().map(|v| from(*v)).fold(0.0, f64::max),
+    }
+}
+
+/// The largest power of two whose product with `x` is at most 1; 1 for zero. Neither it nor its inverse overflows.
+fn power_of_two_below_inverse(x: f64) -> f64 {
+    if x == 0.0 {
+        return 1.0;
+    }
+    // From the bits, not by a logarithm: it must double exactly when x does.
+    let exponent = ((x.to_bits() >> 52) & 0x7ff) as i32 - 1022;
+    2f64.powi(-exponent.clamp(-1000, 1000))
+}
+
+fn shape(object: &Object, place: impl Fn(DVec3) -> DVec3, scale: f64) -> Option<Shape> {
+    Some(match object {
+        Object::Sphere(sphere) => {
+            Shape::Sphere { center: place(sphere.center()), radius: sphere.radius() * scale }
+        }
+        Object::Cuboid(cuboid) => Shape::Cuboid { min: place(cuboid.min()), max: place(cuboid.max()) },
+        Object::Triangle(triangle) => {
+            let vertices = triangle.vertices().map(&place);
+            // Its own size decides whether it has an area, wherever it lies.
+            let normal = crate::reference::triangle_normal(triangle);
+            if normal == DVec3::ZERO {
+                return None;
+            }
+            Shape::Triangle { vertices, normal }
+        }
+    })
+}
+
+fn view(scene: &Scene, scale: f64) -> View {
+    let axis = |from: f64, to: f64, samples: u32| {
+        if samples == 1 { (0.5 * from + 0.5 * to, 0.0) } else { (from, (to - from) / f64::from(samples - 1)) }
+    };
+    match &scene.camera {
+        Camera::Orthographic => View::Parallel { corner: -middle(scene.screen) * scale, pixel: scale },
+        Camera::Pinhole(pinhole) => {
+            let (right, up, back) = pinhole.basis();
+            let from = pinhole.lower_left() / pinhole.distance();
+            let to = pinhole.upper_right() / pinhole.distance();
+            let x = axis(from.x, to.x, scene.screen.width());
+            let y = axis(from.y, to.y, scene.screen.height());
+            View::Pinhole { right, up, back, x, y }
+        }
+    }
+}

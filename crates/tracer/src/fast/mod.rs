@@ -1,0 +1,246 @@
+//! The tracer that pictures are made with: packets of rays, by tiles, with the machine's widest instructions.
+//!
+//! It draws what [`crate::reference`] draws, at most one level apart but for isolated pixels, and the same picture bit
+//! for bit for any tile size, number of threads and width of fused multiply-add. It knows the scene only as
+//! [`geometry`] has recentred and scaled it.
+
+/// Compiles an expression for every instruction set that has kernels, and evaluates the one for `level`.
+#[cfg(target_arch = "x86_64")]
+macro_rules! on {
+    (narrow $level:expr, $simd:ident => $work:expr) => {
+        if let Some($simd) = $level.as_sse4_2() {
+            fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $work,
+            )
+        } else {
+            unreachable!("asked for kernels that this machine has not")
+        }
+    };
+    ($level:expr, $simd:ident => $work:expr) => {
+        if let Some($simd) = $level.as_avx512() {
+            fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $work,
+            )
+        } else if let Some($simd) = $level.as_avx2() {
+            fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $work,
+            )
+        } else {
+            on!(narrow $level, $simd => $work)
+        }
+    };
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+macro_rules! on {
+    ($level:expr, $simd:ident => $work:expr) => {
+        fearless_simd::dispatch!($level, $simd => $work)
+    };
+}
+
+mod geometry;
+mod intersect;
+mod precision;
+mod prepare;
+pub mod probe;
+mod real;
+mod search;
+mod tile;
+mod tree;
+mod window;
+
+use fearless_simd::{Level, Simd};
+use image::RgbImage;
+use rayfold_scene::Scene;
+
+use crate::parallel::{CHANNELS, bands};
+use crate::{Precision, RenderError, RenderOptions};
+use geometry::{Geometry, Solid};
+use prepare::{MASKED, Prepared};
+use real::Real;
+use search::Features;
+use tile::{Band, Scratch, Tile};
+use window::Window;
+
+/// Columns and rows of a tile.
+const SIDE: (u32, u32) = (16, 16);
+
+/// Draws a scene.
+///
+/// # Errors
+/// Those of [`crate::render`].
+pub(crate) fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
+    if !has_kernels(options) {
+        return crate::reference::render(scene, options);
+    }
+    let geometry = Geometry::new(scene)?;
+    let precision = match options.precision {
+        Precision::Auto => precision::choose(&geometry, (scene.screen.width(), scene.screen.height())),
+        forced => forced,
+    };
+    match precision {
+        Precision::F64 => draw::<f64>(scene, &geometry, options),
+        Precision::F32 | Precision::Auto => draw::<f32>(scene, &geometry, options),
+    }
+}
+
+/// Whether there are kernels for the instructions; the first 64-bit processors of the x86 line have none of use.
+#[cfg(target_arch = "x86_64")]
+fn has_kernels(options: &RenderOptions) -> bool {
+    options.level.unwrap_or_else(Level::new).as_sse4_2().is_some()
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn has_kernels(_: &RenderOptions) -> bool {
+    true
+}
+
+/// The precision that [`Precision::Auto`] stands for in a scene.
+pub(crate) fn precision(scene: &Scene) -> Result<Precision, RenderError> {
+    let geometry = Geometry::new(scene)?;
+    Ok(precision::choose(&geometry, (scene.screen.width(), scene.screen.height())))
+}
+
+fn draw<E: Kernels>(
+    scene: &Scene,
+    geometry: &Geometry,
+    options: &RenderOptions,
+) -> Result<RgbImage, RenderError> {
+    let plant = match options.tree {
+        Some(tree) => tree && !geometry.solids.is_empty() || geometry.solids.len() > MASKED,
+        None => geometry.solids.len() > MASKED,
+    };
+    let prepared = Prepared::<E>::new(scene, geometry, plant);
+    let size = (scene.screen.width(), scene.screen.height());
+    let side = options.tile.unwrap_or(SIDE);
+    let whole = geometry.whole();
+    let mut solids: Vec<&Solid> = if plant { vec![&whole] } else { geometry.solids.iter().collect() };
+    solids.sort_by_key(|solid| solid.kind_rank());
+    let window = Window::new(geometry, &solids, size, side, E::ROUNDOFF);
+    let background = crate::reference::levels(scene.background());
+    let level = options.level.unwrap_or_else(Level::new);
+    bands(scene.screen, side.1, options, |row, bytes| {
+        let band = Band { bytes, size, background };
+        E::draw(&Job { prepared: &prepared, window: &window, side, row }, level, band);
+    })
+}
+
+/// A row of tiles to draw.
+struct Job<'a, E> {
+    prepared: &'a Prepared<E>,
+    window: &'a Window,
+    /// Columns and rows of a tile.
+    side: (u32, u32),
+    /// The first row of pixels.
+    row: u32,
+}
+
+impl<E: Real> Job<'_, E> {
+    #[inline(always)]
+    fn draw<S: Simd, F: Features>(&self, simd: S, mut band: Band) {
+        let mut scratch = Scratch::<E>::new();
+        let (width, _) = band.size;
+        let height = (band.bytes.len() / (width as usize * CHANNELS)) as u32;
+        for (column, left) in (0..width).step_by(self.side.0 as usize).enumerate() {
+            let tile = Tile {
+                left,
+                top: self.row,
+                width: self.side.0.min(width - left),
+                height,
+                candidates: self.window.candidates(column, (self.row / self.side.1) as usize),
+            };
+            tile::draw::<S, E, F>(simd, self.prepared, tile, &mut scratch, &mut band);
+        }
+    }
+}
+
+/// Which kernels are compiled for a kind of number.
+trait Kernels: Real {
+    fn draw(job: &Job<Self>, level: Level, band: Band);
+}
+
+impl Kernels for f64 {
+    fn draw(job: &Job<f64>, level: Level, band: Band) {
+        on!(level, simd => job.draw::<_, Everything>(simd, band));
+    }
+}
+
+impl Kernels for f32 {
+    #[cfg(target_arch = "x86_64")]
+    fn draw(job: &Job<f32>, level: Level, band: Band) {
+        if let Some(simd) = level.as_avx512() {
+            job.draw_by_kernel(simd, band);
+        } else if let Some(simd) = level.as_avx2() {
+            job.draw_by_kernel(simd, band);
+        } else {
+            // Such machines are old, and few: one kernel will do for them.
+            on!(narrow level, simd => job.draw::<_, Everything>(simd, band));
+        }
+    }
+
+    #[cfg(not(target_arch = "x86_64"))]
+    fn draw(job: &Job<f32>, level: Level, band: Band) {
+        on!(level, simd => job.draw_by_kernel(simd, band));
+    }
+}
+
+impl Job<'_, f32> {
+    /// With the kernel that has just what the scene has.
+    #[inline(always)]
+    fn draw_by_kernel<S: Simd>(&self, simd: S, band: Band) {
+        let scene = self.prepared;
+        let balls = scene.cuboids.is_empty() && scene.triangles.is_empty();
+        match (scene.tree.is_some(), balls, scene.mirrors) {
+            (true, _, _) => simd.vectorize(
+                #[inline(always)]
+                || self.draw::<S, Everything>(simd, band),
+            ),
+            (false, false, _) => simd.vectorize(
+                #[inline(always)]
+                || self.draw::<S, Solids>(simd, band),
+            ),
+            (false, true, true) => simd.vectorize(
+                #[inline(always)]
+                || self.draw::<S, Mirrors>(simd, band),
+            ),
+            (false, true, false) => simd.vectorize(
+                #[inline(always)]
+                || self.draw::<S, Balls>(simd, band),
+            ),
+        }
+    }
+}
+
+macro_rules! kernels {
+    ($($(#[$doc:meta])* $name:ident: $cuboids:literal, $triangles:literal, $mirrors:literal, $tree:literal;)*) => {
+        $(
+            $(#[$doc])*
+            struct $name;
+
+            impl Features for $name {
+                const CUBOIDS: bool = $cuboids;
+                const TRIANGLES: bool = $triangles;
+                const MIRRORS: bool = $mirrors;
+                const TREE: bool = $tree;
+            }
+        )*
+    };
+}
+
+kernels! {
+    // boxes, triangles, mirrors, tree
+    /// Spheres that mirror nothing.
+    Balls: false, false, false, false;
+    /// Spheres, some of them mirrors.
+    Mirrors: false, false, true, false;
+    /// All kinds, as many as masks have bits.
+    Solids: true, true, true, false;
+    /// All kinds, any number.
+    Everything: true, true, true, true;
+}

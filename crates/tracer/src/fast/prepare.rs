@@ -1,0 +1,371 @@
+//! A scene as the kernels read it: arrays by kind, constants worked out in `f64` and rounded once.
+//!
+//! What is the same for all rays of a kind is computed here and not by lane: for rays from the eye and for rays
+//! towards a light the tests of spheres and triangles shrink to a few products with such constants.
+
+use glam::{DMat3, DVec3};
+use rayfold_scene::{Object, Scene};
+
+use super::geometry::{Geometry, Shape, Solid, Sun, View};
+use super::real::Real;
+use super::tree::{self, Tree};
+
+/// Rounding errors that add up on the way to a hit and to a shadow ray's test, in roundoffs of the largest coordinate;
+/// the offset of a new ray's origin exceeds them.
+pub(super) const OFFSET: f64 = 32.0;
+
+/// Rounding errors of an edge's side, in roundoffs of the sum of the products' magnitudes.
+const SIDE: f64 = 4.0;
+
+/// Rounding errors of bounds on where objects lie.
+pub(super) const BOUNDS: f64 = 16.0;
+
+/// Below this many roundoffs the sine of the angle between a ray and a triangle's plane is noise.
+pub(super) const GRAZING: f64 = 4.0;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sphere<E> {
+    pub(super) center: [E; 3],
+    /// r²
+    pub(super) square: E,
+    /// Position in the script.
+    pub(super) order: E,
+    /// |c|² - r² without cancellation: the power of the eye, for rays from there.
+    pub(super) power: E,
+    /// Distance from the centre at which rays leave its outside and its inside.
+    pub(super) outer: E,
+    pub(super) inner: E,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cuboid<E> {
+    pub(super) min: [E; 3],
+    pub(super) max: [E; 3],
+    pub(super) order: E,
+}
+
+/// Plücker coordinates of an edge: its direction and its moment, the cross product of its ends.
+///
+/// `d · moment + direction · (o × d)` tells on which side of the edge the ray from `o` along `d` passes, with an error
+/// below `slack.0 + slack.1 · |o|₁`: what is within the error belongs to the triangle, so that meshes have no cracks,
+/// neither along edges nor at vertices.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Edge<E> {
+    pub(super) direction: [E; 3],
+    pub(super) moment: [E; 3],
+    pub(super) slack: (E, E),
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Triangle<E> {
+    pub(super) edges: [Edge<E>; 3],
+    /// The same edges for rays from the eye, turned so that what is visible is not negative; the last is a bound on
+    /// the error, or less than zero where the eye lies in the plane.
+    pub(super) from_eye: [([E; 3], E); 3],
+    pub(super) normal: [E; 3],
+    /// `normal · point` of its points.
+    pub(super) height: E,
+    pub(super) order: E,
+}
+
+/// A triangle as an obstacle to one light: affine functions of the ray's origin.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shade<E> {
+    /// Not negative within the triangle, error bound included.
+    pub(super) sides: [([E; 3], E); 3],
+    /// Positive on the side that the light does not shine on.
+    pub(super) depth: ([E; 3], E),
+}
+
+/// A light and every obstacle as it sees it.
+#[derive(Clone, Debug)]
+pub(super) struct Light<E> {
+    /// Orthonormal; the last points towards the light.
+    pub(super) axes: [[E; 3]; 3],
+    pub(super) color: [E; 3],
+    /// 1 / direction for the axes where it is not zero.
+    pub(super) inverse: [Option<E>; 3],
+    /// Centres along `axes`, and r².
+    pub(super) spheres: Vec<[E; 4]>,
+    pub(super) shades: Vec<Shade<E>>,
+    /// For scenes without a tree: what can meet a ray from a region.
+    pub(super) outlines: Outlines<E>,
+}
+
+/// Per object, in the order of the masks' bits: a box along the light's axes, and one along the scene's.
+///
+/// The arrays are as long as a multiple of every packet's width; what is added overlaps nothing.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Outlines<E> {
+    pub(super) low: [Vec<E>; 2],
+    pub(super) high: [Vec<E>; 2],
+    /// The farthest that the object reaches along each scene axis in the light's direction, times the sign of it.
+    pub(super) exits: [Vec<E>; 3],
+    /// The farthest that it reaches towards the light.
+    pub(super) top: Vec<E>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Sphere,
+    Cuboid,
+    Triangle,
+}
+
+/// What lies behind a position in the script.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Entry<E> {
+    pub(super) kind: Kind,
+    /// Position in the array of its kind.
+    pub(super) index: u32,
+    pub(super) mirrors: bool,
+    pub(super) ambient: [E; 3],
+    pub(super) diffuse: [E; 3],
+    pub(super) mirror: [E; 3],
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Rays<E> {
+    Pinhole { corner: [E; 3], right: [E; 3], up: [E; 3] },
+    Parallel { corner: [E; 3], pixel: E },
+}
+
+/// Everything that the kernels read.
+#[derive(Debug)]
+pub(super) struct Prepared<E> {
+    pub(super) rays: Rays<E>,
+    pub(super) spheres: Vec<Sphere<E>>,
+    pub(super) cuboids: Vec<Cuboid<E>>,
+    pub(super) triangles: Vec<Triangle<E>>,
+    pub(super) entries: Vec<Entry<E>>,
+    pub(super) lights: Vec<Light<E>>,
+    pub(super) tree: Option<Tree<E>>,
+    /// Unclamped, for mirrored rays.
+    pub(super) background: [E; 3],
+    pub(super) mirrors: bool,
+}
+
+/// Objects up to this many are tested by masks over all of them; more are found by a tree.
+pub(super) const MASKED: usize = 64;
+
+impl<E: Real> Prepared<E> {
+    pub(super) fn new(scene: &Scene, geometry: &Geometry, plant: bool) -> Self {
+        let mut solids = geometry.solids.clone();
+        let branches = plant.then(|| tree::plant(&mut solids));
+        let mut entries: Vec<Entry<E>> = scene.objects.iter().map(entry).collect();
+        let (mut spheres, mut cuboids, mut triangles) = (vec![], vec![], vec![]);
+        for solid in &solids {
+            let index = match solid.shape {
+                Shape::Sphere { center, radius } => push(&mut spheres, sphere(solid, center, radius)),
+                Shape::Cuboid { min, max } => {
+                    push(&mut cuboids, Cuboid { min: point(min), max: point(max), order: order(solid) })
+                }
+                Shape::Triangle { vertices, normal } => {
+                    push(&mut triangles, triangle(solid, vertices, normal))
+                }
+            };
+            entries[solid.order].index = index;
+        }
+        let tree = branches.map(|branches| Tree::new(branches, &solids, &entries));
+        let mut by_kind: Vec<&Solid> = solids.iter().collect();
+        by_kind.sort_by_key(|solid| solid.kind_rank());
+        let lights = geometry.suns.iter().map(|sun| light(sun, &by_kind, tree.is_none())).collect();
+        let mirrors = geometry.solids.iter().any(|solid| entries[solid.order].mirrors);
+        Self {
+            rays: rays(&geometry.view),
+            spheres,
+            cuboids,
+            triangles,
+            entries,
+            lights,
+            tree,
+            background: point(scene.background()),
+            mirrors,
+        }
+    }
+}
+
+fn point<E: Real>(v: DVec3) -> [E; 3] {
+    v.to_array().map(E::narrow)
+}
+
+fn order<E: Real>(solid: &Solid) -> E {
+    E::narrow(solid.order as f64)
+}
+
+fn push<T>(items: &mut Vec<T>, item: T) -> u32 {
+    items.push(item);
+    items.len() as u32 - 1
+}
+
+fn entry<E: Real>(object: &Object) -> Entry<E> {
+    let material = object.material();
+    Entry {
+        kind: match object {
+            Object::Sphere(_) => Kind::Sphere,
+            Object::Cuboid(_) => Kind::Cuboid,
+            Object::Triangle(_) => Kind::Triangle,
+        },
+        index: 0,
+        mirrors: material.mirror() != DVec3::ZERO,
+        ambient: point(material.ambient()),
+        diffuse: point(material.diffuse()),
+        mirror: point(material.mirror()),
+    }
+}
+
+fn rays<E: Real>(view: &View) -> Rays<E> {
+    match *view {
+        View::Parallel { corner, pixel } => Rays::Parallel { corner: point(corner), pixel: E::narrow(pixel) },
+        View::Pinhole { right, up, back, x, y } => Rays::Pinhole {
+            corner: point(x.0 * right + y.0 * up - back),
+            right: point(x.1 * right),
+            up: point(y.1 * up),
+        },
+    }
+}
+
+fn sphere<E: Real>(solid: &Solid, center: DVec3, radius: f64) -> Sphere<E> {
+    let away = center.length();
+    let offset = OFFSET * E::ROUNDOFF * (center.abs().max_element() + radius);
+    Sphere {
+        center: point(center),
+        square: E::narrow(radius * radius),
+        order: order(solid),
+        power: E::narrow((away - radius) * (away + radius)),
+        outer: E::narrow(radius + offset),
+        inner: E::narrow(radius - offset),
+    }
+}
+
+fn triangle<E: Real>(solid: &Solid, vertices: [DVec3; 3], normal: DVec3) -> Triangle<E> {
+    let [a, b, c] = vertices;
+    let edges = [(b, c), (c, a), (a, b)].map(|(p, q)| (q - p, p.cross(q)));
+    let volume = a.dot(b.cross(c));
+    let noise = SIDE
+        * f64::EPSILON
+        * a.length()
+        * b.length().max(c.length())
+        * (b - a).length().max((c - a).length());
+    let from_eye = edges.map(|(_, moment)| {
+        if volume.abs() <= noise {
+            ([E::narrow(0.0); 3], E::narrow(-1.0))
+        } else {
+            let moment = moment * volume.signum();
+            (point(moment), E::narrow(SIDE * E::ROUNDOFF * l1(moment)))
+        }
+    });
+    let slack = |v: DVec3| E::narrow(2.0 * SIDE * E::ROUNDOFF * l1(v));
+    Triangle {
+        edges: edges.map(|(direction, moment)| Edge {
+            direction: point(direction),
+            moment: point(moment),
+            slack: (slack(moment), slack(direction)),
+        }),
+        from_eye,
+        normal: point(normal),
+        height: E::narrow(normal.dot(nearest_vertex(vertices))),
+        order: order(solid),
+    }
+}
+
+/// The vertex of the smallest coordinates: the one whose height above the plane is rounded least.
+fn nearest_vertex(vertices: [DVec3; 3]) -> DVec3 {
+    vertices.into_iter().min_by(|p, q| p.length().total_cmp(&q.length())).unwrap_or_default()
+}
+
+fn l1(v: DVec3) -> f64 {
+    v.abs().element_sum()
+}
+
+fn light<E: Real>(sun: &Sun, solids: &[&Solid], outlined: bool) -> Light<E> {
+    let (x, y) = sun.towards.any_orthonormal_pair();
+    let axes: [[E; 3]; 3] = [point(x), point(y), point(sun.towards)];
+    // The axes as the kernels have them, so that both sides of a test see the same map.
+    let rounded = DMat3::from_cols_array_2d(&axes.map(|axis| axis.map(Real::widen))).transpose();
+    let mut light = Light {
+        axes,
+        color: point(sun.color),
+        inverse: sun.towards.to_array().map(|d| (d != 0.0).then(|| E::narrow(1.0 / d))),
+        spheres: vec![],
+        shades: vec![],
+        outlines: Outlines::default(),
+    };
+    for solid in solids {
+        match solid.shape {
+            Shape::Sphere { center, radius } => {
+                let [x, y, z] = point(rounded * center);
+                light.spheres.push([x, y, z, E::narrow(radius * radius)]);
+            }
+            Shape::Cuboid { .. } => {}
+            Shape::Triangle { vertices, normal } => {
+                light.shades.push(shade(vertices, normal, rounded.row(2)))
+            }
+        }
+    }
+    if outlined {
+        light.outlines = outlines(solids, rounded);
+    }
+    light
+}
+
+/// From the Plücker coordinates of the ray through `o` along `d`: `d · moment + direction · (o × d)`.
+fn shade<E: Real>(vertices: [DVec3; 3], normal: DVec3, towards: DVec3) -> Shade<E> {
+    let facing = normal.dot(towards);
+    let sign = facing.signum();
+    if facing.abs() <= GRAZING * E::ROUNDOFF {
+        return Shade {
+            sides: [([E::narrow(0.0); 3], E::narrow(-1.0)); 3],
+            depth: ([E::narrow(0.0); 3], E::narrow(-1.0)),
+        };
+    }
+    let [a, b, c] = vertices;
+    let reach = vertices.iter().map(|v| l1(*v)).fold(0.0, f64::max);
+    let side = |p: DVec3, q: DVec3| {
+        // Relative to the nearer end, so that the constant is as small as the edge is near.
+        let slope = towards.cross(q - p) * sign;
+        let anchor = if p.length() < q.length() { p } else { q };
+        let start = slope.dot(-anchor);
+        let slack = 2.0 * SIDE * E::ROUNDOFF * l1(slope) * reach;
+        (point(slope), E::narrow(start + slack))
+    };
+    let height = normal.dot(nearest_vertex(vertices));
+    Shade {
+        sides: [side(b, c), side(c, a), side(a, b)],
+        depth: (point(-normal * sign), E::narrow(height * sign)),
+    }
+}
+
+fn outlines<E: Real>(solids: &[&Solid], axes: DMat3) -> Outlines<E> {
+    let mut outlines = Outlines::default();
+    for solid in solids {
+        let slack = BOUNDS * E::ROUNDOFF * solid.magnitude();
+        for axis in 0..2 {
+            let direction = axes.row(axis);
+            outlines.low[axis].push(E::narrow(-solid.support(-direction) - 2.0 * slack));
+            outlines.high[axis].push(E::narrow(solid.support(direction) + 2.0 * slack));
+        }
+        outlines.top.push(E::narrow(solid.support(axes.row(2)) + 2.0 * slack));
+        let (min, max) = solid.bounds();
+        for axis in 0..3 {
+            let towards = axes.row(2)[axis];
+            // A light along the other two axes passes on both sides.
+            let exit = if towards > 0.0 {
+                max[axis]
+            } else if towards < 0.0 {
+                -min[axis]
+            } else {
+                f64::MAX.sqrt()
+            };
+            // A face is exact: what starts beyond it, if only by its offset, is beyond it.
+            let slack = if matches!(solid.shape, Shape::Cuboid { .. }) { 0.0 } else { slack };
+            outlines.exits[axis].push(E::narrow((exit + slack).min(E::FAR)));
+        }
+    }
+    let Outlines { low, high, exits, top } = &mut outlines;
+    for (never, arrays) in [(E::FAR, &mut low[..]), (-E::FAR, &mut high[..]), (-E::FAR, &mut exits[..])] {
+        arrays.iter_mut().for_each(|array| array.resize(MASKED, E::narrow(never)));
+    }
+    top.resize(MASKED, E::narrow(-E::FAR));
+    outlines
+}

@@ -1,0 +1,153 @@
+//! Single rays through the kernels that pictures are made with.
+//!
+//! Hard cases are about rays that no camera sends; here they can be sent one by one, to any kernel.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd};
+use glam::DVec3;
+use rayfold_scene::Scene;
+
+use super::Everything;
+use super::geometry::Geometry;
+use super::intersect::Ray;
+use super::prepare::{MASKED, Prepared};
+use super::real::{Lanes, Real, Vec3, splat};
+use super::search::{Candidates, nearest, unshaded};
+use crate::{Precision, RenderError, RenderOptions};
+
+/// What a ray meets first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// Position of the object in the script, from 0.
+    pub object: usize,
+    /// Distance from the ray's origin in world units.
+    pub distance: f64,
+}
+
+/// The nearest hit of each ray, `(origin, direction)` with a direction of length 1.
+///
+/// The precision is `f32` if not forced. Rays whose origin is the camera's eye are traced as pictures trace them from
+/// there.
+///
+/// # Errors
+/// Those of [`crate::render`].
+pub fn nearest_hits(
+    scene: &Scene,
+    rays: &[(DVec3, DVec3)],
+    options: &RenderOptions,
+) -> Result<Vec<Option<Found>>, RenderError> {
+    let geometry = Geometry::new(scene)?;
+    match options.precision {
+        Precision::F64 => {
+            probe::<f64, Option<Found>>(scene, &geometry, rays, options, |batch, level, out| {
+                on!(level, simd => batch.nearest(simd, out));
+            })
+        }
+        _ => probe::<f32, Option<Found>>(scene, &geometry, rays, options, |batch, level, out| {
+            on!(level, simd => batch.nearest(simd, out));
+        }),
+    }
+}
+
+/// Whether the first light reaches each point, for `(point, anything)`.
+///
+/// # Errors
+/// Those of [`crate::render`].
+pub fn lit(
+    scene: &Scene,
+    points: &[(DVec3, DVec3)],
+    options: &RenderOptions,
+) -> Result<Vec<bool>, RenderError> {
+    let geometry = Geometry::new(scene)?;
+    match options.precision {
+        Precision::F64 => probe::<f64, bool>(scene, &geometry, points, options, |batch, level, out| {
+            on!(level, simd => batch.lit(simd, out));
+        }),
+        _ => probe::<f32, bool>(scene, &geometry, points, options, |batch, level, out| {
+            on!(level, simd => batch.lit(simd, out));
+        }),
+    }
+}
+
+struct Batch<'a, E> {
+    scene: &'a Prepared<E>,
+    geometry: &'a Geometry,
+    rays: &'a [(DVec3, DVec3)],
+}
+
+fn probe<E: Real, T>(
+    scene: &Scene,
+    geometry: &Geometry,
+    rays: &[(DVec3, DVec3)],
+    options: &RenderOptions,
+    run: impl Fn(&Batch<E>, Level, &mut Vec<T>),
+) -> Result<Vec<T>, RenderError> {
+    let count = geometry.solids.len();
+    let plant = count > MASKED || (count > 0 && options.tree == Some(true));
+    let prepared = Prepared::<E>::new(scene, geometry, plant);
+    let mut out = Vec::with_capacity(rays.len());
+    run(&Batch { scene: &prepared, geometry, rays }, options.level.unwrap_or_else(Level::new), &mut out);
+    Ok(out)
+}
+
+impl<E: Real> Batch<'_, E> {
+    #[inline(always)]
+    fn packets<S: Simd>(&self, simd: S, mut each: impl FnMut(Ray<S, E>, bool, usize)) {
+        for rays in self.rays.chunks(Lanes::<S, E>::LEN) {
+            let (mut origins, mut directions) = ([[E::narrow(0.0); 16]; 3], [[E::narrow(0.0); 16]; 3]);
+            for lane in 0..Lanes::<S, E>::LEN {
+                let (origin, direction) = rays[lane.min(rays.len() - 1)];
+                let origin = (origin - self.geometry.center) * self.geometry.scale;
+                for axis in 0..3 {
+                    origins[axis][lane] = E::narrow(origin[axis]);
+                    directions[axis][lane] = E::narrow(direction[axis]);
+                }
+            }
+            let ray = Ray {
+                origin: Vec3::<S, E>::load(simd, &origins, 0),
+                direction: Vec3::<S, E>::load(simd, &directions, 0),
+            };
+            let from_eye = rays.iter().all(|(origin, _)| *origin == self.geometry.center);
+            each(ray, from_eye, rays.len());
+        }
+    }
+
+    #[inline(always)]
+    fn nearest<S: Simd>(&self, simd: S, out: &mut Vec<Option<Found>>) {
+        self.packets(
+            simd,
+            #[inline(always)]
+            |ray, from_eye, count| {
+                let found = if from_eye {
+                    nearest::<S, E, Everything, true>(simd, self.scene, ray, Candidates::MAX)
+                } else {
+                    nearest::<S, E, Everything, false>(simd, self.scene, ray, Candidates::MAX)
+                };
+                let hit = found.hit(simd).to_bitmask();
+                for lane in 0..count {
+                    out.push((hit >> lane & 1 != 0).then(|| Found {
+                        object: found.order[lane].to_index(),
+                        distance: found.distance[lane].widen() / self.geometry.scale,
+                    }));
+                }
+            },
+        );
+    }
+
+    #[inline(always)]
+    fn lit<S: Simd>(&self, simd: S, out: &mut Vec<bool>) {
+        let zero = splat::<S, E>(simd, E::narrow(0.0));
+        self.packets(
+            simd,
+            #[inline(always)]
+            |ray, _, count| {
+                let all = zero.simd_eq(zero);
+                let light = &self.scene.lights[0];
+                let lit =
+                    unshaded::<S, E, Everything>(simd, self.scene, light, ray.origin, all, Candidates::MAX)
+                        .to_bitmask();
+                out.extend((0..count).map(|lane| lit >> lane & 1 != 0));
+            },
+        );
+    }
+}

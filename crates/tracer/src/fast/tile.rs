@@ -1,0 +1,593 @@
+//! A tile of the image: rays, what they see, its light, and what its mirrors see.
+//!
+//! Generation by generation: the first holds the tile's pixels, each further one the mirrored rays of the one before,
+//! closed up so that packets stay full. In a generation all hits are found first; the region that they fill then decides
+//! which objects can stand in the way of each light.
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+
+use super::intersect::{Ray, Slopes, Surface, cuboid_surface, sphere_surface, triangle_surface};
+use super::prepare::{Entry, Kind, Light, OFFSET, Prepared, Rays};
+use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use super::search::{Candidates, Features, nearest, unshaded};
+use crate::MAX_BOUNCES;
+use crate::parallel::CHANNELS;
+
+/// Pixels of a tile at most.
+pub(super) const PIXELS: usize = 256;
+
+/// A tile's pixels and room for a packet that begins at the last of them.
+const ROOM: usize = PIXELS + 16;
+
+/// A number for each ray of a tile.
+#[derive(Clone)]
+#[repr(align(64))]
+struct Column<E>([E; ROOM]);
+
+impl<E> AsRef<[E]> for Column<E> {
+    #[inline(always)]
+    fn as_ref(&self) -> &[E] {
+        &self.0
+    }
+}
+
+impl<E> AsMut<[E]> for Column<E> {
+    #[inline(always)]
+    fn as_mut(&mut self) -> &mut [E] {
+        &mut self.0
+    }
+}
+
+type Columns<E> = [Column<E>; 3];
+
+/// Rays that wait to be traced.
+struct Queue<E> {
+    origin: Columns<E>,
+    direction: Columns<E>,
+    /// What their colour counts for in the pixel's.
+    weight: Columns<E>,
+    pixel: Column<E>,
+    count: usize,
+}
+
+/// Hits that wait for their light.
+struct Hits<E> {
+    start: Columns<E>,
+    normal: Columns<E>,
+    /// Diffuse coefficient times the ray's weight.
+    diffuse: Columns<E>,
+    color: Columns<E>,
+    /// For each packet with hits: where it begins, and the object that cannot be in its way, as a bit.
+    packets: Vec<(usize, Candidates)>,
+    /// The box that the starts lie in.
+    low: [E; 3],
+    high: [E; 3],
+}
+
+/// Memory of a worker, used again for each of its tiles.
+pub(super) struct Scratch<E> {
+    queues: [Queue<E>; 2],
+    hits: Hits<E>,
+    pixels: Columns<E>,
+    /// Candidates per light.
+    obstacles: Vec<Candidates>,
+}
+
+impl<E: Real> Scratch<E> {
+    pub(super) fn new() -> Self {
+        let column = || Column([E::narrow(0.0); ROOM]);
+        let columns = || [column(), column(), column()];
+        let queue = || Queue {
+            origin: columns(),
+            direction: columns(),
+            weight: columns(),
+            pixel: column(),
+            count: 0,
+        };
+        Self {
+            queues: [queue(), queue()],
+            hits: Hits {
+                start: columns(),
+                normal: columns(),
+                diffuse: columns(),
+                color: columns(),
+                packets: Vec::with_capacity(PIXELS),
+                low: [E::narrow(0.0); 3],
+                high: [E::narrow(0.0); 3],
+            },
+            pixels: columns(),
+            obstacles: Vec::new(),
+        }
+    }
+}
+
+/// A rectangle of the image, counted from its upper left corner.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tile {
+    pub(super) left: u32,
+    pub(super) top: u32,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    pub(super) candidates: Candidates,
+}
+
+/// Where a tile's pixels go: the bytes of its rows, from the image's left edge.
+pub(super) struct Band<'a> {
+    pub(super) bytes: &'a mut [u8],
+    /// Columns and rows of the whole image.
+    pub(super) size: (u32, u32),
+    /// Level of each channel of a pixel that shows nothing.
+    pub(super) background: [u8; CHANNELS],
+}
+
+/// Columns and rows of a packet's pixels.
+#[inline(always)]
+fn packet_shape<S: Simd, E: Real>() -> (usize, usize) {
+    match Lanes::<S, E>::LEN {
+        16 => (4, 4),
+        8 => (4, 2),
+        4 => (2, 2),
+        n => (n, 1),
+    }
+}
+
+/// `from` and on, a number a lane, the lanes counted modulo `modulus`.
+#[inline(always)]
+fn lanes<S: Simd, E: Real>(simd: S, from: usize, modulus: usize) -> Lanes<S, E> {
+    let mut numbers = [E::narrow(0.0); 16];
+    for (lane, number) in numbers.iter_mut().enumerate() {
+        *number = E::narrow((from + lane % modulus) as f64);
+    }
+    Lanes::<S, E>::from_slice(simd, &numbers[..Lanes::<S, E>::LEN])
+}
+
+/// Draws a tile.
+#[inline(always)]
+pub(super) fn draw<S: Simd, E: Real, F: Features>(
+    simd: S,
+    scene: &Prepared<E>,
+    tile: Tile,
+    scratch: &mut Scratch<E>,
+    band: &mut Band,
+) {
+    if tile.candidates == 0 {
+        return fill(tile, band);
+    }
+    let Scratch { queues: [queue, next], hits, pixels, obstacles } = scratch;
+    next.count = 0;
+    first_generation::<S, E, F>(simd, scene, tile, band, hits, queue, next);
+    light_up::<S, E, F>(simd, scene, hits, obstacles);
+    if F::MIRRORS && next.count > 0 {
+        core::mem::swap(&mut hits.color, pixels);
+        let (mut queue, mut next) = (queue, next);
+        for bounce in 1..=MAX_BOUNCES {
+            core::mem::swap(&mut queue, &mut next);
+            next.count = 0;
+            let after = (bounce < MAX_BOUNCES).then_some(&mut *next);
+            later_generation::<S, E, F>(simd, scene, Candidates::MAX, scene.background, hits, queue, after);
+            light_up::<S, E, F>(simd, scene, hits, obstacles);
+            for ray in 0..queue.count {
+                let pixel = queue.pixel.0[ray].to_index();
+                for (sum, color) in pixels.iter_mut().zip(&hits.color) {
+                    sum.0[pixel] += color.0[ray];
+                }
+            }
+            if next.count == 0 {
+                break;
+            }
+        }
+        core::mem::swap(&mut hits.color, pixels);
+    }
+    develop::<S, E>(simd, tile, &hits.color, band);
+}
+
+/// Nothing but background.
+fn fill(tile: Tile, band: &mut Band) {
+    let stride = band.size.0 as usize * CHANNELS;
+    let (from, to) = (tile.left as usize * CHANNELS, (tile.left + tile.width) as usize * CHANNELS);
+    for row in band.bytes.chunks_exact_mut(stride) {
+        row[from..to].as_chunks_mut().0.fill(band.background);
+    }
+}
+
+/// Begins a generation.
+#[inline(always)]
+fn clear<E: Real>(hits: &mut Hits<E>) {
+    hits.packets.clear();
+    hits.low = [E::narrow(E::FAR); 3];
+    hits.high = [E::narrow(-E::FAR); 3];
+}
+
+/// The box of the points of a packet, lane by lane until the generation is complete.
+struct Region<S: Simd, E: Real> {
+    low: Vec3<S, E>,
+    high: Vec3<S, E>,
+}
+
+impl<S: Simd, E: Real> Region<S, E> {
+    #[inline(always)]
+    fn new(simd: S) -> Self {
+        let far = constant::<S, E>(simd, E::FAR);
+        let near = constant::<S, E>(simd, -E::FAR);
+        Self { low: Vec3::<S, E>::new(far, far, far), high: Vec3::<S, E>::new(near, near, near) }
+    }
+
+    #[inline(always)]
+    fn include(&mut self, lanes: Mask<S, E>, point: Vec3<S, E>) {
+        let low = Vec3::select(lanes, point, self.low);
+        let high = Vec3::select(lanes, point, self.high);
+        self.low = Vec3::<S, E>::new(self.low.x.min(low.x), self.low.y.min(low.y), self.low.z.min(low.z));
+        self.high =
+            Vec3::<S, E>::new(self.high.x.max(high.x), self.high.y.max(high.y), self.high.z.max(high.z));
+    }
+
+    #[inline(always)]
+    fn close(self, hits: &mut Hits<E>) {
+        let Self { low, high } = self;
+        hits.low = [low.x.reduce_min(), low.y.reduce_min(), low.z.reduce_min()];
+        hits.high = [high.x.reduce_max(), high.y.reduce_max(), high.z.reduce_max()];
+    }
+}
+
+/// The rays of the tile's pixels.
+#[inline(always)]
+fn first_generation<S: Simd, E: Real, F: Features>(
+    simd: S,
+    scene: &Prepared<E>,
+    tile: Tile,
+    band: &Band,
+    hits: &mut Hits<E>,
+    queue: &mut Queue<E>,
+    next: &mut Queue<E>,
+) {
+    let (width, height) = packet_shape::<S, E>();
+    let columns = lanes::<S, E>(simd, 0, width);
+    let rows = (lanes::<S, E>(simd, 0, usize::MAX) - columns) * E::narrow(1.0 / width as f64);
+    let right = constant::<S, E>(simd, f64::from(tile.left + tile.width - 1));
+    let bottom = constant::<S, E>(simd, f64::from(tile.top + tile.height - 1));
+    let last_row = constant::<S, E>(simd, f64::from(band.size.1 - 1));
+    let background = band.background.map(|level| E::narrow(f64::from(level) / 255.0));
+    clear(hits);
+    let mut region = Region::new(simd);
+    let mut at = 0;
+    for top in (0..tile.height as usize).step_by(height) {
+        for left in (0..tile.width as usize).step_by(width) {
+            // Lanes beyond the edge draw the pixel on the edge again.
+            let i = (columns + E::narrow((tile.left as usize + left) as f64)).min(right);
+            let row = (rows + E::narrow((tile.top as usize + top) as f64)).min(bottom);
+            let j = last_row - row;
+            match scene.rays {
+                Rays::Pinhole { corner, right, up } => {
+                    let along = Vec3::splat(simd, right).scale_add(i, Vec3::splat(simd, corner));
+                    let direction = Vec3::splat(simd, up).scale_add(j, along).normalize(simd);
+                    let ray = Ray { origin: Vec3::zero(simd), direction };
+                    let next = (None, Some(&mut *next));
+                    trace::<S, E, F, true>(
+                        simd,
+                        scene,
+                        ray,
+                        tile.candidates,
+                        background,
+                        at,
+                        hits,
+                        &mut region,
+                        next,
+                    );
+                }
+                Rays::Parallel { corner, pixel } => {
+                    let pixel = splat::<S, E>(simd, pixel);
+                    let corner = Vec3::<S, E>::splat(simd, corner);
+                    Vec3::<S, E>::new(i.mul_add(pixel, corner.x), j.mul_add(pixel, corner.y), corner.z)
+                        .store(&mut queue.origin, at);
+                    let (zero, one) = (E::narrow(0.0), E::narrow(1.0));
+                    Vec3::<S, E>::splat(simd, [zero, zero, E::narrow(-1.0)]).store(&mut queue.direction, at);
+                    Vec3::<S, E>::splat(simd, [one; 3]).store(&mut queue.weight, at);
+                    lanes::<S, E>(simd, at, usize::MAX)
+                        .store_slice(&mut queue.pixel.0[at..at + Lanes::<S, E>::LEN]);
+                    queue.count = at + Lanes::<S, E>::LEN;
+                }
+            }
+            at += Lanes::<S, E>::LEN;
+        }
+    }
+    match scene.rays {
+        Rays::Pinhole { .. } => region.close(hits),
+        Rays::Parallel { .. } => {
+            later_generation::<S, E, F>(simd, scene, tile.candidates, background, hits, queue, Some(next));
+        }
+    }
+}
+
+/// The rays of a queue: those that the generation before sent on.
+#[inline(always)]
+fn later_generation<S: Simd, E: Real, F: Features>(
+    simd: S,
+    scene: &Prepared<E>,
+    candidates: Candidates,
+    background: [E; 3],
+    hits: &mut Hits<E>,
+    queue: &mut Queue<E>,
+    mut next: Option<&mut Queue<E>>,
+) {
+    // Lanes beyond the last ray trace it again.
+    let (last, end) = (queue.count - 1, queue.count.next_multiple_of(Lanes::<S, E>::LEN));
+    for columns in [&mut queue.origin, &mut queue.direction, &mut queue.weight] {
+        for column in columns {
+            let value = column.0[last];
+            column.0[last + 1..end].fill(value);
+        }
+    }
+    queue.pixel.0[last + 1..end].fill(E::narrow(-1.0));
+    clear(hits);
+    let mut region = Region::new(simd);
+    for at in (0..queue.count).step_by(Lanes::<S, E>::LEN) {
+        let ray = Ray {
+            origin: Vec3::load(simd, &queue.origin, at),
+            direction: Vec3::load(simd, &queue.direction, at),
+        };
+        let queues = (Some(&*queue), next.as_deref_mut());
+        trace::<S, E, F, false>(simd, scene, ray, candidates, background, at, hits, &mut region, queues);
+    }
+    region.close(hits);
+}
+
+/// Finds what a packet of rays sees: stores hits that wait for light, their colour without it, and mirrored rays.
+///
+/// `queues` are the one that the packet comes from, if it is not of the first generation, and the next.
+#[inline(always)]
+#[allow(
+    clippy::too_many_arguments,
+    reason = "inlined into its two callers; a struct of them would have no other use"
+)]
+fn trace<S: Simd, E: Real, F: Features, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    ray: Ray<S, E>,
+    candidates: Candidates,
+    background: [E; 3],
+    at: usize,
+    hits: &mut Hits<E>,
+    region: &mut Region<S, E>,
+    (queue, next): (Option<&Queue<E>>, Option<&mut Queue<E>>),
+) {
+    let weight = match queue {
+        Some(queue) => Vec3::load(simd, &queue.weight, at),
+        None => Vec3::splat(simd, [E::narrow(1.0); 3]),
+    };
+    let found = nearest::<S, E, F, EYE>(simd, scene, ray, candidates);
+    let hit = found.hit(simd);
+    let background = weigh::<S, E, EYE>(Vec3::splat(simd, background), weight);
+    let mut remaining = hit.to_bitmask();
+    if remaining == 0 {
+        return background.store(&mut hits.color, at);
+    }
+    let zero = Vec3::zero(simd);
+    let mut start = zero;
+    let mut normal = zero;
+    let mut diffuse = zero;
+    let mut color = background;
+    let mut mirror = zero;
+    let mut mirrors = hit & !hit;
+    let mut alone = Candidates::MAX;
+    while remaining != 0 {
+        let order = found.order[remaining.trailing_zeros() as usize];
+        let entry = &scene.entries[order.to_index()];
+        let same = hit & found.order.simd_eq(splat::<S, E>(simd, order));
+        let surface = surface::<S, E, F, EYE>(simd, scene, entry, ray, found.distance);
+        start = Vec3::select(same, surface.start, start);
+        normal = Vec3::select(same, surface.normal, normal);
+        diffuse = Vec3::select(same, Vec3::splat(simd, entry.diffuse), diffuse);
+        color = Vec3::select(same, weigh::<S, E, EYE>(Vec3::splat(simd, entry.ambient), weight), color);
+        if F::MIRRORS && entry.mirrors {
+            mirrors |= same;
+            mirror = Vec3::select(same, Vec3::splat(simd, entry.mirror), mirror);
+        }
+        let bits = same.to_bitmask();
+        alone &= if bits == hit.to_bitmask() { own_shadow::<E, EYE>(scene, entry) } else { Candidates::MAX };
+        remaining &= !bits;
+    }
+    region.include(hit, start);
+    start.store(&mut hits.start, at);
+    normal.store(&mut hits.normal, at);
+    weigh::<S, E, EYE>(diffuse, weight).store(&mut hits.diffuse, at);
+    color.store(&mut hits.color, at);
+    hits.packets.push((at, alone));
+    if !F::MIRRORS {
+        return;
+    }
+    let bits = mirrors.to_bitmask();
+    let Some(next) = next else { return };
+    if bits == 0 {
+        return;
+    }
+    // The normal faces the ray; where rounding says otherwise, the ray grazes.
+    let towards = ray.direction.dot(normal).min(constant::<S, E>(simd, 0.0));
+    let direction = normal.scale_add(towards * constant::<S, E>(simd, -2.0), ray.direction);
+    // A step of Newton's method keeps its length at 1.
+    let stretch = direction.dot(direction).mul_add(constant::<S, E>(simd, -0.5), constant::<S, E>(simd, 1.5));
+    let pixel = match queue {
+        Some(queue) => Lanes::<S, E>::from_slice(simd, &queue.pixel.0[at..at + Lanes::<S, E>::LEN]),
+        None => lanes::<S, E>(simd, at, usize::MAX),
+    };
+    // Lanes that only repeat another send nothing on.
+    let mirrors = if EYE { mirrors } else { mirrors & pixel.simd_ge(constant::<S, E>(simd, 0.0)) };
+    let end = next.count;
+    compress(start, mirrors, &mut next.origin, end);
+    compress(direction.scale(stretch), mirrors, &mut next.direction, end);
+    compress(weigh::<S, E, EYE>(mirror, weight), mirrors, &mut next.weight, end);
+    pixel.compress(mirrors).store_slice(&mut next.pixel.0[end..end + Lanes::<S, E>::LEN]);
+    next.count += mirrors.to_bitmask().count_ones() as usize;
+}
+
+/// A colour times the ray's weight, which is 1 for rays from the eye.
+#[inline(always)]
+fn weigh<S: Simd, E: Real, const EYE: bool>(color: Vec3<S, E>, weight: Vec3<S, E>) -> Vec3<S, E> {
+    if EYE { color } else { color.mul(weight) }
+}
+
+#[inline(always)]
+fn compress<S: Simd, E: Real>(v: Vec3<S, E>, lanes: Mask<S, E>, into: &mut Columns<E>, at: usize) {
+    Vec3::<S, E>::new(v.x.compress(lanes), v.y.compress(lanes), v.z.compress(lanes)).store(into, at);
+}
+
+/// All candidates but the object itself, where it cannot be in its own light: a convex one, seen from outside.
+#[inline(always)]
+fn own_shadow<E: Real, const EYE: bool>(scene: &Prepared<E>, entry: &Entry<E>) -> Candidates {
+    let outside =
+        EYE && entry.kind == Kind::Sphere && scene.spheres[entry.index as usize].power > E::narrow(0.0);
+    if outside && scene.tree.is_none() { !(1 << entry.index) } else { Candidates::MAX }
+}
+
+/// An object's surface where the rays meet it.
+#[inline(always)]
+fn surface<S: Simd, E: Real, F: Features, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    entry: &Entry<E>,
+    ray: Ray<S, E>,
+    distance: Lanes<S, E>,
+) -> Surface<S, E> {
+    let at = entry.index as usize;
+    if F::CUBOIDS && entry.kind == Kind::Cuboid {
+        let slopes = Slopes::new(simd, ray.direction);
+        return cuboid_surface(simd, &scene.cuboids[at], ray, slopes, distance, OFFSET);
+    }
+    if F::TRIANGLES && entry.kind == Kind::Triangle {
+        return triangle_surface(simd, &scene.triangles[at], ray, distance, OFFSET);
+    }
+    sphere_surface::<S, E, EYE>(simd, &scene.spheres[at], ray, distance)
+}
+
+/// Adds the light that reaches the hits.
+#[inline(always)]
+fn light_up<S: Simd, E: Real, F: Features>(
+    simd: S,
+    scene: &Prepared<E>,
+    hits: &mut Hits<E>,
+    obstacles: &mut Vec<Candidates>,
+) {
+    if hits.packets.is_empty() {
+        return;
+    }
+    obstacles.clear();
+    for light in &scene.lights {
+        obstacles.push(if scene.tree.is_some() {
+            Candidates::MAX
+        } else {
+            in_the_way(simd, light, hits.low, hits.high)
+        });
+    }
+    let zero = constant::<S, E>(simd, 0.0);
+    for &(at, others) in &hits.packets {
+        let normal = Vec3::load(simd, &hits.normal, at);
+        let start = Vec3::load(simd, &hits.start, at);
+        let mut sum = Vec3::zero(simd);
+        for (light, candidates) in scene.lights.iter().zip(obstacles.iter()) {
+            let cosine = normal.dot(Vec3::splat(simd, light.axes[2]));
+            let mut lit = cosine.simd_gt(zero);
+            if !lit.any_true() {
+                continue;
+            }
+            let candidates = candidates & others;
+            if candidates != 0 {
+                lit = unshaded::<S, E, F>(simd, scene, light, start, lit, candidates);
+            }
+            sum = Vec3::splat(simd, light.color).scale_add(lit.select(cosine, zero), sum);
+        }
+        let diffuse = Vec3::load(simd, &hits.diffuse, at);
+        let color = Vec3::load(simd, &hits.color, at);
+        let lit = Vec3::<S, E>::new(
+            diffuse.x.mul_add(sum.x, color.x),
+            diffuse.y.mul_add(sum.y, color.y),
+            diffuse.z.mul_add(sum.z, color.z),
+        );
+        lit.store(&mut hits.color, at);
+    }
+}
+
+/// The objects that can stand between a box and a light.
+#[inline(always)]
+fn in_the_way<S: Simd, E: Real>(simd: S, light: &Light<E>, low: [E; 3], high: [E; 3]) -> Candidates {
+    let outlines = &light.outlines;
+    // The box as the light sees it, wider by the rounding errors.
+    let mut region = [(0.0, 0.0); 3];
+    for (axis, (from, to)) in light.axes.iter().zip(&mut region) {
+        let mut slack = 0.0;
+        for ((direction, low), high) in axis.iter().zip(low).zip(high) {
+            let (a, b) = (direction.widen() * low.widen(), direction.widen() * high.widen());
+            *from += a.min(b);
+            *to += a.max(b);
+            slack += a.abs().max(b.abs());
+        }
+        *from -= 16.0 * E::ROUNDOFF * slack;
+        *to += 16.0 * E::ROUNDOFF * slack;
+    }
+    let (left, right) = (constant::<S, E>(simd, region[0].0), constant::<S, E>(simd, region[0].1));
+    let (bottom, top) = (constant::<S, E>(simd, region[1].0), constant::<S, E>(simd, region[1].1));
+    let near = constant::<S, E>(simd, region[2].0);
+    let mut starts = low;
+    for axis in 0..3 {
+        if light.axes[2][axis] < E::narrow(0.0) {
+            starts[axis] = E::narrow(0.0) - high[axis];
+        }
+    }
+    let starts = Vec3::<S, E>::splat(simd, starts);
+    let mut candidates = 0;
+    let count = outlines.top.len();
+    for at in (0..count).step_by(Lanes::<S, E>::LEN) {
+        let overlap = load::<S, E>(simd, at, &outlines.low[0]).simd_le(right)
+            & load::<S, E>(simd, at, &outlines.high[0]).simd_ge(left)
+            & load::<S, E>(simd, at, &outlines.low[1]).simd_le(top)
+            & load::<S, E>(simd, at, &outlines.high[1]).simd_ge(bottom)
+            & load::<S, E>(simd, at, &outlines.top).simd_ge(near)
+            & load::<S, E>(simd, at, &outlines.exits[0]).simd_ge(starts.x)
+            & load::<S, E>(simd, at, &outlines.exits[1]).simd_ge(starts.y)
+            & load::<S, E>(simd, at, &outlines.exits[2]).simd_ge(starts.z);
+        candidates |= overlap.to_bitmask() << at;
+    }
+    candidates
+}
+
+#[inline(always)]
+fn load<S: Simd, E: Real>(simd: S, at: usize, from: &[E]) -> Lanes<S, E> {
+    Lanes::<S, E>::from_slice(simd, &from[at..at + Lanes::<S, E>::LEN])
+}
+
+/// Colours to the bytes of the image.
+#[inline(always)]
+fn develop<S: Simd, E: Real>(simd: S, tile: Tile, colors: &Columns<E>, band: &mut Band) {
+    let (width, height) = packet_shape::<S, E>();
+    let stride = band.size.0 as usize * CHANNELS;
+    let mut at = 0;
+    for top in (0..tile.height as usize).step_by(height) {
+        for left in (0..tile.width as usize).step_by(width) {
+            let mut packed = [0; 16];
+            let Vec3 { x, y, z } = Vec3::<S, E>::load(simd, colors, at);
+            E::pack::<S>(
+                [level::<S, E>(simd, x), level::<S, E>(simd, y), level::<S, E>(simd, z)],
+                &mut packed,
+            );
+            for (row, pixels) in
+                (top..(top + height).min(tile.height as usize)).zip(packed.chunks_exact(width))
+            {
+                let from = row * stride + (tile.left as usize + left) * CHANNELS;
+                let columns = width.min(tile.width as usize - left);
+                let bytes = &mut band.bytes[from..from + columns * CHANNELS];
+                for (bytes, pixel) in bytes.as_chunks_mut::<CHANNELS>().0.iter_mut().zip(pixels) {
+                    let [r, g, b, _] = pixel.to_le_bytes();
+                    *bytes = [r, g, b];
+                }
+            }
+            at += Lanes::<S, E>::LEN;
+        }
+    }
+}
+
+/// A level and a half a level, so that cutting off the fraction rounds; what is not a number is black.
+#[inline(always)]
+fn level<S: Simd, E: Real>(simd: S, channel: Lanes<S, E>) -> Lanes<S, E> {
+    let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
+    let known = channel.simd_eq(channel).select(channel, zero);
+    known.max(zero).min(one).mul_add(constant::<S, E>(simd, 255.0), constant::<S, E>(simd, 0.5))
+}

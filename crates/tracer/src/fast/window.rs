@@ -1,0 +1,167 @@
+//! What the rays of a tile of the image can meet.
+//!
+//! A tile's rays lie between four planes through the eye, two for its columns of pixels and two for its rows; an object
+//! is a candidate when it reaches inside all four, spheres also have to reach the tile's cone. Everything is widened by
+//! a part of a pixel and by the rounding errors of the kernels, so that no candidate is ever missing.
+
+use glam::DVec3;
+
+use super::geometry::{Geometry, Shape, Solid, View};
+use super::prepare::BOUNDS;
+use super::search::Candidates;
+
+/// Part of a pixel by which tiles are widened.
+const MARGIN: f64 = 1.0 / 32.0;
+
+/// A sphere as the eye sees it.
+#[derive(Clone, Copy, Debug)]
+struct Cap {
+    bit: u32,
+    towards: DVec3,
+    sine: f64,
+    cosine: f64,
+}
+
+/// The candidates of every tile.
+#[derive(Debug)]
+pub(super) struct Window {
+    columns: Vec<Span>,
+    rows: Vec<Span>,
+    caps: Vec<Cap>,
+    view: View,
+}
+
+/// The pixels of a column or a row of tiles in the view's own coordinates, and what reaches into it.
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    from: f64,
+    to: f64,
+    candidates: Candidates,
+}
+
+impl Window {
+    /// `solids` in the order of the bits, at most 64; `width` and `height` are the pixels of the image, `side` those
+    /// of a tile. `roundoff` is that of the kernels. Rows of tiles count from the top.
+    pub(super) fn new(
+        geometry: &Geometry,
+        solids: &[&Solid],
+        (width, height): (u32, u32),
+        side: (u32, u32),
+        roundoff: f64,
+    ) -> Self {
+        let view = geometry.view;
+        let slack = |solid: &Solid| BOUNDS * roundoff * solid.magnitude();
+        // Behind the eye nothing is seen.
+        let ahead = match view {
+            View::Pinhole { back, .. } => -back,
+            View::Parallel { .. } => DVec3::NEG_Z,
+        };
+        let visible = mask(solids, |solid| solid.support(ahead) >= -slack(solid));
+        let span = |from: f64, to: f64, axis: fn(&View) -> DVec3| {
+            let (from, to) = (from.min(to), from.max(to));
+            let (along, back) = (axis(&view), back(&view));
+            let candidates = mask(solids, |solid| {
+                let beyond = |normal: DVec3, distance: f64| {
+                    solid.support(normal) >= distance - slack(solid) * (1.0 + normal.length())
+                };
+                match back {
+                    Some(back) => beyond(along + from * back, 0.0) && beyond(-along - to * back, 0.0),
+                    None => beyond(along, from) && beyond(-along, -to),
+                }
+            });
+            Span { from, to, candidates: candidates & visible }
+        };
+        let (x, y) = steps(&view);
+        let tiles = |pixels: u32, side: u32| {
+            (0..pixels).step_by(side as usize).map(move |i| (i, (i + side).min(pixels) - 1))
+        };
+        let at = |(start, step): (f64, f64), pixel: f64| start + step * pixel;
+        let columns = tiles(width, side.0).map(|(first, last)| {
+            span(at(x, f64::from(first) - MARGIN), at(x, f64::from(last) + MARGIN), right)
+        });
+        let rows = tiles(height, side.1).map(|(first, last)| {
+            let (first, last) = (height - 1 - first, height - 1 - last);
+            span(at(y, f64::from(first) + MARGIN), at(y, f64::from(last) - MARGIN), up)
+        });
+        let caps = match view {
+            View::Pinhole { .. } => caps(solids, slack),
+            View::Parallel { .. } => vec![],
+        };
+        Self { columns: columns.collect(), rows: rows.collect(), caps, view }
+    }
+
+    /// What the rays of the tile of this column and row can meet.
+    pub(super) fn candidates(&self, column: usize, row: usize) -> Candidates {
+        let (x, y) = (self.columns[column], self.rows[row]);
+        let mut candidates = x.candidates & y.candidates;
+        if candidates == 0 {
+            return 0;
+        }
+        let View::Pinhole { right, up, back, .. } = self.view else { return candidates };
+        let corner = |x: f64, y: f64| (x * right + y * up - back).normalize();
+        let corners =
+            [corner(x.from, y.from), corner(x.from, y.to), corner(x.to, y.from), corner(x.to, y.to)];
+        let axis = corners.into_iter().sum::<DVec3>().normalize();
+        let cosine = corners.into_iter().map(|corner| corner.dot(axis)).fold(1.0, f64::min);
+        let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+        for cap in self.caps.iter().filter(|cap| (x.candidates & y.candidates) >> cap.bit & 1 != 0) {
+            // The angle between the axes is more than the sum of the two half-angles.
+            let farthest = cosine * cap.cosine - sine * cap.sine;
+            let opposite = cosine < 0.0 || cap.cosine < 0.0;
+            if !opposite && axis.dot(cap.towards) < farthest - 1e-9 {
+                candidates &= !(1 << cap.bit);
+            }
+        }
+        candidates
+    }
+}
+
+fn back(view: &View) -> Option<DVec3> {
+    match view {
+        View::Pinhole { back, .. } => Some(*back),
+        View::Parallel { .. } => None,
+    }
+}
+
+fn right(view: &View) -> DVec3 {
+    match view {
+        View::Pinhole { right, .. } => *right,
+        View::Parallel { .. } => DVec3::X,
+    }
+}
+
+fn up(view: &View) -> DVec3 {
+    match view {
+        View::Pinhole { up, .. } => *up,
+        View::Parallel { .. } => DVec3::Y,
+    }
+}
+
+/// Start and step of the pixels' coordinates along both axes.
+fn steps(view: &View) -> ((f64, f64), (f64, f64)) {
+    match *view {
+        View::Pinhole { x, y, .. } => (widened(x), widened(y)),
+        View::Parallel { corner, pixel } => ((corner.x, pixel), (corner.y, pixel)),
+    }
+}
+
+/// A single sample has no step; its tile is given a little width all the same.
+fn widened((start, step): (f64, f64)) -> (f64, f64) {
+    (start, if step == 0.0 { 1e-3 * start.abs().max(1.0) } else { step })
+}
+
+fn mask(solids: &[&Solid], is_candidate: impl Fn(&Solid) -> bool) -> Candidates {
+    solids.iter().enumerate().fold(0, |mask, (bit, solid)| mask | u64::from(is_candidate(solid)) << bit)
+}
+
+fn caps(solids: &[&Solid], slack: impl Fn(&Solid) -> f64) -> Vec<Cap> {
+    let cap = |(bit, solid): (usize, &&Solid)| {
+        let Shape::Sphere { center, radius } = solid.shape else { return None };
+        let (away, radius) = (center.length(), radius + 2.0 * slack(solid));
+        let sine = radius / away;
+        let cosine = (1.0 - sine * sine).sqrt();
+        // From within, a sphere is everywhere.
+        (away > radius).then(|| Cap { bit: bit as u32, towards: center / away, sine, cosine })
+    };
+    solids.iter().enumerate().filter_map(cap).collect()
+}

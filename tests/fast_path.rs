@@ -1,0 +1,196 @@
+//! The picture is the same whatever it is drawn with: instruction set, tile, tree, threads; and it is the reference's.
+//!
+//! Scenes are drawn at random; a failure prints the seed. `RAYFOLD_SEED` tries another one.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
+
+use glam::{DVec2, DVec3};
+use image::RgbImage;
+use rayfold_scene::{
+    Camera, Cuboid, DirectionalLight, Light, Material, Object, Pinhole, Scene, Screen, Sphere, Triangle,
+};
+use rayfold_tracer::{Level, Precision, RenderOptions, reference, render};
+
+/// Pixels of a picture that rounding may put on the other side of an outline, as a share.
+const ISOLATED: f64 = 1e-4;
+
+struct Dice(fastrand::Rng);
+
+impl Dice {
+    fn new(test: &str) -> Self {
+        let seed =
+            std::env::var("RAYFOLD_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(20_261_121);
+        println!("{test}: RAYFOLD_SEED={seed}");
+        Self(fastrand::Rng::with_seed(seed))
+    }
+
+    fn within(&mut self, from: f64, to: f64) -> f64 {
+        from + (to - from) * self.0.f64()
+    }
+
+    fn point(&mut self, size: f64) -> DVec3 {
+        DVec3::new(self.within(-size, size), self.within(-size, size), self.within(-size, size))
+    }
+
+    fn color(&mut self) -> DVec3 {
+        self.point(0.5) + 0.5
+    }
+
+    fn material(&mut self) -> Material {
+        let mirror = if self.0.bool() { 0.6 * self.color() } else { DVec3::ZERO };
+        Material::new(0.1 * self.color(), self.color(), mirror).unwrap()
+    }
+
+    fn object(&mut self, kinds: u8) -> Object {
+        let at = self.point(3.0);
+        let material = self.material();
+        match self.0.u8(0..kinds) {
+            0 => Object::Sphere(Sphere::new(self.within(0.1, 0.8), at, material).unwrap()),
+            1 => {
+                let material = Material::new(material.ambient(), material.diffuse(), DVec3::ZERO).unwrap();
+                Object::Cuboid(Cuboid::new([at, at + self.point(0.8)], material).unwrap())
+            }
+            _ => {
+                let material = Material::new(material.ambient(), material.diffuse(), DVec3::ZERO).unwrap();
+                let vertices = [at, at + self.point(1.5), at + self.point(1.5)];
+                Object::Triangle(Triangle::new(vertices, material).unwrap())
+            }
+        }
+    }
+
+    fn scene(&mut self, objects: usize, kinds: u8) -> Scene {
+        let eye = self.point(1.0).normalize() * 9.0;
+        let corner = DVec2::splat(0.5);
+        let camera = Pinhole::new(eye, self.point(0.5) - eye, self.point(1.0), 1.0, -corner, corner).unwrap();
+        let screen = Screen::new(self.0.u32(90..140), self.0.u32(90..140)).unwrap();
+        let mut scene = Scene::new(screen, Camera::Pinhole(camera));
+        scene.set_background(self.color()).unwrap();
+        scene.objects = (0..objects).map(|_| self.object(kinds)).collect();
+        let lights = self.0.usize(0..4);
+        scene.lights = (0..lights)
+            .map(|_| Light::Directional(DirectionalLight::new(0.6 * self.color(), self.point(1.0)).unwrap()))
+            .collect();
+        scene
+    }
+
+    /// Scenes for every kernel.
+    fn scenes(&mut self) -> Vec<Scene> {
+        [(1, 1), (5, 1), (12, 2), (20, 3), (60, 3), (300, 3), (400, 1)]
+            .map(|(n, kinds)| self.scene(n, kinds))
+            .into()
+    }
+}
+
+fn draw(scene: &Scene, options: RenderOptions) -> RgbImage {
+    render(scene, &options).unwrap()
+}
+
+/// Share of the pixels that are off by more than one level in a channel.
+fn off(a: &RgbImage, b: &RgbImage) -> f64 {
+    assert_eq!(a.dimensions(), b.dimensions());
+    let differ = a.pixels().zip(b.pixels()).filter(|(p, q)| (0..3).any(|c| p[c].abs_diff(q[c]) > 1)).count();
+    differ as f64 / a.pixels().len() as f64
+}
+
+fn levels() -> Vec<(&'static str, Level)> {
+    let best = Level::new();
+    let mut levels = vec![("the best", best)];
+    #[cfg(target_arch = "x86_64")]
+    {
+        levels.extend(best.as_avx2().map(|level| ("AVX2", Level::Avx2(level))));
+        levels.extend(best.as_sse4_2().map(|level| ("SSE4.2", Level::Sse4_2(level))));
+    }
+    levels
+}
+
+#[test]
+fn widths_with_fused_multiply_add_agree_bit_for_bit_and_others_but_for_isolated_pixels() {
+    for scene in Dice::new("widths").scenes() {
+        for precision in [Precision::F32, Precision::F64] {
+            let options = RenderOptions { precision, ..Default::default() };
+            let best = draw(&scene, options);
+            for (name, level) in levels() {
+                let other = draw(&scene, RenderOptions { level: Some(level), ..options });
+                if name == "SSE4.2" {
+                    assert!(
+                        off(&best, &other) <= 2.0 * ISOLATED,
+                        "{name} {precision:?}: {}",
+                        off(&best, &other)
+                    );
+                } else {
+                    assert!(best == other, "{name} {precision:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn tiles_trees_and_threads_cannot_be_seen() {
+    for scene in Dice::new("tiles").scenes() {
+        for precision in [Precision::F32, Precision::F64] {
+            let options = RenderOptions { precision, ..Default::default() };
+            let expected = draw(&scene, options);
+            for tile in [(4, 4), (8, 8), (32, 8), (64, 4)] {
+                let tile = Some(tile);
+                assert!(expected == draw(&scene, RenderOptions { tile, ..options }), "tiles of {tile:?}");
+            }
+            let tree = Some(true);
+            assert!(expected == draw(&scene, RenderOptions { tree, ..options }), "tree {precision:?}");
+            let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+            assert!(expected == alone.install(|| draw(&scene, options)), "one thread");
+        }
+    }
+}
+
+#[test]
+fn the_reference_draws_the_same() {
+    let mut dice = Dice::new("reference");
+    let mut scenes = dice.scenes();
+    let orthographic = |scene: &Scene| {
+        let mut scene = scene.clone();
+        scene.camera = Camera::Orthographic;
+        let place = |p: DVec3| p * 20.0 + DVec3::new(50.0, 50.0, -100.0);
+        scene.objects = scene
+            .objects
+            .iter()
+            .map(|object| match object {
+                Object::Sphere(o) => {
+                    Object::Sphere(Sphere::new(o.radius() * 20.0, place(o.center()), *o.material()).unwrap())
+                }
+                Object::Cuboid(o) => {
+                    Object::Cuboid(Cuboid::new(o.corners().map(place), *o.material()).unwrap())
+                }
+                Object::Triangle(o) => {
+                    Object::Triangle(Triangle::new(o.vertices().map(place), *o.material()).unwrap())
+                }
+            })
+            .collect();
+        scene
+    };
+    scenes.extend(scenes.iter().map(orthographic).collect::<Vec<_>>());
+    for precision in [Precision::F32, Precision::F64] {
+        let (mut differ, mut pixels) = (0.0, 0.0);
+        for scene in &scenes {
+            let expected = reference::render(scene, &RenderOptions::default()).unwrap();
+            let drawn = draw(scene, RenderOptions { precision, ..Default::default() });
+            let share = off(&expected, &drawn);
+            differ += share * expected.pixels().len() as f64;
+            pixels += expected.pixels().len() as f64;
+        }
+        println!("{precision:?}: {differ} of {pixels} pixels are off by more than one level");
+        assert!(differ <= 4.0 * ISOLATED * pixels, "{precision:?}: {differ} of {pixels}");
+    }
+}
+
+#[test]
+fn a_scene_without_objects_is_its_background() {
+    for screen in [(1, 1), (1, 50), (33, 17)] {
+        let mut scene = Scene::new(Screen::new(screen.0, screen.1).unwrap(), Camera::Orthographic);
+        scene.set_background(DVec3::new(0.1, 0.5, 0.9)).unwrap();
+        for tree in [None, Some(true)] {
+            let image = draw(&scene, RenderOptions { tree, ..Default::default() });
+            assert!(image.pixels().all(|pixel| pixel.0 == [26, 128, 230]));
+        }
+    }
+}
