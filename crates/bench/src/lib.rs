@@ -7,7 +7,9 @@
 #![allow(clippy::print_stderr, reason = "a measurement says what it is at")]
 
 pub mod accuracy;
+pub mod cpu_time;
 pub mod hard_cases;
 pub mod oracle;
+mod plot;
 pub mod scenes;
 pub mod tracers;

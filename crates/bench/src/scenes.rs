@@ -1,11 +1,15 @@
 //! Scenes to measure on, made from a seed.
 
+use std::path::Path;
+
 use anyhow::{Context, Result};
 use glam::{DVec2, DVec3};
 use rayfold_scene::{
-    Camera, Cuboid, DirectionalLight, InvalidValue, Light, Material, Object, Pinhole, Scene, Screen, Sphere,
-    Triangle,
+    Camera, Cuboid, DirectionalLight, InvalidValue, Light, Limits, Material, Object, Pinhole, Scene, Screen,
+    Sphere, Triangle, natural_cmp, parse,
 };
+
+use crate::tracers::Ray;
 
 /// A camera at `eye` that looks at `target` and sees `width` world units a unit of distance from side to side.
 ///
@@ -15,6 +19,47 @@ pub fn looking_at(eye: DVec3, target: DVec3, width: f64, screen: Screen) -> Resu
     let half = DVec2::new(0.5, 0.5 * f64::from(screen.height()) / f64::from(screen.width())) * width;
     Pinhole::new(eye, target - eye, DVec3::Y, 1.0, -half, half).map(Camera::Pinhole)
 }
+
+/// The ray of column `i` from the left and row `j` from the bottom, of unit length.
+pub fn pixel_ray(scene: &Scene, i: u32, j: u32) -> Ray {
+    let (i, j) = (f64::from(i), f64::from(j));
+    let Camera::Pinhole(pinhole) = scene.camera else {
+        return Ray { origin: DVec3::new(i, j, 0.0), direction: DVec3::NEG_Z };
+    };
+    let along = |from: f64, to: f64, index: f64, count: u32| {
+        if count == 1 { 0.5 * (from + to) } else { from + (to - from) * index / f64::from(count - 1) }
+    };
+    let (a, b) = (pinhole.lower_left(), pinhole.upper_right());
+    let (u, v, w) = pinhole.basis();
+    let across = along(a.x, b.x, i, scene.screen.width());
+    let upward = along(a.y, b.y, j, scene.screen.height());
+    let direction = across * u + upward * v - pinhole.distance() * w;
+    Ray { origin: pinhole.eye(), direction: direction.normalize() }
+}
+
+/// The middle frame of an animation in `scenes/`.
+///
+/// # Errors
+/// When its script cannot be read.
+pub fn example(name: &str) -> Result<Scene> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(name);
+    let mut scripts: Vec<String> = std::fs::read_dir(&folder)
+        .with_context(|| folder.display().to_string())?
+        .map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()))
+        .collect::<Result<_>>()?;
+    scripts.retain(|name| name.ends_with(".txt"));
+    scripts.sort_by(|a, b| natural_cmp(a, b));
+    let script = scripts.get(scripts.len() / 2).context("a folder without scripts")?;
+    let text = std::fs::read(folder.join(script))?;
+    let parsed = parse(script, &text, &Limits::default());
+    parsed
+        .script
+        .and_then(|script| script.frame(0))
+        .with_context(|| format!("{script}: {:?}", parsed.diagnostics))
+}
+
+/// The animations in `scenes/`.
+pub const EXAMPLES: [&str; 5] = ["sphere_light", "moving_up", "artistic", "artisticsss", "hello"];
 
 /// A surface that scatters and mirrors.
 ///

@@ -23,8 +23,8 @@ pub struct Hit {
     pub object: usize,
     /// In lengths of the ray's direction.
     pub t: f64,
-    /// Unit normal, facing the ray.
-    pub normal: DVec3,
+    /// Unit normal, facing the ray, where the way tells it.
+    pub normal: Option<DVec3>,
 }
 
 /// The numbers that a way computes with.
@@ -38,7 +38,8 @@ pub enum Arithmetic {
     Chosen,
 }
 
-type Nearest = Box<dyn Fn(&Scene, &[Ray]) -> Vec<Option<Hit>> + Sync>;
+type Hits = anyhow::Result<Vec<Option<Hit>>>;
+type Nearest = Box<dyn Fn(&Scene, &[Ray]) -> Hits + Sync>;
 type Render = Box<dyn Fn(&Scene) -> anyhow::Result<RgbImage> + Sync>;
 
 /// A way to trace.
@@ -52,8 +53,20 @@ pub struct Tracer {
 }
 
 impl Tracer {
+    pub(crate) fn new(
+        name: impl Into<String>,
+        arithmetic: Arithmetic,
+        nearest: impl Fn(&Scene, &[Ray]) -> Hits + Sync + 'static,
+        render: impl Fn(&Scene) -> anyhow::Result<RgbImage> + Sync + 'static,
+    ) -> Self {
+        Self { name: name.into(), arithmetic, nearest: Box::new(nearest), render: Box::new(render) }
+    }
+
     /// The nearest hit of each ray.
-    pub fn nearest(&self, scene: &Scene, rays: &[Ray]) -> Vec<Option<Hit>> {
+    ///
+    /// # Errors
+    /// Those of [`rayfold_tracer::render`].
+    pub fn nearest(&self, scene: &Scene, rays: &[Ray]) -> Hits {
         (self.nearest)(scene, rays)
     }
 
@@ -80,18 +93,23 @@ pub fn all() -> Vec<Tracer> {
     vec![reference()]
 }
 
+/// The truth first, then the ways between which the user can choose.
+pub fn for_pictures() -> Vec<Tracer> {
+    vec![reference()]
+}
+
 /// The plain `f64` tracer.
 pub fn reference() -> Tracer {
-    Tracer {
-        name: "reference".into(),
-        arithmetic: Arithmetic::Double,
-        nearest: Box::new(|scene, rays| rays.iter().map(|ray| reference_nearest(scene, *ray)).collect()),
-        render: Box::new(|scene| Ok(reference::render(scene, &RenderOptions::default())?)),
-    }
+    Tracer::new(
+        "reference",
+        Arithmetic::Double,
+        |scene, rays| Ok(rays.iter().map(|ray| reference_nearest(scene, *ray)).collect()),
+        |scene| Ok(reference::render(scene, &RenderOptions::default())?),
+    )
 }
 
 fn reference_nearest(scene: &Scene, ray: Ray) -> Option<Hit> {
     let length = ray.direction.length();
     let hit = reference::nearest(&scene.objects, ray.origin, ray.direction / length)?;
-    Some(Hit { object: hit.object, t: hit.distance / length, normal: hit.surface.normal })
+    Some(Hit { object: hit.object, t: hit.distance / length, normal: Some(hit.surface.normal) })
 }

@@ -55,19 +55,20 @@ pub(super) fn face_to_face(tracers: &[Tracer], size: Size, figures: &mut Figures
         starts.push((Ray { origin, direction }, last.to_dvec3(), growth));
     }
     anyhow::ensure!(starts.len() >= size.pick(15, 500), "rays leave the mirrors early");
-    for tracer in tracers {
+    'ways: for tracer in tracers {
         let mut worst = 0f64;
         for (start, last, growth) in &starts {
             let mut ray = *start;
             for _ in 0..BOUNCES {
-                let Some(hit) = tracer.nearest(&scene, &[ray])[0] else {
+                let Some(hit) = tracer.nearest(&scene, &[ray])?[0] else {
                     ray.direction = DVec3::NAN;
                     break;
                 };
+                let Some(normal) = hit.normal else { continue 'ways };
                 let point = ray.origin + hit.t * ray.direction;
-                let mirrored = ray.direction - 2.0 * ray.direction.dot(hit.normal) * hit.normal;
+                let mirrored = ray.direction - 2.0 * ray.direction.dot(normal) * normal;
                 // Off the surface by what the distance is uncertain.
-                let origin = point + 4.0 * tracer.ulp(100.0) * hit.normal;
+                let origin = point + 4.0 * tracer.ulp(100.0) * normal;
                 ray = Ray { origin, direction: mirrored.normalize() };
             }
             worst = worse(worst, (ray.direction - last).length() / growth);

@@ -35,7 +35,7 @@ pub(super) fn distant(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
             let truths = truths(&objects, &rays);
             let scene = objects_only(objects.to_vec())?;
             for (tracer, worst) in tracers.iter().zip(&mut worst) {
-                for ((ray, truth), hit) in rays.iter().zip(&truths).zip(tracer.nearest(&scene, &rays)) {
+                for ((ray, truth), hit) in rays.iter().zip(&truths).zip(tracer.nearest(&scene, &rays)?) {
                     let clearance = sphere_clearance(&ball, ray.origin, ray.direction);
                     match (truth, hit) {
                         (Some(truth), Some(hit)) if clearance < -0.01 => {
@@ -88,7 +88,7 @@ pub(super) fn horizon(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
         let truths = truths(&objects, &rays);
         for tracer in tracers {
             let worst =
-                truths.iter().zip(tracer.nearest(&scene, &rays)).fold(0.0, |worst, pair| match pair {
+                truths.iter().zip(tracer.nearest(&scene, &rays)?).fold(0.0, |worst, pair| match pair {
                     (Some(truth), Some(hit)) => worse(worst, (hit.t - truth.t).abs() / truth.t),
                     (None, None) => worst,
                     _ => f64::INFINITY,
@@ -133,10 +133,12 @@ pub(super) fn tangent(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
             }
             let truths = truths(&objects, &rays);
             for (k, ((ray, truth), hit)) in
-                rays.iter().zip(&truths).zip(tracer.nearest(&scene, &rays)).enumerate()
+                rays.iter().zip(&truths).zip(tracer.nearest(&scene, &rays)?).enumerate()
             {
                 count += 1;
-                if hit.is_some_and(|hit| !hit.t.is_finite() || !hit.normal.is_finite()) {
+                if hit.is_some_and(|hit| {
+                    !hit.t.is_finite() || hit.normal.is_some_and(|normal| !normal.is_finite())
+                }) {
                     invalid += 1;
                 }
                 if hit.is_some() != truth.is_some() {
@@ -189,7 +191,7 @@ pub(super) fn inside(tracers: &[Tracer], size: Size, figures: &mut Figures) -> R
         let (mut wrong, mut count) = (0, 0);
         for (object, rays) in &sets {
             let scene = objects_only(vec![*object])?;
-            for (ray, hit) in rays.iter().zip(tracer.nearest(&scene, rays)) {
+            for (ray, hit) in rays.iter().zip(tracer.nearest(&scene, rays)?) {
                 count += 1;
                 let truth = nearest(&[*object], ray.origin, ray.direction).map(|hit| hit.t.to_f64());
                 let right = match (truth, hit) {
@@ -224,7 +226,7 @@ pub(super) fn giant_and_dwarf(tracers: &[Tracer], size: Size, figures: &mut Figu
     let rays: Vec<Ray> = places.iter().map(|&(i, j)| ray(i, j)).collect();
     let truths: Vec<_> = rays.iter().map(|&ray| seen(ray)).collect();
     for tracer in tracers {
-        let hits = tracer.nearest(&scene, &rays);
+        let hits = tracer.nearest(&scene, &rays)?;
         let off = places.iter().zip(&truths).zip(&hits).filter(|((place, truth), hit)| {
             let shown = hit.map(|hit| hit.object);
             let near = |turn: f64| ray(place.0 + 0.5 * turn.cos(), place.1 + 0.5 * turn.sin());

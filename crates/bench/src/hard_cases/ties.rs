@@ -31,7 +31,7 @@ pub(super) fn identical(tracers: &[Tracer], size: Size, figures: &mut Figures) -
             .collect();
         let first = |object: usize| order.iter().position(|&kind| kind == order[object]);
         for tracer in tracers {
-            let hits = tracer.nearest(&scene, &rays);
+            let hits = tracer.nearest(&scene, &rays)?;
             let late = hits.iter().flatten().filter(|hit| first(hit.object) != Some(hit.object)).count();
             figures.add(
                 tracer,
@@ -66,7 +66,7 @@ fn faces(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
         for objects in [vec![big, small, ball], vec![small, ball, big], vec![ball, small, big]] {
             let at = |object: Object| objects.iter().position(|&o| o == object);
             let scene = objects_only(objects.clone())?;
-            for (ray, hit) in rays.iter().zip(tracer.nearest(&scene, &rays)) {
+            for (ray, hit) in rays.iter().zip(tracer.nearest(&scene, &rays)?) {
                 let other = if ray.origin.x == 3.0 { ball } else { small };
                 late += usize::from(hit.map(|hit| hit.object) != at(big).min(at(other)));
             }

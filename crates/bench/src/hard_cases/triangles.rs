@@ -46,7 +46,7 @@ fn escapes(
                     aimed(centre + direction(&mut rng), target(&faces[rng.usize(0..faces.len())], &mut rng))
                 })
                 .collect();
-            escaped += tracer.nearest(&scene, &batch).iter().filter(|hit| hit.is_none()).count();
+            escaped += tracer.nearest(&scene, &batch)?.iter().filter(|hit| hit.is_none()).count();
             left -= batch.len();
         }
         figures.add(tracer, format!("cracks in {} faces, {what}", faces.len()), rays, escaped as f64, 0.0);
@@ -95,7 +95,7 @@ pub(super) fn needles(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
             .collect();
         let truths = truths(&objects, &rays);
         for (tracer, worst) in tracers.iter().zip(&mut worst) {
-            for ((ray, truth), hit) in rays.iter().zip(&truths).zip(tracer.nearest(&scene, &rays)) {
+            for ((ray, truth), hit) in rays.iter().zip(&truths).zip(tracer.nearest(&scene, &rays)?) {
                 let largest = vertices.iter().fold(0.0, |m: f64, v| m.max((*v - ray.origin).length()));
                 match (truth, hit) {
                     (Some(truth), Some(hit)) => {
@@ -157,10 +157,10 @@ pub(super) fn degenerate(tracers: &[Tracer], size: Size, figures: &mut Figures) 
         sets.push((objects_only(vec![triangle(*vertices)?])?, rays));
     }
     for tracer in tracers {
-        let hits = sets
-            .iter()
-            .map(|(scene, rays)| tracer.nearest(scene, rays).iter().flatten().count())
-            .sum::<usize>();
+        let mut hits = 0;
+        for (scene, rays) in &sets {
+            hits += tracer.nearest(scene, rays)?.iter().flatten().count();
+        }
         let rays = sets.iter().map(|(_, rays)| rays.len()).sum();
         figures.add(tracer, "hits", rays, hits as f64, 0.0);
         figures.add(tracer, "not reported when read", flat.len(), unreported as f64, 0.0);
@@ -197,10 +197,10 @@ pub(super) fn in_plane(tracers: &[Tracer], size: Size, figures: &mut Figures) ->
         }
     }
     for tracer in tracers {
-        let hits = sets
-            .iter()
-            .map(|(scene, rays)| tracer.nearest(scene, rays).iter().flatten().count())
-            .sum::<usize>();
+        let mut hits = 0;
+        for (scene, rays) in &sets {
+            hits += tracer.nearest(scene, rays)?.iter().flatten().count();
+        }
         let rays = sets.iter().map(|(_, rays)| rays.len()).sum();
         figures.add(tracer, "hits", rays, hits as f64, 0.0);
     }
@@ -229,7 +229,7 @@ pub(super) fn tree_or_not(tracers: &[Tracer], size: Size, figures: &mut Figures)
         let mut firsts: Vec<(Arithmetic, Vec<Option<usize>>)> = Vec::new();
         for (tracer, different) in tracers.iter().zip(&mut different) {
             let hits: Vec<_> =
-                tracer.nearest(&scene, &rays).iter().map(|hit| hit.map(|hit| hit.object)).collect();
+                tracer.nearest(&scene, &rays)?.iter().map(|hit| hit.map(|hit| hit.object)).collect();
             match firsts.iter().find(|(arithmetic, _)| *arithmetic == tracer.arithmetic) {
                 Some((_, first)) => *different += hits.iter().zip(first).filter(|(a, b)| a != b).count(),
                 None => firsts.push((tracer.arithmetic, hits)),

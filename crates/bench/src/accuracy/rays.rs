@@ -1,0 +1,34 @@
+//! How many rays a scene takes.
+
+use anyhow::Result;
+use rayfold_scene::{Light, Scene, model::unit};
+use rayfold_tracer::MAX_BOUNCES;
+
+use crate::scenes::pixel_ray;
+use crate::tracers::{Ray, Tracer};
+
+/// Rays from the camera, to lights and from mirrors: what the language asks for, whatever a tracer saves.
+pub(crate) fn count(scene: &Scene, tracer: &Tracer) -> Result<u64> {
+    let (width, height) = (scene.screen.width(), scene.screen.height());
+    let mut rays: Vec<Ray> = (0..width * height).map(|k| pixel_ray(scene, k % width, k / width)).collect();
+    let mut total = 0;
+    for bounce in 0..=MAX_BOUNCES {
+        total += rays.len() as u64;
+        let mut mirrored = Vec::new();
+        for (ray, hit) in rays.iter().zip(tracer.nearest(scene, &rays)?) {
+            let Some((hit, normal)) = hit.and_then(|hit| Some((hit, hit.normal?))) else { continue };
+            let lit = |light: &&Light| {
+                let Light::Directional(light) = light;
+                normal.dot(-unit(light.direction())) > 0.0
+            };
+            total += scene.lights.iter().filter(lit).count() as u64;
+            if scene.objects[hit.object].material().mirror() != glam::DVec3::ZERO && bounce < MAX_BOUNCES {
+                let direction = ray.direction - 2.0 * ray.direction.dot(normal) * normal;
+                let origin = ray.origin + hit.t * (1.0 - 1e-9) * ray.direction;
+                mirrored.push(Ray { origin, direction: direction.normalize() });
+            }
+        }
+        rays = mirrored;
+    }
+    Ok(total)
+}

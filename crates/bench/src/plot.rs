@@ -1,0 +1,86 @@
+//! Plots for the reports, as SVG.
+
+use std::path::Path;
+
+use anyhow::{Result, anyhow};
+use plotters::prelude::*;
+
+/// Points with a name; joined by lines where they are a course.
+pub(crate) struct Series {
+    pub(crate) name: String,
+    pub(crate) points: Vec<(f64, f64)>,
+    pub(crate) joined: bool,
+}
+
+/// What a plot says beside its points.
+pub(crate) struct Labels<'a> {
+    pub(crate) title: &'a str,
+    pub(crate) x: &'a str,
+    pub(crate) y: &'a str,
+}
+
+const SIZE: (u32, u32) = (900, 560);
+
+/// Colours that those who see few colours tell apart (Okabe and Ito, 2008).
+const COLORS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(60, 60, 60),
+];
+
+/// Draws series over two logarithmic axes.
+pub(crate) fn log_log(path: &Path, labels: &Labels, series: &[Series]) -> Result<()> {
+    draw(path, labels, series).map_err(|error| anyhow!("{}: {error}", path.display()))
+}
+
+fn draw(path: &Path, labels: &Labels, series: &[Series]) -> Result<(), Box<dyn std::error::Error>> {
+    let range = |of: fn(&(f64, f64)) -> f64| {
+        let all = series.iter().flat_map(|s| &s.points).map(of);
+        let (low, high) = all.fold((f64::INFINITY, 0f64), |(l, h), v| (l.min(v), h.max(v)));
+        // Whole decades, with half a decade to spare.
+        10f64.powf((low.log10() - 0.2).floor())..10f64.powf((high.log10() + 0.2).ceil())
+    };
+    let area = SVGBackend::new(path, SIZE).into_drawing_area();
+    area.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&area)
+        .caption(labels.title, ("sans-serif", 20))
+        .margin(12)
+        .x_label_area_size(44)
+        .y_label_area_size(72)
+        .build_cartesian_2d(range(|p| p.0).log_scale(), range(|p| p.1).log_scale())?;
+    chart
+        .configure_mesh()
+        .x_desc(labels.x)
+        .y_desc(labels.y)
+        .x_label_formatter(&|x| format!("{x:e}"))
+        .y_label_formatter(&|y| format!("{y:e}"))
+        .max_light_lines(0)
+        .label_style(("sans-serif", 14))
+        .draw()?;
+    for (k, series) in series.iter().enumerate() {
+        let color = COLORS[k % COLORS.len()];
+        if series.joined {
+            chart.draw_series(LineSeries::new(series.points.iter().copied(), color.stroke_width(2)))?;
+        }
+        // Colours repeat after seven; the shape tells the rest.
+        let filled = k < COLORS.len();
+        let style = if filled { color.filled() } else { color.stroke_width(2) };
+        chart
+            .draw_series(series.points.iter().map(|&p| Circle::new(p, 5, style)))?
+            .label(&series.name)
+            .legend(move |(x, y)| Circle::new((x + 8, y), 5, style));
+    }
+    chart
+        .configure_series_labels()
+        .background_style(WHITE.mix(0.85))
+        .border_style(BLACK.mix(0.3))
+        .label_font(("sans-serif", 14))
+        .position(SeriesLabelPosition::UpperRight)
+        .draw()?;
+    area.present()?;
+    Ok(())
+}
