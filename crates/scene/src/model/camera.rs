@@ -1,0 +1,218 @@
+//! Cameras: which ray a pixel is.
+
+use glam::{DVec2, DVec3};
+
+use super::invalid::{InvalidValue, Parameter, direction, finite, positive};
+use super::{to_unit_scale, unit};
+
+/// Where the ray of a pixel starts and where it goes.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub enum Camera {
+    /// The ray of column i, row j (from the bottom) starts at (i, j, 0) and goes (0, 0, -1).
+    #[default]
+    Orthographic,
+    /// All rays start at the eye.
+    Pinhole(Pinhole),
+}
+
+/// A pinhole camera: the window lies at a distance in front of the eye, square to the gaze.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pinhole {
+    eye: DVec3,
+    gaze: DVec3,
+    up: DVec3,
+    distance: f64,
+    lower_left: DVec2,
+    upper_right: DVec2,
+}
+
+impl Pinhole {
+    /// `eye` is a position, `gaze` and `up` directions of any length, `distance` that of the window from the eye;
+    /// `lower_left` (au, av) and `upper_right` (bu, bv) are the window's corners in its own plane. A window whose
+    /// corners are swapped mirrors the image.
+    ///
+    /// # Errors
+    /// When a number is not finite, gaze or up is zero, the two are parallel, the distance is not positive, or the
+    /// window is empty.
+    pub fn new(
+        eye: DVec3,
+        gaze: DVec3,
+        up: DVec3,
+        distance: f64,
+        lower_left: DVec2,
+        upper_right: DVec2,
+    ) -> Result<Self, InvalidValue> {
+        Self::checked(eye, gaze, up, distance, lower_left, upper_right).map_err(|faults| faults[0])
+    }
+
+    /// As [`Pinhole::new`], but says everything that is wrong.
+    pub(crate) fn checked(
+        eye: DVec3,
+        gaze: DVec3,
+        up: DVec3,
+        distance: f64,
+        lower_left: DVec2,
+        upper_right: DVec2,
+    ) -> Result<Self, Vec<InvalidValue>> {
+        let (a, b) = (lower_left, upper_right);
+        let gaze_and_up = [direction(Parameter::Gaze, gaze), direction(Parameter::Up, up)];
+        let parallel = gaze_and_up.iter().all(Result::is_ok) && is_parallel(gaze, up);
+        let faults: Vec<_> = gaze_and_up
+            .into_iter()
+            .chain([
+                finite(Parameter::Eye, eye),
+                positive(Parameter::WindowDistance, distance).map(|_| eye),
+                finite(Parameter::WindowCorner, a.extend(0.0)),
+                finite(Parameter::WindowCorner, b.extend(0.0)),
+            ])
+            .filter_map(Result::err)
+            .chain(parallel.then_some(InvalidValue::GazeParallelToUp))
+            .chain((a.x == b.x).then_some(InvalidValue::EmptyWindowWidth))
+            .chain((a.y == b.y).then_some(InvalidValue::EmptyWindowHeight))
+            .collect();
+        if faults.is_empty() {
+            Ok(Self { eye, gaze, up, distance, lower_left, upper_right })
+        } else {
+            Err(faults)
+        }
+    }
+
+    /// Where the rays start.
+    pub fn eye(&self) -> DVec3 {
+        self.eye
+    }
+
+    /// Direction of the gaze, of any length.
+    pub fn gaze(&self) -> DVec3 {
+        self.gaze
+    }
+
+    /// View-up, of any length.
+    pub fn up(&self) -> DVec3 {
+        self.up
+    }
+
+    /// Distance of the window from the eye, greater than zero.
+    pub fn distance(&self) -> f64 {
+        self.distance
+    }
+
+    /// The window's lower-left corner (au, av).
+    pub fn lower_left(&self) -> DVec2 {
+        self.lower_left
+    }
+
+    /// The window's upper-right corner (bu, bv).
+    pub fn upper_right(&self) -> DVec2 {
+        self.upper_right
+    }
+
+    /// The orthonormal frame (u, v, w): u to the right, v up, w against the gaze.
+    ///
+    /// w = -g/|g|, u = (up x w)/|up x w|, v = w x u.
+    pub fn basis(&self) -> (DVec3, DVec3, DVec3) {
+        let w = -unit(self.gaze);
+        // The same as up x w, but from the numbers of the script, which are exact.
+        let u = unit(cross(level(self.gaze), level(self.up)));
+        (u, w.cross(u), w)
+    }
+}
+
+/// Directions whose sine is below this are taken for parallel: what is parallel as written in decimals is only nearly
+/// so once it is rounded to floats.
+const PARALLEL: f64 = 4.0 * f64::EPSILON;
+
+fn is_parallel(a: DVec3, b: DVec3) -> bool {
+    let (a, b) = (level(a), level(b));
+    cross(a, b).length() < PARALLEL * a.length() * b.length()
+}
+
+/// The vector times a power of two, about as long as 1.
+fn level(v: DVec3) -> DVec3 {
+    v * to_unit_scale(v.abs().max_element())
+}
+
+/// The cross product to within 1.5 units in the last place of each component, also of nearly parallel vectors
+/// (Kahan's difference of products; Jeannerod, Louvet, Muller 2013, "Further analysis of Kahan's algorithm").
+fn cross(a: DVec3, b: DVec3) -> DVec3 {
+    let difference = |a: f64, b: f64, c: f64, d: f64| {
+        let cd = c * d;
+        let error = (-c).mul_add(d, cd);
+        a.mul_add(b, -cd) + error
+    };
+    DVec3::new(difference(a.y, b.z, a.z, b.y), difference(a.z, b.x, a.x, b.z), difference(a.x, b.y, a.y, b.x))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn pinhole(gaze: DVec3, up: DVec3) -> Result<Pinhole, InvalidValue> {
+        Pinhole::new(DVec3::ZERO, gaze, up, 1.0, DVec2::NEG_ONE, DVec2::ONE)
+    }
+
+    #[test]
+    fn every_parameter_is_checked() {
+        let check = |e: DVec3, g: DVec3, s: f64, a: DVec2, b: DVec2, expect: &[InvalidValue]| {
+            let faults = Pinhole::checked(e, g, DVec3::Y, s, a, b).err().unwrap_or_default();
+            assert_eq!(faults, expect);
+        };
+        let (e, g, a, b) = (DVec3::ZERO, DVec3::NEG_Z, DVec2::NEG_ONE, DVec2::ONE);
+        check(e, g, 1.0, a, b, &[]);
+        check(e, g, 1.0, b, a, &[]);
+        check(e, g, 0.0, a, b, &[InvalidValue::NotPositive(Parameter::WindowDistance)]);
+        check(e, g, f64::NAN, a, b, &[InvalidValue::NotFinite(Parameter::WindowDistance)]);
+        check(e, DVec3::ZERO, 1.0, a, b, &[InvalidValue::ZeroDirection(Parameter::Gaze)]);
+        check(DVec3::NAN, g, 1.0, a, b, &[InvalidValue::NotFinite(Parameter::Eye)]);
+        check(e, g, 1.0, DVec2::NAN, b, &[InvalidValue::NotFinite(Parameter::WindowCorner)]);
+        check(e, g, 1.0, a, DVec2::new(-1.0, 1.0), &[InvalidValue::EmptyWindowWidth]);
+        check(
+            e,
+            g,
+            -1.0,
+            a,
+            a,
+            &[
+                InvalidValue::NotPositive(Parameter::WindowDistance),
+                InvalidValue::EmptyWindowWidth,
+                InvalidValue::EmptyWindowHeight,
+            ],
+        );
+    }
+
+    #[test]
+    fn the_basis_is_that_of_the_language() {
+        let camera = pinhole(DVec3::NEG_Z * 1e-200, DVec3::new(0.0, 1e200, 1e200)).unwrap();
+        let (u, v, w) = camera.basis();
+        assert!(u.distance(DVec3::X) < 1e-15 && v.distance(DVec3::Y) < 1e-15 && w == DVec3::Z);
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_parallel_as_written_is_found_parallel(
+            x in -1000..=1000i32, y in -1000..=1000i32, z in 1..=1000i32,
+            factor in prop_oneof![-1000..=-1i32, 1..=1000i32],
+            scale in -300..=300i32,
+        ) {
+            // The decimals that a script would hold: parallel on paper, rounded one by one when they are read.
+            let read = |n: i32, exponent: i32| format!("{n}e{exponent}").parse::<f64>().unwrap();
+            let gaze = DVec3::new(read(x, -3), read(y, -3), read(z, -3));
+            let up = DVec3::new(read(x * factor, scale), read(y * factor, scale), read(z * factor, scale));
+            prop_assert_eq!(pinhole(gaze, up), Err(InvalidValue::GazeParallelToUp));
+        }
+
+        #[test]
+        fn what_is_a_billionth_apart_is_not_parallel(
+            x in -1000..=1000i32, y in -1000..=1000i32, z in 1..=1000i32, scale in -280..=280i32,
+        ) {
+            let gaze = DVec3::new(x.into(), y.into(), z.into());
+            let up = (gaze + gaze.any_orthogonal_vector().normalize() * gaze.length() * 1e-9) * 10f64.powi(scale);
+            let (u, v, w) = pinhole(gaze, up).unwrap().basis();
+            for (a, b) in [(u, v), (v, w), (w, u)] {
+                prop_assert!(a.dot(b).abs() < 1e-14 && (a.length() - 1.0).abs() < 1e-14);
+            }
+        }
+    }
+}
