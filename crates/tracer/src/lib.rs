@@ -70,7 +70,7 @@ pub enum RenderError {
     /// The flag of [`RenderOptions::cancel`] was raised.
     #[error("rendering was cancelled")]
     Cancelled,
-    /// The coordinates are so large that their differences are not finite.
+    /// Of single rays alone: the coordinates are so large that their differences are not finite.
     #[error("the scene is too vast: distances in it are not finite numbers")]
     TooVast,
     /// The image does not fit into this machine's address space.
@@ -84,10 +84,7 @@ pub enum RenderError {
 }
 
 /// The numbers that [`Precision::Auto`] chooses for a scene.
-///
-/// # Errors
-/// When the scene cannot be rendered at any precision.
-pub fn precision(scene: &Scene) -> Result<Precision, RenderError> {
+pub fn precision(scene: &Scene) -> Precision {
     fast::precision(scene)
 }
 

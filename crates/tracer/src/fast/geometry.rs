@@ -54,7 +54,19 @@ pub(super) struct Geometry {
     pub(super) center: DVec3,
 }
 
+/// Sizes below this, in a scene of size 1, have products that vanish.
+const VANISHING: f64 = 1e-100;
+
 impl Geometry {
+    /// Whether the scene's sizes are so near to each other that their products are numbers.
+    pub(super) fn is_even(&self) -> bool {
+        self.solids.iter().all(|solid| {
+            let (min, max) = solid.bounds();
+            let size = (max - min).max_element();
+            size == 0.0 || size > VANISHING
+        })
+    }
+
     /// # Errors
     /// When the scene is so large that its size is not a number.
     pub(super) fn new(scene: &Scene) -> Result<Self, RenderError> {

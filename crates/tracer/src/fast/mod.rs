@@ -62,7 +62,7 @@ use rayfold_scene::Scene;
 use crate::parallel::{CHANNELS, bands};
 use crate::{Precision, RenderError, RenderOptions};
 use geometry::{Geometry, Solid};
-use prepare::{MASKED, Prepared};
+use prepare::Prepared;
 use real::Real;
 use search::Features;
 use tile::{Band, Scratch, Tile};
@@ -76,17 +76,22 @@ const SIDE: (u32, u32) = (16, 16);
 /// # Errors
 /// Those of [`crate::render`].
 pub(crate) fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    if !has_kernels(options) {
-        return crate::reference::render(scene, options);
-    }
-    let geometry = Geometry::new(scene)?;
-    let precision = match options.precision {
-        Precision::Auto => precision::choose(&geometry, (scene.screen.width(), scene.screen.height())),
-        forced => forced,
+    let geometry = match Geometry::new(scene) {
+        Ok(geometry) if geometry.is_even() && has_kernels(options) => geometry,
+        // Numbers that the kernels cannot hold are left to the tracer that takes them one by one.
+        _ => return crate::reference::render(scene, options),
     };
-    match precision {
+    match resolve(options.precision, &geometry, scene) {
         Precision::F64 => draw::<f64>(scene, &geometry, options),
         Precision::F32 | Precision::Auto => draw::<f32>(scene, &geometry, options),
+    }
+}
+
+/// The precision that is meant.
+fn resolve(precision: Precision, geometry: &Geometry, scene: &Scene) -> Precision {
+    match precision {
+        Precision::Auto => precision::choose(geometry, (scene.screen.width(), scene.screen.height())),
+        forced => forced,
     }
 }
 
@@ -102,9 +107,11 @@ fn has_kernels(_: &RenderOptions) -> bool {
 }
 
 /// The precision that [`Precision::Auto`] stands for in a scene.
-pub(crate) fn precision(scene: &Scene) -> Result<Precision, RenderError> {
-    let geometry = Geometry::new(scene)?;
-    Ok(precision::choose(&geometry, (scene.screen.width(), scene.screen.height())))
+pub(crate) fn precision(scene: &Scene) -> Precision {
+    match Geometry::new(scene) {
+        Ok(geometry) if geometry.is_even() => resolve(Precision::Auto, &geometry, scene),
+        _ => Precision::F64,
+    }
 }
 
 fn draw<E: Kernels>(
@@ -112,15 +119,12 @@ fn draw<E: Kernels>(
     geometry: &Geometry,
     options: &RenderOptions,
 ) -> Result<RgbImage, RenderError> {
-    let plant = match options.tree {
-        Some(tree) => tree && !geometry.solids.is_empty() || geometry.solids.len() > MASKED,
-        None => geometry.solids.len() > MASKED,
-    };
-    let prepared = Prepared::<E>::new(scene, geometry, plant);
+    let prepared = Prepared::<E>::new(scene, geometry, options.tree);
     let size = (scene.screen.width(), scene.screen.height());
     let side = options.tile.unwrap_or(SIDE);
     let whole = geometry.whole();
-    let mut solids: Vec<&Solid> = if plant { vec![&whole] } else { geometry.solids.iter().collect() };
+    let mut solids: Vec<&Solid> =
+        if prepared.tree.is_some() { vec![&whole] } else { geometry.solids.iter().collect() };
     solids.sort_by_key(|solid| solid.kind_rank());
     let window = Window::new(geometry, &solids, size, side, E::ROUNDOFF);
     let background = crate::reference::levels(scene.background());

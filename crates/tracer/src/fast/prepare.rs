@@ -149,9 +149,17 @@ pub(super) struct Prepared<E> {
 pub(super) const MASKED: usize = 64;
 
 impl<E: Real> Prepared<E> {
-    pub(super) fn new(scene: &Scene, geometry: &Geometry, plant: bool) -> Self {
+    /// `tree` says whether to look for objects down a tree, if it matters; what masks cannot hold then is one leaf.
+    pub(super) fn new(scene: &Scene, geometry: &Geometry, tree: Option<bool>) -> Self {
         let mut solids = geometry.solids.clone();
-        let branches = plant.then(|| tree::plant(&mut solids));
+        let many = solids.len() > MASKED;
+        let branches = match tree {
+            _ if solids.is_empty() => None,
+            Some(false) if many => Some(tree::stump(&solids)),
+            None if !many => None,
+            Some(false) => None,
+            _ => Some(tree::plant(&mut solids)),
+        };
         let mut entries: Vec<Entry<E>> = scene.objects.iter().map(entry).collect();
         let (mut spheres, mut cuboids, mut triangles) = (vec![], vec![], vec![]);
         for solid in &solids {

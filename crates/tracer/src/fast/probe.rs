@@ -7,12 +7,13 @@ use fearless_simd::{Level, Simd};
 use glam::DVec3;
 use rayfold_scene::Scene;
 
-use super::Everything;
 use super::geometry::Geometry;
 use super::intersect::Ray;
-use super::prepare::{MASKED, Prepared};
+use super::prepare::Prepared;
 use super::real::{Lanes, Real, Vec3, splat};
 use super::search::{Candidates, nearest, unshaded};
+use super::tile::surface;
+use super::{Everything, resolve};
 use crate::{Precision, RenderError, RenderOptions};
 
 /// What a ray meets first.
@@ -22,11 +23,13 @@ pub struct Found {
     pub object: usize,
     /// Distance from the ray's origin in world units.
     pub distance: f64,
+    /// Unit normal on the side that the ray came from.
+    pub normal: DVec3,
 }
 
 /// The nearest hit of each ray, `(origin, direction)` with a direction of length 1.
 ///
-/// The precision is `f32` if not forced. Rays whose origin is the camera's eye are traced as pictures trace them from
+/// Rays whose origin is the camera's eye are traced as pictures trace them from
 /// there.
 ///
 /// # Errors
@@ -59,7 +62,7 @@ pub fn lit(
     options: &RenderOptions,
 ) -> Result<Vec<bool>, RenderError> {
     let geometry = Geometry::new(scene)?;
-    match options.precision {
+    match resolve(options.precision, &geometry, scene) {
         Precision::F64 => probe::<f64, bool>(scene, &geometry, points, options, |batch, level, out| {
             on!(level, simd => batch.lit(simd, out));
         }),
@@ -82,9 +85,7 @@ fn probe<E: Real, T>(
     options: &RenderOptions,
     run: impl Fn(&Batch<E>, Level, &mut Vec<T>),
 ) -> Result<Vec<T>, RenderError> {
-    let count = geometry.solids.len();
-    let plant = count > MASKED || (count > 0 && options.tree == Some(true));
-    let prepared = Prepared::<E>::new(scene, geometry, plant);
+    let prepared = Prepared::<E>::new(scene, geometry, options.tree);
     let mut out = Vec::with_capacity(rays.len());
     run(&Batch { scene: &prepared, geometry, rays }, options.level.unwrap_or_else(Level::new), &mut out);
     Ok(out)
@@ -124,10 +125,33 @@ impl<E: Real> Batch<'_, E> {
                     nearest::<S, E, Everything, false>(simd, self.scene, ray, Candidates::MAX)
                 };
                 let hit = found.hit(simd).to_bitmask();
-                for lane in 0..count {
+                let mut normals = [DVec3::ZERO; 16];
+                let mut remaining = hit;
+                while remaining != 0 {
+                    let order = found.order[remaining.trailing_zeros() as usize];
+                    let entry = &self.scene.entries[order.to_index()];
+                    let normal = if from_eye {
+                        surface::<S, E, Everything, true>(simd, self.scene, entry, ray, found.distance).normal
+                    } else {
+                        surface::<S, E, Everything, false>(simd, self.scene, entry, ray, found.distance)
+                            .normal
+                    };
+                    for (lane, known) in normals.iter_mut().enumerate().take(Lanes::<S, E>::LEN) {
+                        if found.order[lane] == order {
+                            *known = DVec3::new(
+                                normal.x[lane].widen(),
+                                normal.y[lane].widen(),
+                                normal.z[lane].widen(),
+                            );
+                            remaining &= !(1 << lane);
+                        }
+                    }
+                }
+                for (lane, normal) in normals.into_iter().enumerate().take(count) {
                     out.push((hit >> lane & 1 != 0).then(|| Found {
                         object: found.order[lane].to_index(),
                         distance: found.distance[lane].widen() / self.geometry.scale,
+                        normal,
                     }));
                 }
             },

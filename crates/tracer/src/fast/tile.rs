@@ -441,7 +441,7 @@ fn own_shadow<E: Real, const EYE: bool>(scene: &Prepared<E>, entry: &Entry<E>) -
 
 /// An object's surface where the rays meet it.
 #[inline(always)]
-fn surface<S: Simd, E: Real, F: Features, const EYE: bool>(
+pub(super) fn surface<S: Simd, E: Real, F: Features, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
     entry: &Entry<E>,

@@ -46,6 +46,11 @@ impl Boundable for Bounds {
     }
 }
 
+/// All solids in one leaf.
+pub(super) fn stump(solids: &[Solid]) -> Branches {
+    Branches(vec![(0, solids.len() as u32)])
+}
+
 /// Groups the solids and puts them in the order of the leaves; there is at least one.
 pub(super) fn plant(solids: &mut Vec<Solid>) -> Branches {
     let single = |v: DVec3| Vec3A::from(v.as_vec3());
