@@ -10,6 +10,7 @@ pub mod accuracy;
 pub mod cpu_time;
 pub mod hard_cases;
 pub mod oracle;
+pub mod parsing;
 mod plot;
 pub mod scenes;
 pub mod tracers;

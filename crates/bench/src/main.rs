@@ -1,7 +1,7 @@
 //! The program that measures: a subcommand a report.
 
 use clap::{Parser, Subcommand};
-use rayfold_bench::accuracy;
+use rayfold_bench::{accuracy, parsing};
 
 #[derive(Debug, Parser)]
 #[command(name = "rayfold-bench", about = "Measures rayfold and writes the reports in docs/reports")]
@@ -14,10 +14,13 @@ struct Cli {
 enum Measurement {
     /// Error and speed of every way to trace, and the hard cases at full size
     Accuracy(accuracy::Args),
+    /// What it takes to read and write the largest scripts
+    Parsing(parsing::Args),
 }
 
 fn main() -> anyhow::Result<()> {
     match Cli::parse().measurement {
         Measurement::Accuracy(args) => accuracy::run(&args),
+        Measurement::Parsing(args) => parsing::run(&args),
     }
 }
