@@ -23,7 +23,7 @@ use rayfold_scene::{AnimationSettings, Limits, natural_cmp, parse, parse_setting
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 
 /// Longer than anything here takes on a loaded machine.
-pub const PATIENCE: Duration = Duration::from_secs(120);
+pub const PATIENCE: Duration = Duration::from_secs(240);
 
 pub struct Stage {
     pub platform: Platform,

@@ -7,6 +7,8 @@ use clap::{Parser, Subcommand};
 
 use crate::cloud::{fetch, remove, retry, status, submit};
 use crate::console::{Color, Console};
+#[cfg(unix)]
+use crate::dev;
 use crate::outcome::{Outcome, exit_code};
 use crate::{check, completions, cost, interrupt, render, split};
 
@@ -54,6 +56,8 @@ enum Command {
     Fetch(fetch::Args),
     Retry(retry::Args),
     Remove(remove::Args),
+    #[cfg(unix)]
+    Dev(dev::Args),
     Completions(completions::Args),
 }
 
@@ -69,6 +73,8 @@ impl Command {
             Self::Fetch(args) => fetch::run(&args, console),
             Self::Retry(args) => retry::run(&args, console),
             Self::Remove(args) => remove::run(&args, console),
+            #[cfg(unix)]
+            Self::Dev(args) => dev::run(&args, console),
             Self::Completions(args) => completions::run(&args, console),
         }
     }
