@@ -22,9 +22,9 @@ use crate::{check, completions, cost, interrupt, render, split};
     arg_required_else_help = true,
     after_help = "\
 Examples:
-  rayfold render scenes/hello -o hello.gif      render a folder of scripts to an animation
-  rayfold check scenes/hello                    show what is wrong with its scripts
-  rayfold render --help                         more about rendering
+  rayfold render scenes/hello -o hello.gif         render a folder of scripts to an animation
+  rayfold check scenes/hello                       show what is wrong with its scripts
+  rayfold submit scenes/hello --bucket my-bucket   render it in the cloud
 
 Exit codes: 0 done, 1 the input or the rendering failed, 2 wrong usage, 130 interrupted."
 )]
