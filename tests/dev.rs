@@ -50,6 +50,7 @@ impl Dev {
             region: of("AWS_REGION"),
             access_key: of("AWS_ACCESS_KEY_ID"),
             secret_key: of("AWS_SECRET_ACCESS_KEY"),
+            session_token: None,
         };
         S3Store::at(&connection, "rayfold")
     }
