@@ -32,7 +32,17 @@ pub enum Folded {
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
     /// Sees to it that the manifest shows `fact`.
     pub(crate) async fn fold(&self, animation: &Animation, fact: &Fact) -> Result<Folded> {
-        let mut known = self.manifest(animation).await?;
+        let known = self.manifest(animation).await?;
+        self.fold_from(animation, fact, known).await
+    }
+
+    /// The same from a manifest that has just been read.
+    pub(crate) async fn fold_from(
+        &self,
+        animation: &Animation,
+        fact: &Fact,
+        mut known: Option<Known>,
+    ) -> Result<Folded> {
         if self.is_covered(known.as_ref(), fact) {
             return Ok(Folded::Covered);
         }

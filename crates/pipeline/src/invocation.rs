@@ -103,6 +103,20 @@ pub enum Mutation {
     DropGifCondition,
 }
 
+impl Mutation {
+    /// All of them.
+    pub const ALL: [Mutation; 8] = [
+        Mutation::SkipSecondListing,
+        Mutation::ClaimBeforeCommit,
+        Mutation::DropIfMatch,
+        Mutation::LeaveOwnCommit,
+        Mutation::NeverClaim,
+        Mutation::AssemblerLeavesEarly,
+        Mutation::AssemblerDoesNotLookAgain,
+        Mutation::DropGifCondition,
+    ];
+}
+
 /// A manifest as it was read or written.
 #[derive(Debug, Clone)]
 pub(crate) struct Known {

@@ -16,6 +16,8 @@ mod observe;
 pub mod reconcile;
 pub mod render;
 pub mod retry;
+#[cfg(any(test, feature = "simulation"))]
+pub mod simulation;
 pub mod store;
 pub mod studio;
 pub mod sweep;

@@ -207,6 +207,14 @@ impl Manifest {
             && self.frames.iter().zip(&other.frames).all(|(a, b)| a.agrees_with(b))
     }
 
+    /// The parts of a split script's version that are still to come; `None` when it does not show the split.
+    pub fn pending_parts(&self, name: &ScriptName, version: &ETag) -> Option<Vec<NonZeroU64>> {
+        let frames = self.frames.iter().filter(|frame| frame.script == *name && frame.version == *version);
+        let mut parts = frames.filter_map(|frame| Some((frame.part?, &frame.state))).peekable();
+        parts.peek()?;
+        Some(parts.filter(|(_, state)| **state == FrameState::Pending).map(|(part, _)| part).collect())
+    }
+
     /// Whether it shows the fact.
     pub fn shows(&self, fact: &Fact) -> bool {
         let of = |name: &ScriptName, version: &ETag| {

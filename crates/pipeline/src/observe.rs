@@ -1,7 +1,8 @@
 //! Listing an animation: both prefixes at once, in ranges side by side when it is large, and what the listing alone
 //! does not show (settings, the parts of split scripts, the reasons of faults).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::num::NonZeroU64;
 
 use futures_util::future::try_join;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
@@ -165,6 +166,28 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(())
     }
 
+    /// Which parts of a split script have neither frame nor error yet.
+    pub(crate) async fn missing_parts(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        version: &ETag,
+        count: NonZeroU64,
+    ) -> Result<Vec<NonZeroU64>> {
+        let prefix = format!("{}{}", animation.frames(), Tag::receipts_of(name, version));
+        let listed = self.list_ranges(ListRequest::all(prefix), Vec::new()).await?;
+        let there: BTreeSet<NonZeroU64> = listed
+            .into_iter()
+            .filter_map(receipt)
+            .filter_map(|found| match found.receipt {
+                Receipt::Frame { part, .. } | Receipt::Fault { part, .. } => part,
+                _ => None,
+            })
+            .collect();
+        let numbers = (1..=count.get()).filter_map(NonZeroU64::new);
+        Ok(numbers.filter(|number| !there.contains(number)).collect())
+    }
+
     /// Adds the reasons of faults: those that the manifest has, and when nothing is left to come all others. Says
     /// whether they could be had; if not, the listing is out of date.
     async fn add_reasons(
@@ -251,7 +274,9 @@ pub(crate) fn standing(receipts: &[ReceiptFound], part: Part) -> Option<Standing
     let mut standing = None;
     for found in receipts {
         let next = match &found.receipt {
-            Receipt::Split { .. } if part.is_none() => Standing::Split,
+            Receipt::Split { tag, count, .. } if part.is_none() => {
+                Standing::Split { tag: tag.clone(), count: *count }
+            }
             Receipt::Frame { tag, part: of, .. } if *of == part => Standing::Drawn(tag.pixels),
             Receipt::Fault { part: of, .. } if *of == part => Standing::Faulty(found.etag.clone()),
             _ => continue,
@@ -269,7 +294,12 @@ pub(crate) enum Standing {
     /// A frame of this pixel version.
     Drawn(u32),
     /// Several frames.
-    Split,
+    Split {
+        /// What the parts' keys have.
+        tag: Tag,
+        /// How many frames.
+        count: NonZeroU64,
+    },
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {

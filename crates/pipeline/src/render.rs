@@ -4,6 +4,7 @@
 //! event for the current version; looks whether that version has a result already; draws it, puts the result under a
 //! key that names script and version, only if it is not there yet; and folds.
 
+use std::collections::BTreeSet;
 use std::future::Future;
 use std::num::NonZeroU64;
 use std::pin::pin;
@@ -18,8 +19,8 @@ use crate::invocation::Invocation;
 use crate::keys::{Animation, Key, Part, Receipt, ScriptName, Tag};
 use crate::manifest::{Fact, Reason};
 use crate::observe::Standing;
-use crate::store::{ETag, Store};
-use crate::{Clock, Error, Result};
+use crate::store::{ETag, ListRequest, Store};
+use crate::{Clock, Error, Result, Timestamp};
 
 /// What draws. The functions bring [`crate::studio::Studio`], the simulation something smaller.
 pub trait Renderer: Send + Sync {
@@ -149,15 +150,20 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 (Outcome::Superseded, Fact::Version(name.clone(), script.info.etag))
             }
             Some(script) => {
-                let version = script.info.etag;
+                let (version, uploaded) = (script.info.etag, script.info.modified);
                 match self.standing(&animation, &name, &version, part).await? {
+                    Some(Standing::Split { tag, count }) => {
+                        stages.read = self.clock.now().since(start);
+                        return self.follow_split(animation, name, tag, count, uploaded, stages).await;
+                    }
                     Some(standing) => (Outcome::Present, standing.fact(name.clone(), version, part)),
                     None => {
                         let read = self.clock.now();
                         let drawing = self.draw(renderer, &name, script.body, part).await?;
                         let drawn = self.clock.now();
                         stages.draw = drawn.since(read);
-                        let put = self.put_drawing(&animation, &name, version, part, drawing).await?;
+                        let put =
+                            self.put_drawing(&animation, &name, (version, uploaded), part, drawing).await?;
                         stages.put = self.clock.now().since(drawn);
                         put
                     }
@@ -196,7 +202,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         &self,
         animation: &Animation,
         name: &ScriptName,
-        version: ETag,
+        (version, uploaded): (ETag, Timestamp),
         part: Part,
         drawing: Drawing,
     ) -> Result<(Outcome, Fact)> {
@@ -209,7 +215,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 (Outcome::Drawn, Fact::Drawn(name, version, part, self.policy.pixels))
             }
             Drawing::Split(count) => {
-                self.put_parts(animation, &name, &tag, count).await?;
+                self.put_parts(animation, &name, &tag, count, uploaded).await?;
                 let receipt = Receipt::Split { name: name.clone(), tag, count };
                 self.put_receipt(&animation.receipt(&receipt), Bytes::new(), "text/plain").await?;
                 (Outcome::Split(count), Fact::Split(name, version))
@@ -240,34 +246,95 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.put_receipt(&key, body.into(), "application/json").await
     }
 
-    /// Wakes an invocation for each part. Parts that are there have had their event.
+    /// Wakes an invocation for each part. Parts that have been put since the script was uploaded have had their event;
+    /// that of older ones may have come while another version was current.
     async fn put_parts(
         &self,
         animation: &Animation,
         name: &ScriptName,
         tag: &Tag,
         count: NonZeroU64,
+        uploaded: Timestamp,
     ) -> Result<()> {
-        let parts = (1..=count.get()).filter_map(NonZeroU64::new).map(|number| async move {
-            let body = serde_json::json!({
-                "script": animation.script(name),
-                "version": tag.version,
-                "trace": number,
-                "of": count,
-            });
-            let (animation, name, tag) = (animation.clone(), name.clone(), tag.clone());
-            let key = Key::Part { animation, name, tag, number }.to_string();
-            self.put_receipt(&key, body.to_string().into(), "application/json").await.map(drop)
+        let numbers = (1..=count.get()).filter_map(NonZeroU64::new);
+        let parts = numbers.map(|number| async move {
+            let (key, body) = part_object(animation, name, tag, number, count);
+            if self.put_receipt(&key, body.clone(), "application/json").await?.is_none()
+                && self.head(&key).await?.is_none_or(|part| part.modified <= uploaded)
+            {
+                self.put(&key, body).await?;
+            }
+            Ok(())
         });
         let concurrency = self.policy.concurrency;
         stream::iter(parts).map(Ok).try_for_each_concurrent(concurrency, |part| part).await
     }
+
+    /// The script is split already. Parts whose events came while another version was current have drawn nothing: those
+    /// that were put before this upload and have no result are woken anew.
+    async fn follow_split(
+        &self,
+        animation: Animation,
+        name: ScriptName,
+        tag: Tag,
+        count: NonZeroU64,
+        uploaded: Timestamp,
+        mut stages: Stages,
+    ) -> Result<Rendered> {
+        let start = self.clock.now();
+        let known = self.manifest(&animation).await?;
+        let pending = known.as_ref().and_then(|known| known.manifest.pending_parts(&name, &tag.version));
+        if !pending.is_some_and(|pending| pending.is_empty()) {
+            self.wake_lost_parts(&animation, &name, &tag, count, uploaded).await?;
+        }
+        let fact = Fact::Split(name.clone(), tag.version);
+        let folded = self.fold_from(&animation, &fact, known).await?;
+        stages.fold = self.clock.now().since(start);
+        Ok(Rendered { animation, script: Some(name), outcome: Outcome::Present, folded, stages })
+    }
+
+    async fn wake_lost_parts(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        tag: &Tag,
+        count: NonZeroU64,
+        uploaded: Timestamp,
+    ) -> Result<()> {
+        let prefix = format!("{}{name}@{tag}/", animation.parts());
+        let mut old = self.list_ranges(ListRequest::all(prefix), Vec::new()).await?;
+        old.retain(|part| part.modified <= uploaded);
+        if old.is_empty() {
+            return Ok(());
+        }
+        let old: BTreeSet<String> = old.into_iter().map(|part| part.key).collect();
+        let missing = self.missing_parts(animation, name, &tag.version, count).await?;
+        let parts = missing.into_iter().map(|number| part_object(animation, name, tag, number, count));
+        let lost: Vec<_> = parts.filter(|(key, _)| old.contains(key)).collect();
+        let puts = lost.into_iter().map(|(key, body)| async move { self.put(&key, body).await.map(drop) });
+        let concurrency = self.policy.concurrency;
+        stream::iter(puts).map(Ok).try_for_each_concurrent(concurrency, |put| put).await
+    }
+}
+
+/// The object that wakes an invocation for a part.
+fn part_object(
+    animation: &Animation,
+    name: &ScriptName,
+    tag: &Tag,
+    number: NonZeroU64,
+    of: NonZeroU64,
+) -> (String, Bytes) {
+    let (script, version) = (animation.script(name), &tag.version);
+    let body = serde_json::json!({ "script": script, "version": version, "trace": number, "of": of });
+    let (animation, name, tag) = (animation.clone(), name.clone(), tag.clone());
+    (Key::Part { animation, name, tag, number }.to_string(), body.to_string().into())
 }
 
 impl Standing {
     pub(crate) fn fact(self, name: ScriptName, version: ETag, part: Part) -> Fact {
         match self {
-            Standing::Split => Fact::Split(name, version),
+            Standing::Split { .. } => Fact::Split(name, version),
             Standing::Drawn(pixels) => Fact::Drawn(name, version, part, pixels),
             Standing::Faulty(receipt) => Fact::Faulty(name, version, part, receipt),
         }

@@ -4,7 +4,8 @@ use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::retry::{Scope, retry};
 use rayfold_pipeline::{Invocation, Policy, Randomness, SystemClock};
 
-use super::{BucketArgs, must_exist, parse_animation, with_bucket};
+use super::{BucketArgs, parse_animation, with_bucket};
+use crate::cloud::watch::Watch;
 use crate::console::Console;
 use crate::outcome::Outcome;
 use crate::wording::number;
@@ -31,7 +32,14 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let scope = if args.all { Scope::All } else { Scope::Failed };
     with_bucket(&args.bucket, async |store| {
-        must_exist(store, &args.animation).await?;
+        let mut watch = Watch::new(store, &args.animation);
+        watch.look().await?;
+        anyhow::ensure!(
+            watch.manifest.is_some(),
+            "there is no animation {} in {}",
+            args.animation,
+            store.bucket()
+        );
         let (seed, request) = (fastrand::u64(..), format!("retry-{:016x}", fastrand::u64(..)));
         let (random, policy) = (Randomness::seeded(seed), Policy::default());
         let invocation = Invocation::new(store, &SystemClock, &random, &policy, &request);

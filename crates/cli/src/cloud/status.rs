@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use clap::ValueEnum;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 use rayfold_pipeline::keys::{Animation, Key, MANIFESTS, SCRIPTS};
 use rayfold_pipeline::manifest::{Head, Reason};
@@ -9,8 +10,8 @@ use rayfold_pipeline::store::{ListRequest, S3Store};
 use serde::Serialize;
 
 use super::watch::Watch;
-use super::{BucketArgs, SIDE_BY_SIDE, list, must_exist, parse_animation, report, with_bucket};
-use crate::console::{Console, Format};
+use super::{BucketArgs, SIDE_BY_SIDE, list, parse_animation, report, with_bucket};
+use crate::console::Console;
 use crate::outcome::Outcome;
 use crate::wording::Size;
 
@@ -36,6 +37,15 @@ pub(crate) struct Args {
     /// How to show it
     #[arg(long, value_enum, default_value_t)]
     format: Format,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// For people
+    #[default]
+    Text,
+    /// For programs: a document with `animations`; with --watch one in a line for each change
+    Json,
 }
 
 #[derive(Serialize)]
@@ -90,8 +100,9 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
             if let (Some(animation), [watch]) = (&args.animation, watches.as_slice())
                 && watch.manifest.is_none()
                 && !args.watch
+                && !exists(store, animation).await?
             {
-                must_exist(store, animation).await?;
+                anyhow::bail!("there is no animation {animation} in {}", store.bucket());
             }
             let shown = match args.format {
                 Format::Text => table(&names, &watches),
@@ -151,6 +162,11 @@ async fn animations(store: &S3Store) -> anyhow::Result<Vec<Animation>> {
     }
     names.sort();
     Ok(names)
+}
+
+async fn exists(store: &S3Store, animation: &Animation) -> anyhow::Result<bool> {
+    let (scripts, _) = list(store, ListRequest::level(animation.scripts())).await?;
+    Ok(!scripts.is_empty())
 }
 
 fn table(names: &[Animation], watches: &[Watch<'_>]) -> String {

@@ -34,17 +34,12 @@ impl<'a> Watch<'a> {
     /// Those of the store.
     pub(crate) async fn look(&mut self) -> rayfold_pipeline::Result<bool> {
         let key = self.animation.manifest();
-        // At first a whole GET, whose refusal says more than that of a HEAD.
-        let is_known = match &self.version {
-            Some(_) => found(self.store.head(&key).await)?.map(|info| info.etag) == self.version,
-            None => false,
-        };
+        let version = found(self.store.head(&key).await)?.map(|info| info.etag);
         let mut changed = false;
-        if !is_known {
+        if version != self.version {
+            changed = true;
             let object = found(self.store.get(&key).await)?;
-            let version = object.as_ref().map(|object| object.info.etag.clone());
-            changed = version != self.version;
-            self.version = version;
+            self.version = object.as_ref().map(|object| object.info.etag.clone());
             self.manifest =
                 object.map(|object| Manifest::decode(self.animation, &object.body)).transpose()?;
         }

@@ -1,0 +1,469 @@
+//! The simulated bucket: latency, faults, kills, and what the platform counts.
+//!
+//! A request takes effect at some moment between its start and its answer, whether or not whoever sent it still lives.
+//! Listings are not atomic: each name is seen as it was at one of two moments within the request.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use bytes::{Bytes, BytesMut};
+
+use super::engine::{Engine, WorldClock, lock};
+use crate::store::{
+    Bucket, Condition, ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, Upload,
+};
+use crate::{Clock, Error, Randomness, Result};
+
+/// How often things go wrong: once in so many; never when 0.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Faults {
+    /// 503.
+    pub(super) busy: u64,
+    /// 409 for a conditional put.
+    pub(super) conflict: u64,
+    /// The answer is lost.
+    pub(super) lost_answer: u64,
+    /// Listings mix two moments.
+    pub(super) torn_listings: bool,
+    /// A request takes up to eight times as long.
+    pub(super) slow: u64,
+}
+
+/// Who sends requests.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Actor {
+    /// Someone who uploads, or a command.
+    User,
+    /// The render function.
+    Render,
+    /// The assemble function.
+    Assemble,
+}
+
+/// One kind of request, as permissions know it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Action {
+    /// `s3:GetObject`: `get`, `get_range`, `head`.
+    Get,
+    /// `s3:PutObject`: `put`, `upload`.
+    Put,
+    /// `s3:DeleteObject`.
+    Delete,
+    /// `s3:ListBucket`.
+    List,
+}
+
+/// What happens to one invocation.
+#[derive(Debug)]
+pub(super) struct Fate {
+    /// Requests until it is killed; never when it starts at 0.
+    countdown: AtomicU32,
+    /// Whether the request that it is killed in is lost, too.
+    lose_last: bool,
+    /// How much later the request lands otherwise.
+    delay_last: Duration,
+    killed: AtomicBool,
+    requests: AtomicU64,
+}
+
+impl Fate {
+    pub(super) fn new(kill_in_request: u32, lose_last: bool, delay_last: Duration) -> Self {
+        Fate {
+            countdown: AtomicU32::new(kill_in_request),
+            lose_last,
+            delay_last,
+            killed: AtomicBool::new(false),
+            requests: AtomicU64::new(0),
+        }
+    }
+
+    pub(super) fn requests(&self) -> u64 {
+        self.requests.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn is_killed(&self) -> bool {
+        self.killed.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn kill(&self) {
+        self.killed.store(true, Ordering::Relaxed);
+    }
+}
+
+/// What the bucket tells the world after a change: who, which key, whether it is there now.
+pub(super) type Notify = dyn Fn(Actor, &str, bool, &Bucket) + Send + Sync;
+
+/// The bucket and everything around it.
+pub(super) struct Grounds {
+    pub(super) engine: Engine,
+    pub(super) random: Randomness,
+    pub(super) faults: Mutex<Faults>,
+    pub(super) bucket: Mutex<Bucket>,
+    pub(super) notify: Mutex<Option<Arc<Notify>>>,
+    /// Told when a function has listed scripts: the moment at which a change is most awkward.
+    pub(super) listed: Mutex<Option<Arc<dyn Fn() + Send + Sync>>>,
+    /// What users have overwritten or deleted, and where.
+    pub(super) past: Mutex<Vec<(String, Option<String>)>>,
+    /// A write took effect after its sender was killed.
+    pub(super) late_writes: AtomicU64,
+    /// What each actor was seen doing, with the prefix up to the first slash.
+    pub(super) seen: Mutex<std::collections::BTreeSet<(Actor, Action, String)>>,
+    /// Requests by actor.
+    pub(super) requests: [AtomicU64; 3],
+    /// What happened, line by line, for whoever replays a run.
+    pub(super) log: Option<Mutex<Vec<String>>>,
+}
+
+impl Grounds {
+    pub(super) fn new(engine: Engine, seed: u64, logged: bool) -> Arc<Self> {
+        Arc::new(Grounds {
+            log: logged.then(Mutex::default),
+            engine,
+            random: Randomness::seeded(seed),
+            faults: Mutex::default(),
+            bucket: Mutex::default(),
+            notify: Mutex::new(None),
+            listed: Mutex::new(None),
+            past: Mutex::default(),
+            late_writes: AtomicU64::new(0),
+            seen: Mutex::default(),
+            requests: Default::default(),
+        })
+    }
+
+    /// Writes a line into the log, if there is one.
+    pub(super) fn note(&self, line: impl FnOnce() -> String) {
+        if let Some(log) = &self.log {
+            let ms = self.engine.now_us() / 1000;
+            lock(log).push(format!("{ms:>8} ms  {}", line()));
+        }
+    }
+
+    /// True once in `of` times, never when `of` is 0.
+    pub(super) fn chance(&self, of: u64) -> bool {
+        of > 0 && self.random.one_in(of)
+    }
+
+    pub(super) fn between_ms(&self, range: Range<u64>) -> Duration {
+        Duration::from_micros(range.start * 1000 + self.random.below((range.end - range.start) * 1000))
+    }
+
+    fn changed(&self, actor: Actor, key: &str, there: bool) {
+        let notify = lock(&self.notify).clone();
+        if let Some(notify) = notify {
+            notify(actor, key, there, &lock(&self.bucket));
+        }
+    }
+}
+
+/// The bucket as one invocation sees it.
+#[derive(Clone)]
+pub(super) struct WorldStore {
+    pub(super) grounds: Arc<Grounds>,
+    pub(super) actor: Actor,
+    /// The request id.
+    pub(super) name: String,
+    pub(super) fate: Arc<Fate>,
+    /// Ends the invocation that uses this.
+    pub(super) die: Arc<dyn Fn() + Send + Sync>,
+}
+
+/// What a request answers.
+enum Answer {
+    Object(Object),
+    ETag(ETag),
+    Deleted,
+    Page(ListPage),
+}
+
+/// What a request does to the bucket.
+#[derive(Clone)]
+enum Effect {
+    Get(String, Range<u64>),
+    Put(String, Bytes, PutOptions),
+    Delete(String),
+    List(ListRequest),
+    /// Takes time and changes nothing: beginning an upload, sending a part of one.
+    Nothing(String),
+}
+
+impl Effect {
+    fn action(&self) -> Action {
+        match self {
+            Effect::Get(..) => Action::Get,
+            Effect::Put(..) | Effect::Nothing(_) => Action::Put,
+            Effect::Delete(_) => Action::Delete,
+            Effect::List(_) => Action::List,
+        }
+    }
+
+    fn key(&self) -> &str {
+        match self {
+            Effect::Get(key, _) | Effect::Put(key, ..) | Effect::Delete(key) | Effect::Nothing(key) => key,
+            Effect::List(request) => &request.prefix,
+        }
+    }
+
+    /// Milliseconds from request to answer.
+    fn latency_ms(&self) -> Range<u64> {
+        match self {
+            Effect::Get(..) => 10..25,
+            Effect::Put(..) | Effect::Delete(_) | Effect::Nothing(_) => 25..60,
+            Effect::List(_) => 20..40,
+        }
+    }
+
+    fn is_conditional(&self) -> bool {
+        matches!(self, Effect::Put(_, _, options) if options.condition != Condition::Always)
+    }
+}
+
+impl WorldStore {
+    async fn request(&self, effect: Effect) -> Result<Answer> {
+        let grounds = &self.grounds;
+        grounds.requests[self.actor as usize].fetch_add(1, Ordering::Relaxed);
+        self.fate.requests.fetch_add(1, Ordering::Relaxed);
+        let key = effect.key().to_owned();
+        let folder = key.split_inclusive('/').next().unwrap_or_default().to_owned();
+        lock(&grounds.seen).insert((self.actor, effect.action(), folder));
+
+        let faults = *lock(&grounds.faults);
+        let slowness = if grounds.chance(faults.slow) { 1 + grounds.random.below(8) } else { 1 };
+        let latency = grounds.between_ms(effect.latency_ms()) * u32::try_from(slowness).unwrap_or(1);
+        let before_effect = grounds.random.up_to(latency);
+        let countdown = self.fate.countdown.load(Ordering::Relaxed);
+        if countdown > 0 {
+            self.fate.countdown.store(countdown - 1, Ordering::Relaxed);
+            if countdown == 1 {
+                self.kill_within(latency);
+            }
+        }
+        if grounds.chance(faults.busy) {
+            grounds.engine.sleep(latency).await;
+            return Err(Error::Throttled { key, source: "slow down".into() });
+        }
+        if effect.is_conditional() && grounds.chance(faults.conflict) {
+            grounds.engine.sleep(latency).await;
+            return Err(Error::Conflict { key });
+        }
+        let slot = Arc::new(Mutex::new(None));
+        self.take_effect(before_effect, effect.clone(), slot.clone(), false);
+        if let (Effect::List(request), true) = (&effect, faults.torn_listings) {
+            let (grounds, request, slot) = (self.grounds.clone(), request.clone(), slot.clone());
+            let second = before_effect + self.grounds.random.up_to(latency.saturating_sub(before_effect));
+            self.grounds.engine.after(second, move || {
+                let later = lock(&grounds.bucket).list(&request);
+                let salt = grounds.random.bits();
+                let mut slot = lock(&slot);
+                if let Some(Ok(Answer::Page(page))) = slot.as_mut() {
+                    tear(page, later, salt);
+                }
+            });
+        }
+        grounds.engine.sleep(latency).await;
+        if grounds.chance(faults.lost_answer) {
+            // Either the caller sees that, or the client has repeated the request before it says anything.
+            if grounds.random.one_in(2) {
+                return Err(Error::Ambiguous { key, source: "connection reset".into() });
+            }
+            let again = Arc::new(Mutex::new(None));
+            self.take_effect(before_effect, effect, again.clone(), false);
+            grounds.engine.sleep(latency).await;
+            return take(&again, key);
+        }
+        take(&slot, key)
+    }
+
+    /// Ends the invocation at some moment of the request that it is about to send.
+    fn kill_within(&self, latency: Duration) {
+        let (fate, die) = (self.fate.clone(), self.die.clone());
+        let moment = self.grounds.random.up_to(latency);
+        self.grounds.engine.after(moment, move || {
+            fate.kill();
+            die();
+        });
+    }
+
+    fn take_effect(
+        &self,
+        delay: Duration,
+        effect: Effect,
+        slot: Arc<Mutex<Option<Result<Answer>>>>,
+        late: bool,
+    ) {
+        let store = self.clone();
+        self.grounds.engine.after(delay, move || {
+            if store.fate.is_killed() && !late {
+                if !store.fate.lose_last {
+                    store.take_effect(store.fate.delay_last, effect, slot, true);
+                }
+                return;
+            }
+            if late && matches!(effect, Effect::Put(..) | Effect::Delete(_)) {
+                store.grounds.late_writes.fetch_add(1, Ordering::Relaxed);
+            }
+            let line = store.grounds.log.as_ref().map(|_| describe(&effect));
+            let answer = store.apply(effect);
+            store.grounds.note(|| {
+                let outcome = match &answer {
+                    Ok(Answer::Object(object)) => format!("{}", object.info.etag),
+                    Ok(Answer::Page(page)) => {
+                        let keys = page.objects.iter().map(|object| object.key.as_str());
+                        keys.collect::<Vec<_>>().join(" ")
+                    }
+                    Ok(_) => String::new(),
+                    Err(error) => error.to_string(),
+                };
+                let late = if late { " (late)" } else { "" };
+                let line = line.unwrap_or_default();
+                format!("{:.6} {:?} {line}{late}: {outcome}", store.name, store.actor)
+            });
+            *lock(&slot) = Some(answer);
+        });
+    }
+
+    fn apply(&self, effect: Effect) -> Result<Answer> {
+        let grounds = &self.grounds;
+        match effect {
+            Effect::Get(key, range) => lock(&grounds.bucket).get_range(&key, range).map(Answer::Object),
+            Effect::List(request) => {
+                let page = lock(&grounds.bucket).list(&request);
+                let listed = lock(&grounds.listed).clone();
+                if let Some(listed) = listed.filter(|_| request.prefix.starts_with("scripts/")) {
+                    listed();
+                }
+                Ok(Answer::Page(page))
+            }
+            Effect::Nothing(_) => Ok(Answer::Deleted),
+            Effect::Put(key, body, options) => {
+                let now = WorldClock::exact(&grounds.engine).now();
+                let etag = lock(&grounds.bucket).put(now, &key, body, options)?;
+                grounds.changed(self.actor, &key, true);
+                Ok(Answer::ETag(etag))
+            }
+            Effect::Delete(key) => {
+                if lock(&grounds.bucket).delete(&key) {
+                    grounds.changed(self.actor, &key, false);
+                }
+                Ok(Answer::Deleted)
+            }
+        }
+    }
+}
+
+fn describe(effect: &Effect) -> String {
+    match effect {
+        Effect::Put(key, body, options) => {
+            let text = String::from_utf8_lossy(body);
+            let start: String = text.chars().take(300).map(|c| if c == '\n' { ' ' } else { c }).collect();
+            format!("put {key} {:?} {start}", options.condition)
+        }
+        Effect::Get(key, _) => format!("get {key}"),
+        Effect::Delete(key) => format!("delete {key}"),
+        Effect::List(request) => format!("list {}", request.prefix),
+        Effect::Nothing(key) => format!("part of {key}"),
+    }
+}
+
+fn take(slot: &Mutex<Option<Result<Answer>>>, key: String) -> Result<Answer> {
+    lock(slot).take().unwrap_or_else(|| Err(Error::Ambiguous { key, source: "no effect, no answer".into() }))
+}
+
+/// Replaces about half of the names of a page by what was there at a later moment.
+fn tear(page: &mut ListPage, later: ListPage, salt: u64) {
+    if page.next.is_some() || later.next.is_some() {
+        return;
+    }
+    let of_later = |name: &str| {
+        let hash = name.bytes().fold(salt, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29)
+        });
+        hash.count_ones() % 2 == 0
+    };
+    page.objects.retain(|object| !of_later(&object.key));
+    page.objects.extend(later.objects.into_iter().filter(|object| of_later(&object.key)));
+    page.objects.sort_by(|a, b| a.key.cmp(&b.key));
+    page.prefixes.retain(|prefix| !of_later(prefix));
+    page.prefixes.extend(later.prefixes.into_iter().filter(|prefix| of_later(prefix)));
+    page.prefixes.sort();
+}
+
+fn wrong_answer(key: &str) -> Error {
+    Error::Refused { key: key.to_owned(), source: "an answer to another request".into() }
+}
+
+impl Store for WorldStore {
+    type Upload = WorldUpload;
+
+    async fn get(&self, key: &str) -> Result<Object> {
+        self.get_range(key, 0..u64::MAX).await
+    }
+
+    async fn get_range(&self, key: &str, range: Range<u64>) -> Result<Object> {
+        match self.request(Effect::Get(key.to_owned(), range)).await? {
+            Answer::Object(object) => Ok(object),
+            _ => Err(wrong_answer(key)),
+        }
+    }
+
+    async fn head(&self, key: &str) -> Result<ObjectInfo> {
+        self.get_range(key, 0..0).await.map(|object| object.info)
+    }
+
+    async fn put(&self, key: &str, body: Bytes, options: PutOptions) -> Result<ETag> {
+        match self.request(Effect::Put(key.to_owned(), body, options)).await? {
+            Answer::ETag(etag) => Ok(etag),
+            _ => Err(wrong_answer(key)),
+        }
+    }
+
+    async fn delete(&self, key: &str) -> Result<()> {
+        self.request(Effect::Delete(key.to_owned())).await.map(drop)
+    }
+
+    async fn list(&self, request: ListRequest) -> Result<ListPage> {
+        let prefix = request.prefix.clone();
+        match self.request(Effect::List(request)).await? {
+            Answer::Page(page) => Ok(page),
+            _ => Err(wrong_answer(&prefix)),
+        }
+    }
+
+    async fn upload(&self, key: &str, options: PutOptions) -> Result<WorldUpload> {
+        self.request(Effect::Nothing(key.to_owned())).await?;
+        Ok(WorldUpload { store: self.clone(), key: key.to_owned(), options, body: BytesMut::new(), sent: 0 })
+    }
+}
+
+/// Bytes of a part; the simulated files are small.
+const PART: usize = 256;
+
+/// An object being written to the simulated bucket.
+pub(super) struct WorldUpload {
+    store: WorldStore,
+    key: String,
+    options: PutOptions,
+    body: BytesMut,
+    sent: usize,
+}
+
+impl Upload for WorldUpload {
+    async fn write(&mut self, bytes: Bytes) -> Result<()> {
+        self.body.extend_from_slice(&bytes);
+        while self.body.len() - self.sent >= PART {
+            self.store.request(Effect::Nothing(self.key.clone())).await?;
+            self.sent += PART;
+        }
+        Ok(())
+    }
+
+    async fn finish(self) -> Result<ETag> {
+        self.store.put(&self.key, self.body.freeze(), self.options).await
+    }
+
+    async fn abort(self) -> Result<()> {
+        self.store.request(Effect::Nothing(self.key.clone())).await.map(drop)
+    }
+}

@@ -1,0 +1,340 @@
+//! The functions' platform: events that come late, twice or never, invocations that run side by side up to a limit,
+//! are killed and tried again under the same request id, and what is given up and recorded.
+
+use std::collections::{BTreeSet, VecDeque};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, Weak};
+use std::time::Duration;
+
+use super::acting::{Actress, Lister};
+use super::bucket::{Actor, Fate, Grounds, WorldStore};
+use super::engine::{TaskId, WorldClock, lock};
+use crate::failure::{End, Failure};
+use crate::fold::Folded;
+use crate::render::Outcome;
+use crate::retry::{Scope, retry};
+use crate::store::ETag;
+use crate::sweep::Visit;
+use crate::{
+    Clock, Error, Invocation, Mutation, Policy, Randomness, Timestamp, assemble, record_failure,
+    render_frame, sweep,
+};
+
+/// How often the platform fails its users: once in so many, never when 0.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Chaos {
+    /// An event is lost.
+    pub(super) drop: u64,
+    /// An event comes twice, or an invocation that succeeded is run again.
+    pub(super) duplicate: u64,
+    /// An invocation is killed.
+    pub(super) kill: u64,
+    /// An event waits until it is too old.
+    pub(super) too_old: u64,
+    /// The longest delay of an event, in milliseconds.
+    pub(super) delay_ms: u64,
+    /// How far a function's clock is ahead of the bucket's, at most, in milliseconds.
+    pub(super) skew_ms: u64,
+}
+
+/// What an invocation works on.
+#[derive(Debug, Clone)]
+pub(super) enum Work {
+    /// An object event of the render function.
+    Render(String, Option<ETag>),
+    /// A claim.
+    Assemble(String),
+    /// The schedule.
+    Sweep,
+    /// An on-failure record.
+    Record(Failure),
+    /// `rayfold retry`.
+    Retry(crate::keys::Animation),
+}
+
+#[derive(Debug, Clone)]
+struct Job {
+    work: Work,
+    request_id: String,
+    attempt: u64,
+}
+
+/// What happened, for the predicates.
+#[derive(Debug, Default)]
+pub(super) struct Diary {
+    /// Something that by design only the sweep can heal.
+    pub(super) needs_sweep: Option<&'static str>,
+    /// Events that were given up.
+    pub(super) given_up: u64,
+    /// What the last sweep did.
+    pub(super) last_sweep: Vec<Visit>,
+    /// An error that no invocation should have.
+    pub(super) bug: Option<String>,
+    /// Requests of invocations that found everything done, with how often each count came.
+    pub(super) idle: Vec<u64>,
+    /// Invocations by kind: render, assemble.
+    pub(super) invocations: [u64; 2],
+}
+
+struct State {
+    queue: VecDeque<Job>,
+    running: BTreeSet<u64>,
+    tokens: u64,
+}
+
+/// The platform.
+pub(super) struct Platform {
+    pub(super) grounds: Arc<Grounds>,
+    pub(super) policy: Arc<Policy>,
+    pub(super) chaos: Mutex<Chaos>,
+    pub(super) diary: Mutex<Diary>,
+    pub(super) mutation: Option<Mutation>,
+    pub(super) concurrency: usize,
+    pub(super) timeout: Duration,
+    pub(super) draw_ms: (u64, u64),
+    state: Mutex<State>,
+    me: Weak<Platform>,
+}
+
+impl Platform {
+    pub(super) fn new(
+        grounds: Arc<Grounds>,
+        policy: Policy,
+        mutation: Option<Mutation>,
+        concurrency: usize,
+        draw_ms: (u64, u64),
+    ) -> Arc<Self> {
+        Arc::new_cyclic(|me| Platform {
+            grounds,
+            policy: Arc::new(policy),
+            chaos: Mutex::default(),
+            diary: Mutex::default(),
+            mutation,
+            concurrency,
+            timeout: Duration::from_secs(30),
+            draw_ms,
+            state: Mutex::new(State { queue: VecDeque::new(), running: BTreeSet::new(), tokens: 0 }),
+            me: me.clone(),
+        })
+    }
+
+    /// An object changed: the events that follow.
+    pub(super) fn object_event(&self, key: &str, etag: Option<ETag>) {
+        let work = match key.split('/').next() {
+            Some("scripts") => Work::Render(key.to_owned(), etag),
+            Some("parts" | "retries") if etag.is_some() => Work::Render(key.to_owned(), etag),
+            Some("assemblies") if etag.is_some() => Work::Assemble(key.to_owned()),
+            _ => return,
+        };
+        let chaos = *lock(&self.chaos);
+        if self.grounds.chance(chaos.drop) {
+            self.only_the_sweep_heals("an event was lost");
+            return;
+        }
+        let copies = 1 + u64::from(self.grounds.chance(chaos.duplicate));
+        for _ in 0..copies {
+            let delay = self.grounds.between_ms(0..chaos.delay_ms + 15);
+            self.submit(work.clone(), delay);
+        }
+    }
+
+    /// Starts work after a delay, as an event of its own.
+    pub(super) fn submit(&self, work: Work, delay: Duration) {
+        let request_id = format!("{:016x}", self.grounds.random.bits());
+        self.enqueue(Job { work, request_id, attempt: 1 }, delay);
+    }
+
+    fn enqueue(&self, job: Job, delay: Duration) {
+        let Some(me) = self.me.upgrade() else { return };
+        self.grounds.engine.after(delay, move || {
+            lock(&me.state).queue.push_back(job);
+            me.launch();
+        });
+    }
+
+    fn launch(&self) {
+        loop {
+            let mut state = lock(&self.state);
+            if state.running.len() >= self.concurrency {
+                return;
+            }
+            let Some(job) = state.queue.pop_front() else { return };
+            state.tokens += 1;
+            let token = state.tokens;
+            state.running.insert(token);
+            drop(state);
+            self.start(job, token);
+        }
+    }
+
+    fn start(&self, job: Job, token: u64) {
+        let Some(me) = self.me.upgrade() else { return };
+        let grounds = &self.grounds;
+        let chaos = *lock(&self.chaos);
+        let is_user = matches!(job.work, Work::Retry(_));
+        if !is_user && grounds.chance(chaos.too_old) {
+            me.end(&job, token, Err(Some(End::TooOld)));
+            return;
+        }
+        let countdown = match grounds.chance(chaos.kill) && !is_user {
+            true => 1 + u32::try_from(grounds.random.below(14)).unwrap_or(0),
+            false => 0,
+        };
+        let late = grounds.between_ms(1..if grounds.random.one_in(4) { 8_000 } else { 80 });
+        let fate = Arc::new(Fate::new(countdown, grounds.random.one_in(2), late));
+        let task = Arc::new(Mutex::new(None::<TaskId>));
+        let die: Arc<dyn Fn() + Send + Sync> = {
+            let (me, job, task) = (self.me.clone(), job.clone(), task.clone());
+            Arc::new(move || {
+                if let (Some(me), Some(task)) = (me.upgrade(), *lock(&task)) {
+                    me.grounds.engine.kill(task);
+                    me.end(&job, token, Err(Some(End::Died)));
+                }
+            })
+        };
+        {
+            let (me, job, task, fate) = (self.me.clone(), job.clone(), task.clone(), fate.clone());
+            grounds.engine.after(self.timeout, move || {
+                if let (Some(me), Some(task)) = (me.upgrade(), *lock(&task))
+                    && lock(&me.state).running.contains(&token)
+                {
+                    fate.kill();
+                    me.grounds.engine.kill(task);
+                    me.end(&job, token, Err(Some(End::TimedOut)));
+                }
+            });
+        }
+        grounds.note(|| format!("{:.6} starts attempt {} at {:?}", job.request_id, job.attempt, job.work));
+        let skew = grounds.between_ms(0..chaos.skew_ms + 1);
+        let clock = WorldClock { engine: grounds.engine.clone(), skew };
+        let deadline = clock.now().after(self.timeout);
+        let id = grounds.engine.spawn(async move {
+            let result = me.work(&job, clock, deadline, fate, die).await;
+            me.end(&job, token, result.map_err(|error| me.end_of(&error)));
+        });
+        *lock(&task) = Some(id);
+    }
+
+    async fn work(
+        &self,
+        job: &Job,
+        clock: WorldClock,
+        deadline: Timestamp,
+        fate: Arc<Fate>,
+        die: Arc<dyn Fn() + Send + Sync>,
+    ) -> Result<(), Error> {
+        let actor = match job.work {
+            Work::Render(..) => Actor::Render,
+            Work::Retry(_) => Actor::User,
+            _ => Actor::Assemble,
+        };
+        let grounds = self.grounds.clone();
+        let store = WorldStore {
+            grounds: grounds.clone(),
+            actor,
+            name: job.request_id.clone(),
+            fate: fate.clone(),
+            die: die.clone(),
+        };
+        let random = Randomness::seeded(grounds.random.bits());
+        let invocation = Invocation::new(&store, &clock, &random, &self.policy, &job.request_id)
+            .until(deadline)
+            .breaking(self.mutation);
+        match &job.work {
+            Work::Render(key, _) => {
+                let actress = Actress { grounds, fate: fate.clone(), die, draw_ms: self.draw_ms };
+                lock(&self.diary).invocations[0] += 1;
+                let rendered = render_frame(&invocation, &actress, key).await?;
+                let draws_nothing = matches!(
+                    rendered.outcome,
+                    Outcome::Present | Outcome::Superseded | Outcome::Gone | Outcome::Settings
+                );
+                if draws_nothing && rendered.folded == Folded::Covered {
+                    lock(&self.diary).idle.push(fate.requests());
+                }
+            }
+            Work::Assemble(key) => {
+                lock(&self.diary).invocations[1] += 1;
+                assemble(&invocation, &Lister, key).await?;
+            }
+            Work::Sweep => {
+                let swept = sweep(&invocation).await?;
+                let mut visits = Vec::new();
+                for (_, visit) in swept.visits {
+                    visits.push(visit?);
+                }
+                lock(&self.diary).last_sweep = visits;
+            }
+            Work::Record(failure) => {
+                record_failure(&invocation, failure).await?;
+            }
+            Work::Retry(animation) => {
+                retry(&invocation, animation, Scope::Failed).await?;
+            }
+        }
+        Ok(())
+    }
+
+    /// How the platform sees an error; `None` for one that a retry cannot mend.
+    fn end_of(&self, error: &Error) -> Option<End> {
+        match error {
+            Error::Key { .. } => None,
+            Error::OutOfTime { .. } => Some(End::TimedOut),
+            Error::Invariant { .. } | Error::Malformed { .. } | Error::Refused { .. } => {
+                lock(&self.diary).bug = Some(error.to_string());
+                None
+            }
+            error => Some(End::Error(error.to_string())),
+        }
+    }
+
+    fn end(&self, job: &Job, token: u64, result: Result<(), Option<End>>) {
+        if !lock(&self.state).running.remove(&token) {
+            return;
+        }
+        self.grounds.note(|| format!("{:.6} ends: {result:?}", job.request_id));
+        let chaos = *lock(&self.chaos);
+        let backoff = self.grounds.between_ms(200..3_000);
+        match (result, &job.work) {
+            (Err(None), _) | (_, Work::Retry(_)) => {}
+            (Ok(()), _) => {
+                if self.grounds.chance(chaos.duplicate) {
+                    self.enqueue(job.clone(), backoff);
+                }
+            }
+            (Err(Some(end)), work) => {
+                let tries = if matches!(work, Work::Record(_)) { 20 } else { 3 };
+                if end != End::TooOld && job.attempt < tries {
+                    self.enqueue(Job { attempt: job.attempt + 1, ..job.clone() }, backoff);
+                } else {
+                    self.give_up(job, end);
+                }
+            }
+        }
+        self.launch();
+    }
+
+    fn give_up(&self, job: &Job, end: End) {
+        let (key, version) = match &job.work {
+            Work::Render(key, version) => (key.clone(), version.clone()),
+            Work::Assemble(key) => (key.clone(), None),
+            _ => {
+                self.only_the_sweep_heals("a record or a sweep was given up");
+                return;
+            }
+        };
+        lock(&self.diary).given_up += 1;
+        self.only_the_sweep_heals("an event was given up");
+        let failure = Failure { key, version, attempts: job.attempt, end };
+        self.submit(Work::Record(failure), Duration::from_millis(100));
+    }
+
+    pub(super) fn only_the_sweep_heals(&self, what: &'static str) {
+        lock(&self.diary).needs_sweep.get_or_insert(what);
+    }
+
+    /// Whether a write landed after its writer was killed.
+    pub(super) fn has_late_writes(&self) -> bool {
+        self.grounds.late_writes.load(Ordering::Relaxed) > 0
+    }
+}

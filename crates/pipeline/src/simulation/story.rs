@@ -1,0 +1,342 @@
+//! One run: a story and a world made up from a seed, lived through, and judged.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use bytes::Bytes;
+
+use super::bucket::{Actor, Faults, Grounds};
+use super::engine::{Engine, WorldClock, lock};
+use super::expected::Expected;
+use super::platform::{Chaos, Platform, Work};
+use super::{Run, Shared};
+use crate::keys::{Animation, Key};
+use crate::manifest::Manifest;
+use crate::store::{Bucket, PutOptions};
+use crate::sweep::Visit;
+use crate::{Clock, Mutation, Policy, Randomness};
+
+/// By when a run must have come to rest.
+const PATIENCE: Duration = Duration::from_secs(24 * 3600);
+
+/// How many sweeps a run may need.
+const MOST_SWEEPS: u32 = 24;
+
+/// Scripts of the stories: their natural order is not their byte order, and one name looks like a receipt's.
+const NAMES: [&str; 4] = ["2", "10", "1", "3@0-p1"];
+
+/// Lives through one seed, and writes it down if asked to.
+pub(super) fn run(
+    seed: u64,
+    mutation: Option<Mutation>,
+    log: Option<&mut Vec<String>>,
+) -> Result<Run, String> {
+    let random = Randomness::seeded(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x5eed);
+    let engine = Engine::default();
+    let grounds = Grounds::new(engine.clone(), random.bits(), log.is_some());
+    let policy = Policy {
+        quiet: Duration::from_millis([100, 1_000, 5_000][pick(&random, 3)]),
+        stuck_after: Duration::from_secs(60),
+        superseded_after: Duration::from_secs([1, 1_000, 7 * 24 * 3600][pick(&random, 3)]),
+        pause_cap: Duration::from_millis([1, 50, 500][pick(&random, 3)]),
+        pause_per_frame: Duration::from_millis([0, 1, 20][pick(&random, 3)]),
+        ..Policy::default()
+    };
+    let concurrency = [1, 2, 4, 100][pick(&random, 4)];
+    let platform = Platform::new(
+        grounds.clone(),
+        policy,
+        mutation,
+        concurrency,
+        (1, [20, 300, 3_000][pick(&random, 3)]),
+    );
+    let calm = random.one_in(4);
+    if !calm {
+        let rare = |random: &Randomness, rates: [u64; 4]| rates[pick(random, 4)];
+        *lock(&platform.chaos) = Chaos {
+            drop: rare(&random, [0, 0, 0, 8]),
+            duplicate: rare(&random, [0, 0, 3, 10]),
+            kill: rare(&random, [0, 3, 6, 2]),
+            too_old: rare(&random, [0, 0, 0, 30]),
+            delay_ms: rare(&random, [10, 100, 1_000, 5_000]),
+            skew_ms: rare(&random, [0, 0, 50, 2_000]),
+        };
+        *lock(&grounds.faults) = Faults {
+            busy: rare(&random, [0, 0, 20, 60]),
+            conflict: rare(&random, [0, 0, 5, 30]),
+            lost_answer: rare(&random, [0, 0, 10, 40]),
+            torn_listings: random.one_in(2),
+            slow: rare(&random, [0, 3, 6, 20]),
+        };
+    }
+    let animation = Animation::new("an/im").map_err(|error| error.to_string())?;
+    let watch: Shared<Watch> = Shared::default();
+    {
+        let (platform, watch) = (Arc::downgrade(&platform), watch.clone());
+        *lock(&grounds.notify) = Some(Arc::new(move |actor, key, there, bucket| {
+            lock(&watch).see(actor, key, there, bucket);
+            if let Some(platform) = platform.upgrade() {
+                let etag = bucket.head(key).ok().filter(|_| there).map(|info| info.etag);
+                platform.object_event(key, etag);
+            }
+        }));
+    }
+    write_story(&random, &grounds, &platform, &animation);
+    if random.one_in(2) {
+        *lock(&grounds.listed) = Some(awkward_user(&random, &grounds));
+    }
+
+    engine.run(Duration::from_secs(45));
+    *lock(&platform.chaos) = Chaos { delay_ms: 10, ..Chaos::default() };
+    *lock(&grounds.faults) = Faults::default();
+    let judge = Judge { engine, grounds, platform, animation, watch };
+    let outcome = judge.judge();
+    // The notification and the platform's tasks know each other.
+    *lock(&judge.grounds.notify) = None;
+    *lock(&judge.grounds.listed) = None;
+    judge.engine.end();
+    if let (Some(log), Some(noted)) = (log, &judge.grounds.log) {
+        log.append(&mut lock(noted));
+    }
+    outcome
+}
+
+fn pick(random: &Randomness, of: usize) -> usize {
+    usize::try_from(random.below(of as u64)).unwrap_or(0)
+}
+
+/// What users do, and when.
+fn write_story(random: &Randomness, grounds: &Arc<Grounds>, platform: &Arc<Platform>, animation: &Animation) {
+    let count = 1 + pick(random, 4).min(1 + pick(random, 3));
+    let span_ms = [50, 500, 4_000, 20_000][pick(random, 4)];
+    let settings_text = |random: &Randomness, scripts: usize| match random.below(8) {
+        0 => r#"{"frames": 0.5}"#.to_owned(),
+        1 | 2 => r#"{"fps": 20}"#.to_owned(),
+        3 => format!(r#"{{"frames": {}}}"#, scripts + 1),
+        _ => format!(r#"{{"frames": {scripts}}}"#),
+    };
+    if random.one_in(2) {
+        let delay = Duration::from_millis(random.below(span_ms));
+        act(grounds, delay, animation.settings(), Some(settings_text(random, count)));
+    }
+    let key = |place: usize| format!("{}{}.txt", animation.scripts(), NAMES[place]);
+    for place in 0..count {
+        let delay = Duration::from_millis(random.below(span_ms));
+        act(grounds, delay, key(place), Some(content(random)));
+    }
+    for _ in 0..random.below(6) {
+        let delay = Duration::from_millis(random.below(span_ms * 2));
+        let place = pick(random, count);
+        match random.below(12) {
+            0..=4 => act(grounds, delay, key(place), Some(content(random))),
+            5 | 6 => {
+                // A quick change and change back.
+                let (first, second) = (content(random), content(random));
+                act(grounds, delay, key(place), Some(first.clone()));
+                for text in [second, first] {
+                    let later = delay + Duration::from_millis(random.below(400));
+                    act(grounds, later, key(place), Some(text));
+                }
+            }
+            7 | 8 => act(grounds, delay, key(place), None),
+            9 => act(grounds, delay, animation.settings(), Some(settings_text(random, count))),
+            10 => act(grounds, delay, animation.settings(), None),
+            _ => platform.submit(Work::Sweep, delay + Duration::from_secs(random.below(30))),
+        }
+    }
+}
+
+/// A user who changes a script just when a function has listed it, mostly back to what it was before.
+fn awkward_user(random: &Randomness, grounds: &Arc<Grounds>) -> Arc<dyn Fn() + Send + Sync> {
+    let random = Randomness::seeded(random.bits());
+    let (left, patience) = (AtomicU64::new(1 + random.below(4)), 1 + random.below(6));
+    let world = Arc::downgrade(grounds);
+    Arc::new(move || {
+        let Some(grounds) = world.upgrade() else { return };
+        if left.load(Ordering::Relaxed) == 0 || !random.one_in(patience) {
+            return;
+        }
+        left.fetch_sub(1, Ordering::Relaxed);
+        let past = lock(&grounds.past).clone();
+        let Some((key, before)) = past.get(pick(&random, past.len().max(1))) else { return };
+        let text = if random.one_in(6) { Some(content(&random)) } else { before.clone() };
+        let key = if key.ends_with(".json") { return } else { key.clone() };
+        let first = Duration::from_millis(random.below(60));
+        act(&grounds, first, key.clone(), text);
+        if random.one_in(3) {
+            let later = first + Duration::from_millis(random.below(150));
+            act(&grounds, later, key, Some(content(&random)));
+        }
+    })
+}
+
+/// Few contents, so that changes are often back to what was.
+fn content(random: &Randomness) -> String {
+    let number = random.below(2);
+    match random.below(24) {
+        0 => format!("bad {number}"),
+        1 => format!("hang {number}"),
+        2 => format!("crash {number}"),
+        3..=5 => format!("split {} {number}", 2 + random.below(2)),
+        _ => format!("frame {number}"),
+    }
+}
+
+/// The user puts or deletes an object.
+fn act(grounds: &Arc<Grounds>, delay: Duration, key: String, text: Option<String>) {
+    let world = grounds.clone();
+    grounds.engine.after(delay, move || {
+        let now = WorldClock::exact(&world.engine).now();
+        let there = text.is_some();
+        let before = lock(&world.bucket).get(&key).ok();
+        let before = before.map(|object| String::from_utf8_lossy(&object.body).into_owned());
+        lock(&world.past).push((key.clone(), before));
+        world.note(|| format!("the user: {key} {text:?}"));
+        let changed = match text {
+            Some(text) => lock(&world.bucket).put(now, &key, Bytes::from(text), PutOptions::always()).is_ok(),
+            None => lock(&world.bucket).delete(&key),
+        };
+        let notify = lock(&world.notify).clone();
+        if let Some(notify) = notify.filter(|_| changed) {
+            notify(Actor::User, &key, there, &lock(&world.bucket));
+        }
+    });
+}
+
+/// What must hold at every moment.
+#[derive(Default)]
+struct Watch {
+    revision: u64,
+    violation: Option<String>,
+}
+
+impl Watch {
+    fn see(&mut self, actor: Actor, key: &str, there: bool, bucket: &Bucket) {
+        if let Err(what) = self.check(actor, key, there, bucket) {
+            self.violation.get_or_insert(what);
+        }
+    }
+
+    fn check(&mut self, actor: Actor, key: &str, there: bool, bucket: &Bucket) -> Result<(), String> {
+        if actor != Actor::User && key.starts_with("scripts/") {
+            return Err(format!("{actor:?} wrote {key}"));
+        }
+        let Ok(parsed) = key.parse::<Key>() else {
+            return Err(format!("{actor:?} wrote {key}, which is no key"));
+        };
+        let body = bucket.get(key).map(|object| object.body).unwrap_or_default();
+        match parsed {
+            Key::Manifest { animation } => {
+                let manifest = Manifest::decode(&animation, &body).map_err(|error| error.to_string())?;
+                let before = std::mem::replace(&mut self.revision, manifest.head.revision);
+                if !there || manifest.head.revision != before + 1 {
+                    return Err(format!("revision {} follows {before}", manifest.head.revision));
+                }
+            }
+            Key::Gif { .. } if there => {
+                let text = String::from_utf8_lossy(&body);
+                let frames: Vec<(u64, String, u64)> = text.lines().skip(1).filter_map(place_of).collect();
+                if !frames.is_sorted()
+                    || frames.windows(2).any(|pair| pair[0] == pair[1])
+                    || frames.is_empty()
+                {
+                    return Err(format!("a GIF with its frames out of order:\n{text}"));
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+/// Where a picture belongs: the number that its script's name starts with, the name, the part.
+fn place_of(picture: &str) -> Option<(u64, String, u64)> {
+    let mut fields = picture.split(':');
+    let name = fields.next()?;
+    let digits: String = name.chars().take_while(char::is_ascii_digit).collect();
+    Some((digits.parse().ok()?, name.to_owned(), fields.next()?.parse().ok()?))
+}
+
+/// Lets the world come to rest and looks at it.
+struct Judge {
+    engine: Engine,
+    grounds: Arc<Grounds>,
+    platform: Arc<Platform>,
+    animation: Animation,
+    watch: Shared<Watch>,
+}
+
+impl Judge {
+    fn judge(&self) -> Result<Run, String> {
+        self.rest()?;
+        let needs_sweep = lock(&self.platform.diary).needs_sweep;
+        let without_sweep = needs_sweep.is_none() && !self.platform.has_late_writes();
+        if without_sweep {
+            self.check().map_err(|what| format!("without a sweep: {what}"))?;
+        }
+        self.sweep_until_rest()?;
+        if self.wrongly_given_up() > 0 {
+            if lock(&self.platform.diary).needs_sweep.is_none() {
+                return Err("a frame was given up that nothing had happened to".to_owned());
+            }
+            self.platform.submit(Work::Retry(self.animation.clone()), Duration::ZERO);
+            self.rest()?;
+            self.sweep_until_rest()?;
+        }
+        self.check()?;
+        let diary = lock(&self.platform.diary);
+        let seen = lock(&self.grounds.seen);
+        Ok(Run {
+            requests: self.grounds.requests.iter().map(|count| count.load(Ordering::Relaxed)).sum(),
+            invocations: diary.invocations,
+            without_sweep,
+            given_up: diary.given_up,
+            late_writes: self.grounds.late_writes.load(Ordering::Relaxed),
+            permissions: seen
+                .iter()
+                .map(|(actor, action, folder)| format!("{actor:?} {action:?} {folder}"))
+                .collect(),
+        })
+    }
+
+    /// Runs until nothing is left to happen.
+    fn rest(&self) -> Result<(), String> {
+        let limit = Duration::from_micros(self.engine.now_us()) + PATIENCE;
+        if !self.engine.run(limit) {
+            return Err("the world does not come to rest".to_owned());
+        }
+        if let Some(bug) = &lock(&self.platform.diary).bug {
+            return Err(format!("an invocation failed for good: {bug}"));
+        }
+        lock(&self.watch).violation.clone().map_or(Ok(()), Err)
+    }
+
+    fn sweep_until_rest(&self) -> Result<(), String> {
+        // Longer than the sweep's own patience with any frame.
+        let pause = self.platform.policy.stuck_after * 8;
+        for _ in 0..MOST_SWEEPS {
+            let acts = lock(&self.grounds.past).len();
+            self.platform.submit(Work::Sweep, pause);
+            self.rest()?;
+            let did_nothing =
+                lock(&self.platform.diary).last_sweep.iter().all(|visit| *visit == Visit::default());
+            if did_nothing && lock(&self.grounds.past).len() == acts {
+                return Ok(());
+            }
+        }
+        Err(format!("after {MOST_SWEEPS} sweeps there is still something to do"))
+    }
+
+    fn wrongly_given_up(&self) -> usize {
+        let bucket = lock(&self.grounds.bucket);
+        let manifest = bucket.get(&self.animation.manifest()).ok();
+        let manifest = manifest.and_then(|object| Manifest::decode(&self.animation, &object.body).ok());
+        manifest.map_or(0, |manifest| Expected::of(&bucket, &self.animation).wrongly_given_up(&manifest))
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let bucket = lock(&self.grounds.bucket);
+        Expected::of(&bucket, &self.animation).check(&bucket, &self.animation)
+    }
+}

@@ -1,0 +1,115 @@
+//! A slice of the simulation; `rayfold-bench simulate` runs the long ones.
+
+use std::time::Duration;
+
+use super::*;
+
+/// How many seeds every `cargo test` runs.
+const SEEDS: u64 = 1_000;
+
+#[test]
+fn the_protocol_holds() {
+    if let Some(seed) = seed_to_replay(std::env::var("RAYFOLD_SEED").ok().as_deref()) {
+        let mut log = Vec::new();
+        let outcome = replay(seed, None, &mut log);
+        println!("{}", log.join("\n"));
+        outcome.unwrap_or_else(|violation| panic!("{violation}"));
+        return;
+    }
+    let mut without_sweep = 0;
+    for seed in 0..SEEDS {
+        let run = run(seed, None).unwrap_or_else(|violation| panic!("{violation}"));
+        without_sweep += u64::from(run.without_sweep);
+    }
+    assert!(without_sweep > SEEDS / 2, "most runs must not need the sweep: {without_sweep}");
+}
+
+/// A seed in which the guarantees hold, but not once the rule is broken. `rayfold-bench simulate --hunt` finds others
+/// when the stories have changed.
+fn notices(rule: Mutation, seed: u64) {
+    run(seed, None).unwrap_or_else(|violation| panic!("{violation}"));
+    let violation = run(seed, Some(rule)).expect_err("a broken rule is noticed");
+    println!("{rule:?}: {violation}");
+}
+
+#[test]
+fn a_missing_second_listing_is_noticed() {
+    notices(Mutation::SkipSecondListing, 6_131);
+}
+
+#[test]
+fn claims_before_their_commit_are_noticed() {
+    notices(Mutation::ClaimBeforeCommit, 18_710);
+}
+
+#[test]
+fn unconditional_manifests_are_noticed() {
+    notices(Mutation::DropIfMatch, 2);
+}
+
+#[test]
+fn leaving_ones_own_commit_is_noticed() {
+    notices(Mutation::LeaveOwnCommit, 32);
+}
+
+#[test]
+fn missing_claims_are_noticed() {
+    notices(Mutation::NeverClaim, 2);
+}
+
+#[test]
+fn a_seed_gives_the_same_run() {
+    let (mut first, mut second) = (Vec::new(), Vec::new());
+    replay(32, None, &mut first).unwrap();
+    replay(32, None, &mut second).unwrap();
+    assert!(first.len() > 50 && first == second);
+}
+
+/// What `docs/pipeline.md` says that each function does, besides what only superseded parts lead to.
+#[test]
+fn functions_do_only_what_their_permissions_say() {
+    let mut seen = std::collections::BTreeSet::new();
+    for seed in 0..SEEDS {
+        seen.extend(run(seed, None).unwrap_or_else(|violation| panic!("{violation}")).permissions);
+    }
+    seen.retain(|permission| !permission.starts_with("User"));
+    let table = "
+        Render: scripts/ List Get, parts/ List Get Put, frames/ List Get Put, manifests/ Get Put, assemblies/ Put
+        Assemble: scripts/ List Get, parts/ List Delete, frames/ List Get Put Delete, manifests/ List Get Put,
+            assemblies/ Put, retries/ List Put, animations/ Get Put Delete";
+    let mut expected = std::collections::BTreeSet::new();
+    for function in ["Render", "Assemble"] {
+        let (_, rest) = table.split_once(&format!("{function}:")).unwrap();
+        let line = rest.split_once(':').map_or(rest, |(line, _)| line);
+        for entry in line.trim_end_matches("Assemble").split(',') {
+            let mut words = entry.split_whitespace();
+            let folder = words.next().unwrap();
+            expected.extend(words.map(|action| format!("{function} {action} {folder}")));
+        }
+    }
+    assert_eq!(seen, expected);
+}
+
+fn scaled(frames: u64, concurrency: usize, most_requests: f64) {
+    let report =
+        measure(Scale { frames, concurrency, draw_ms: (800, 1_200), upload_ms: 200, seed: 1 }).unwrap();
+    println!("{frames} frames, {concurrency} at once: {report:?}");
+    assert!(report.requests_a_frame <= most_requests, "{report:?}");
+    assert!(report.tail <= Duration::from_secs(1), "{report:?}");
+    assert!(report.idle <= 4, "{report:?}");
+}
+
+#[test]
+fn few_frames_on_as_many_invocations() {
+    scaled(50, 50, 12.0);
+}
+
+#[test]
+fn many_frames_on_as_many_invocations() {
+    scaled(300, 300, 8.0);
+}
+
+#[test]
+fn more_frames_than_a_page_on_fewer_invocations() {
+    scaled(1_100, 150, 12.0);
+}
