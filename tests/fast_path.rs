@@ -135,8 +135,12 @@ fn tiles_trees_and_threads_cannot_be_seen() {
                 let tile = Some(tile);
                 assert!(expected == draw(&scene, RenderOptions { tile, ..options }), "tiles of {tile:?}");
             }
-            let tree = Some(true);
-            assert!(expected == draw(&scene, RenderOptions { tree, ..options }), "tree {precision:?}");
+            for tree in [Some(true), Some(false)] {
+                assert!(
+                    expected == draw(&scene, RenderOptions { tree, ..options }),
+                    "{tree:?} {precision:?}"
+                );
+            }
             let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
             assert!(expected == alone.install(|| draw(&scene, options)), "one thread");
         }

@@ -30,6 +30,25 @@ fn failures(manifest: &Manifest) -> Vec<(&str, &Reason)> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn hello_uploaded_file_by_file_is_the_gif_that_is_made_locally() {
+    let mut stage = stage(|_| {}).await;
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/hello");
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let entry = entry.unwrap();
+        let name: &'static str = entry.file_name().into_string().unwrap().leak();
+        files.push((name, std::fs::read_to_string(entry.path()).unwrap()));
+    }
+    assert_eq!(files.len(), 51, "50 scripts and animation.json");
+    for file in &files {
+        stage.upload("hello", std::slice::from_ref(file)).await;
+    }
+    stage.until_gif_of("hello", &files).await;
+    let seen = stage.seen();
+    assert_eq!((drawn(&seen), built(&seen)), (50, 1));
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn only_what_changed_is_drawn_again() {
     let mut stage = stage(|_| {}).await;
     let mut files = vec![("f1.txt", scene(8.0)), ("f2.txt", scene(12.0)), ("f10.txt", scene(16.0))];

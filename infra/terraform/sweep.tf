@@ -16,11 +16,10 @@ resource "aws_scheduler_schedule" "sweep" {
     mode = "OFF"
   }
 
-  # Without an input of its own the function gets the scheduler's notification, whose source is aws.scheduler; the local
-  # invoker sends the same.
   target {
     arn      = aws_lambda_function.this["assemble"].arn
     role_arn = aws_iam_role.scheduler.arn
+    input    = jsonencode({ sweep = true })
 
     # The next sweep does all that this one would have done.
     retry_policy {

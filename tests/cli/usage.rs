@@ -25,8 +25,7 @@ Commands:
   render       Render scripts to an animation, to one image, or to many
   check        Show what is wrong with scripts, without rendering them
   split        Split a script with many Traces into one script a frame
-  completions  Print a completion script for a shell
-  help         Print this message or the help of the given subcommand(s)
+...
 
 Options:
   -q, --quiet         Say nothing but errors
@@ -35,9 +34,9 @@ Options:
   -V, --version       Print version
 
 Examples:
-  rayfold render scenes/hello -o hello.gif      render a folder of scripts to an animation
-  rayfold check scenes/hello                    show what is wrong with its scripts
-  rayfold render --help                         more about rendering
+  rayfold render scenes/hello -o hello.gif         render a folder of scripts to an animation
+  rayfold check scenes/hello                       show what is wrong with its scripts
+  rayfold submit scenes/hello --bucket my-bucket   render it in the cloud
 
 Exit codes: 0 done, 1 the input or the rendering failed, 2 wrong usage, 130 interrupted.
 
@@ -77,7 +76,7 @@ fn unknown_subcommand() {
     Folder::new().rayfold("rendr").assert().code(2).stderr_eq(str![[r#"
 error: unrecognized subcommand 'rendr'
 
-  tip: a similar subcommand exists: 'render'
+  tip: some similar subcommands exist: 'retry', 'render'
 
 Usage: rayfold [OPTIONS] <COMMAND>
 

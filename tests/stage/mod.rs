@@ -1,7 +1,10 @@
 //! A stage for end-to-end tests: MinIO, the invoker and the unmodified function binaries, with scripts going in and GIFs
-//! coming out. Everything is started fresh for each test, on free loopback ports, and ends with it.
+//! coming out. Everything is started fresh for each test, on free loopback ports, and ends with it. Each function runs
+//! under the policy of its own role, the document that Terraform gives it on AWS: what that lacks fails a test.
 
 #![allow(dead_code, unreachable_pub, reason = "a module of several test files, which use each a part of it")]
+
+pub mod role;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,7 +23,7 @@ use rayfold_scene::{AnimationSettings, Limits, natural_cmp, parse, parse_setting
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 
 /// Longer than anything here takes on a loaded machine.
-pub const PATIENCE: Duration = Duration::from_secs(120);
+pub const PATIENCE: Duration = Duration::from_secs(240);
 
 pub struct Stage {
     pub platform: Platform,
@@ -42,6 +45,10 @@ pub async fn stage(functions: &Path, change: impl FnOnce(&mut Settings)) -> Stag
         change(settings);
     };
     let mut platform = Platform::start(&plan, settings, &mut |line| eprintln!("{line}")).await.unwrap();
+    for function in Function::ALL {
+        let own = role::environment(platform.minio(), function, &plan.bucket).await;
+        platform.settings_mut().environment_of.insert(function, own);
+    }
     let (sender, seen) = unbounded_channel();
     platform.start_invoker(Some(sender.clone())).await.unwrap();
     let mut stage = Stage { platform, sender, seen, data };

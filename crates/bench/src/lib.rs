@@ -7,9 +7,12 @@
 #![allow(clippy::print_stderr, reason = "a measurement says what it is at")]
 
 pub mod accuracy;
+pub mod cold_start;
 pub mod cpu_time;
 pub mod hard_cases;
 pub mod oracle;
+pub mod parsing;
+pub mod pipeline;
 mod plot;
 pub mod scenes;
 pub mod simulate;

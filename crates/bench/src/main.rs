@@ -1,7 +1,7 @@
 //! The program that measures: a subcommand a report.
 
 use clap::{Parser, Subcommand};
-use rayfold_bench::{accuracy, simulate};
+use rayfold_bench::{accuracy, cold_start, parsing, pipeline, simulate};
 
 #[derive(Debug, Parser)]
 #[command(name = "rayfold-bench", about = "Measures rayfold and writes the reports in docs/reports")]
@@ -14,6 +14,12 @@ struct Cli {
 enum Measurement {
     /// Error and speed of every way to trace, and the hard cases at full size
     Accuracy(accuracy::Args),
+    /// The paper's table: scenes from upload to GIF on MinIO and the local invoker
+    Pipeline(pipeline::Args),
+    /// Size of the functions, and how soon a new process asks for its first invocation
+    ColdStart(cold_start::Args),
+    /// What it takes to read and write the largest scripts
+    Parsing(parsing::Args),
     /// The pipeline's protocol in a simulated world: seeds, broken rules, requests at scale
     Simulate(simulate::Args),
 }
@@ -21,6 +27,9 @@ enum Measurement {
 fn main() -> anyhow::Result<()> {
     match Cli::parse().measurement {
         Measurement::Accuracy(args) => accuracy::run(&args),
+        Measurement::Pipeline(args) => pipeline::run(&args),
+        Measurement::ColdStart(args) => cold_start::run(&args),
+        Measurement::Parsing(args) => parsing::run(&args),
         Measurement::Simulate(args) => simulate::run(&args),
     }
 }

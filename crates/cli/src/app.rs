@@ -7,6 +7,8 @@ use clap::{Parser, Subcommand};
 
 use crate::cloud::{fetch, remove, retry, status, submit};
 use crate::console::{Color, Console};
+#[cfg(unix)]
+use crate::dev;
 use crate::outcome::{Outcome, exit_code};
 use crate::{check, completions, cost, interrupt, render, split};
 
@@ -20,9 +22,9 @@ use crate::{check, completions, cost, interrupt, render, split};
     arg_required_else_help = true,
     after_help = "\
 Examples:
-  rayfold render scenes/hello -o hello.gif      render a folder of scripts to an animation
-  rayfold check scenes/hello                    show what is wrong with its scripts
-  rayfold render --help                         more about rendering
+  rayfold render scenes/hello -o hello.gif         render a folder of scripts to an animation
+  rayfold check scenes/hello                       show what is wrong with its scripts
+  rayfold submit scenes/hello --bucket my-bucket   render it in the cloud
 
 Exit codes: 0 done, 1 the input or the rendering failed, 2 wrong usage, 130 interrupted."
 )]
@@ -54,6 +56,8 @@ enum Command {
     Fetch(fetch::Args),
     Retry(retry::Args),
     Remove(remove::Args),
+    #[cfg(unix)]
+    Dev(dev::Args),
     Completions(completions::Args),
 }
 
@@ -69,6 +73,8 @@ impl Command {
             Self::Fetch(args) => fetch::run(&args, console),
             Self::Retry(args) => retry::run(&args, console),
             Self::Remove(args) => remove::run(&args, console),
+            #[cfg(unix)]
+            Self::Dev(args) => dev::run(&args, console),
             Self::Completions(args) => completions::run(&args, console),
         }
     }

@@ -2,11 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::ValueEnum;
 use rayfold_scene::{Diagnostic, Limits};
 use serde::Serialize;
 
-use crate::console::{Console, describe};
+use crate::console::{Console, Format, describe};
 use crate::input::{Input, SETTINGS};
 use crate::outcome::Outcome;
 use crate::survey::{Faults, parse_all};
@@ -37,15 +36,6 @@ pub(crate) struct Args {
     max_pixels: u64,
     #[command(flatten)]
     threads: Threads,
-}
-
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-enum Format {
-    /// For people, on standard error
-    #[default]
-    Text,
-    /// For programs, one document on standard output
-    Json,
 }
 
 #[derive(Serialize)]

@@ -19,6 +19,16 @@ pub(crate) enum Color {
     Never,
 }
 
+/// How a subcommand that reports shows its findings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Format {
+    /// For people
+    #[default]
+    Text,
+    /// For programs, on standard output
+    Json,
+}
+
 /// Resolved once from the flags, the environment and what the streams are attached to.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Console {
@@ -93,7 +103,11 @@ pub(crate) fn describe(error: &anyhow::Error) -> String {
 
 /// What went wrong, without the number that the system has for it.
 fn without_number(error: &(dyn std::error::Error + 'static)) -> String {
-    let text = error.to_string();
-    let end = if error.is::<std::io::Error>() { text.rfind(" (os error ") } else { None };
-    text[..end.unwrap_or(text.len())].to_owned()
+    let mut text = error.to_string();
+    if text.ends_with(')')
+        && let Some(end) = text.rfind(" (os error ")
+    {
+        text.truncate(end);
+    }
+    text
 }

@@ -12,6 +12,8 @@ mod cloud;
 mod completions;
 mod console;
 mod cost;
+#[cfg(unix)]
+mod dev;
 mod input;
 mod interrupt;
 mod outcome;

@@ -9,6 +9,7 @@ use std::io::{BufRead, BufReader};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::sync::{Mutex, PoisonError};
 
 use crate::{Error, Result};
 
@@ -31,7 +32,7 @@ exit "$status"
 /// A running program; dropping it stops the program and waits until it is gone.
 #[derive(Debug)]
 pub(crate) struct Guarded {
-    shell: Child,
+    shell: Mutex<Child>,
     lifeline: Option<ChildStdin>,
     pid: u32,
 }
@@ -67,7 +68,7 @@ impl Guarded {
         }
         let pid =
             line.trim().parse().map_err(|_| failed(std::io::Error::other("the shell named no process")))?;
-        Ok(Self { shell, lifeline, pid })
+        Ok(Self { shell: Mutex::new(shell), lifeline, pid })
     }
 
     /// The program's own process id.
@@ -76,15 +77,15 @@ impl Guarded {
     }
 
     /// How the program ended, if it has.
-    pub(crate) fn exited(&mut self) -> Option<ExitStatus> {
-        self.shell.try_wait().ok().flatten()
+    pub(crate) fn exited(&self) -> Option<ExitStatus> {
+        self.shell.lock().unwrap_or_else(PoisonError::into_inner).try_wait().ok().flatten()
     }
 }
 
 impl Drop for Guarded {
     fn drop(&mut self) {
         drop(self.lifeline.take());
-        let _ = self.shell.wait();
+        let _ = self.shell.get_mut().unwrap_or_else(PoisonError::into_inner).wait();
     }
 }
 
@@ -116,7 +117,7 @@ mod tests {
 
     #[test]
     fn a_program_that_ends_by_itself_is_seen() {
-        let (mut guarded, _folder) = sleeper("exit 7");
+        let (guarded, _folder) = sleeper("exit 7");
         let start = Instant::now();
         let status = loop {
             if let Some(status) = guarded.exited() {

@@ -128,7 +128,7 @@ impl Minio {
             if address.port() == 0 {
                 address = free(address).await?;
             }
-            let mut process = Guarded::spawn(
+            let process = Guarded::spawn(
                 binary,
                 &[
                     "server".into(),
@@ -140,7 +140,7 @@ impl Minio {
                 environment(&credentials, webhook),
                 &log,
             )?;
-            match wait_until_healthy(&mut process, address, start).await {
+            match wait_until_healthy(&process, address, start).await {
                 Ok(()) => {
                     return Ok(Self { process, address, data: data.to_owned(), credentials, _lock: lock });
                 }
@@ -182,6 +182,16 @@ impl Minio {
         self.process.pid()
     }
 
+    /// Returns when it has ended, and how.
+    pub async fn ended(&self) -> std::process::ExitStatus {
+        loop {
+            match self.process.exited() {
+                Some(status) => return status,
+                None => tokio::time::sleep(Duration::from_millis(200)).await,
+            }
+        }
+    }
+
     /// What the standard AWS environment has to say so that S3 is this one.
     pub fn environment(&self) -> Vec<(String, String)> {
         [
@@ -221,11 +231,7 @@ async fn free(mut address: SocketAddr) -> Result<SocketAddr> {
     listener.local_addr().map_err(|source| Error::Listen { address: address.to_string(), source })
 }
 
-async fn wait_until_healthy(
-    process: &mut Guarded,
-    address: SocketAddr,
-    start: Instant,
-) -> Result<(), String> {
+async fn wait_until_healthy(process: &Guarded, address: SocketAddr, start: Instant) -> Result<(), String> {
     loop {
         if let Some(status) = process.exited() {
             return Err(format!("it ended ({status})"));

@@ -158,6 +158,7 @@ pub fn connection(minio: &Minio) -> Connection {
         region: REGION.to_owned(),
         access_key: minio.credentials().access_key.clone(),
         secret_key: minio.credentials().secret_key.clone(),
+        session_token: None,
     }
 }
 

@@ -1,4 +1,4 @@
-//! Work on bands of an image, side by side.
+//! Work on bands of an image, or on many objects, side by side.
 //!
 //! Knows nothing of what is drawn: it hands each worker rows that are its own and looks at the cancel flag between
 //! them. Which worker draws a band cannot be seen in the picture.
@@ -13,6 +13,14 @@ use crate::{RenderError, RenderOptions};
 
 /// Bytes of an RGB pixel.
 pub(crate) const CHANNELS: usize = 3;
+
+/// Fewer items than this are not worth sharing out.
+const SHARED: usize = 4096;
+
+/// `items.iter().map(f).collect()`, on all cores where there are many items.
+pub(crate) fn map<T: Sync, U: Send>(items: &[T], f: impl Fn(&T) -> U + Send + Sync) -> Vec<U> {
+    if items.len() < SHARED { items.iter().map(f).collect() } else { items.par_iter().map(f).collect() }
+}
 
 /// Draws an image in bands of `rows` rows; `draw` gets the first row of its band, counted from the top, and the
 /// band's bytes.

@@ -269,7 +269,7 @@ run "sweep" {
       one(aws_scheduler_schedule.sweep.flexible_time_window).mode == "OFF",
       one(aws_scheduler_schedule.sweep.target).arn == "arn:aws:lambda:eu-central-1:123456789012:function:demo-assemble",
       one(aws_scheduler_schedule.sweep.target).role_arn == "arn:aws:iam::123456789012:role/demo-sweep-schedule",
-      one(aws_scheduler_schedule.sweep.target).input == null,
+      jsondecode(one(aws_scheduler_schedule.sweep.target).input) == { sweep = true },
       one(one(aws_scheduler_schedule.sweep.target).dead_letter_config).arn == aws_sqs_queue.dead_letters.arn,
       one(one(aws_scheduler_schedule.sweep.target).retry_policy).maximum_event_age_in_seconds == 840,
       one(one(aws_scheduler_schedule.sweep.target).retry_policy).maximum_retry_attempts == 2,

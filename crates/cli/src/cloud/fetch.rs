@@ -10,7 +10,7 @@ use rayfold_pipeline::manifest::{FrameState, Manifest, Status};
 use rayfold_pipeline::store::{ObjectInfo, S3Store, Store};
 
 use super::watch::Watch;
-use super::{BucketArgs, SIDE_BY_SIDE, address, parse_animation, report, with_bucket};
+use super::{BucketArgs, SIDE_BY_SIDE, address, must_exist, parse_animation, report, with_bucket};
 use crate::console::Console;
 use crate::outcome::{Outcome, Usage};
 use crate::output::{OutputError, OutputFile, probe};
@@ -60,7 +60,8 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         let mut watch = Watch::new(store, &args.animation);
         watch.look().await?;
         let Some(manifest) = &watch.manifest else {
-            anyhow::bail!("there is no animation {} in {}", args.animation, store.bucket());
+            must_exist(store, &args.animation).await?;
+            anyhow::bail!("no function has looked at {} yet", args.animation);
         };
         match &target {
             Target::Gif(path) => {

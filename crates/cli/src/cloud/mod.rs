@@ -48,12 +48,29 @@ pub(crate) fn with_bucket<T>(
     runtime.block_on(async {
         let work = async {
             let store = S3Store::from_environment(&args.bucket).await?;
-            work(&store).await
+            work(&store).await.map_err(|error| explain(error, &args.bucket))
         };
         tokio::select! {
             result = work => result,
             () = interrupted() => anyhow::bail!("interrupted"),
         }
+    })
+}
+
+/// The store's own words seldom name the bucket, and never say where credentials come from.
+fn explain(error: anyhow::Error, bucket: &str) -> anyhow::Error {
+    let Some(Error::Refused { source, .. } | Error::Ambiguous { source, .. }) = error.downcast_ref() else {
+        return error;
+    };
+    let words = source.to_string();
+    let lacks_credentials = ["credentials", "IMDS"].iter().any(|word| words.contains(word));
+    error.context(if lacks_credentials {
+        format!(
+            "bucket {bucket}: found no AWS credentials: set AWS_PROFILE, or AWS_ACCESS_KEY_ID and \
+             AWS_SECRET_ACCESS_KEY"
+        )
+    } else {
+        format!("bucket {bucket}")
     })
 }
 
@@ -87,6 +104,19 @@ pub(crate) fn found<T>(answer: rayfold_pipeline::Result<T>) -> rayfold_pipeline:
         Err(Error::NotFound { .. }) => Ok(None),
         answer => answer.map(Some),
     }
+}
+
+/// # Errors
+/// When nothing shows that there is such an animation, or ever was.
+pub(crate) async fn must_exist(store: &S3Store, animation: &Animation) -> anyhow::Result<()> {
+    let has_manifest = found(store.get(&animation.manifest()).await)?.is_some();
+    let page = store.list(ListRequest::level(animation.scripts())).await?;
+    anyhow::ensure!(
+        has_manifest || !page.objects.is_empty(),
+        "there is no animation {animation} in {}",
+        store.bucket()
+    );
+    Ok(())
 }
 
 /// For clap: the name of an animation.

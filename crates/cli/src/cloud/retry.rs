@@ -4,8 +4,7 @@ use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::retry::{Scope, retry};
 use rayfold_pipeline::{Invocation, Policy, Randomness, SystemClock};
 
-use super::{BucketArgs, parse_animation, with_bucket};
-use crate::cloud::watch::Watch;
+use super::{BucketArgs, must_exist, parse_animation, with_bucket};
 use crate::console::Console;
 use crate::outcome::Outcome;
 use crate::wording::number;
@@ -32,14 +31,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let scope = if args.all { Scope::All } else { Scope::Failed };
     with_bucket(&args.bucket, async |store| {
-        let mut watch = Watch::new(store, &args.animation);
-        watch.look().await?;
-        anyhow::ensure!(
-            watch.manifest.is_some(),
-            "there is no animation {} in {}",
-            args.animation,
-            store.bucket()
-        );
+        must_exist(store, &args.animation).await?;
         let (seed, request) = (fastrand::u64(..), format!("retry-{:016x}", fastrand::u64(..)));
         let (random, policy) = (Randomness::seeded(seed), Policy::default());
         let invocation = Invocation::new(store, &SystemClock, &random, &policy, &request);

@@ -2,7 +2,6 @@
 
 use std::fmt::Write;
 
-use clap::ValueEnum;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 use rayfold_pipeline::keys::{Animation, Key, MANIFESTS, SCRIPTS};
 use rayfold_pipeline::manifest::{Head, Reason};
@@ -10,8 +9,8 @@ use rayfold_pipeline::store::{ListRequest, S3Store};
 use serde::Serialize;
 
 use super::watch::Watch;
-use super::{BucketArgs, SIDE_BY_SIDE, list, parse_animation, report, with_bucket};
-use crate::console::Console;
+use super::{BucketArgs, SIDE_BY_SIDE, list, must_exist, parse_animation, report, with_bucket};
+use crate::console::{Console, Format};
 use crate::outcome::Outcome;
 use crate::wording::Size;
 
@@ -37,15 +36,6 @@ pub(crate) struct Args {
     /// How to show it
     #[arg(long, value_enum, default_value_t)]
     format: Format,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// For people
-    #[default]
-    Text,
-    /// For programs: a document with `animations`; with --watch one in a line for each change
-    Json,
 }
 
 #[derive(Serialize)]
@@ -100,9 +90,8 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
             if let (Some(animation), [watch]) = (&args.animation, watches.as_slice())
                 && watch.manifest.is_none()
                 && !args.watch
-                && !exists(store, animation).await?
             {
-                anyhow::bail!("there is no animation {animation} in {}", store.bucket());
+                must_exist(store, animation).await?;
             }
             let shown = match args.format {
                 Format::Text => table(&names, &watches),
@@ -162,11 +151,6 @@ async fn animations(store: &S3Store) -> anyhow::Result<Vec<Animation>> {
     }
     names.sort();
     Ok(names)
-}
-
-async fn exists(store: &S3Store, animation: &Animation) -> anyhow::Result<bool> {
-    let (scripts, _) = list(store, ListRequest::level(animation.scripts())).await?;
-    Ok(!scripts.is_empty())
 }
 
 fn table(names: &[Animation], watches: &[Watch<'_>]) -> String {

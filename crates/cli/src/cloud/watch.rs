@@ -34,12 +34,17 @@ impl<'a> Watch<'a> {
     /// Those of the store.
     pub(crate) async fn look(&mut self) -> rayfold_pipeline::Result<bool> {
         let key = self.animation.manifest();
-        let version = found(self.store.head(&key).await)?.map(|info| info.etag);
+        // At first a whole GET, whose refusal says more than that of a HEAD.
+        let is_known = match &self.version {
+            Some(_) => found(self.store.head(&key).await)?.map(|info| info.etag) == self.version,
+            None => false,
+        };
         let mut changed = false;
-        if version != self.version {
-            changed = true;
+        if !is_known {
             let object = found(self.store.get(&key).await)?;
-            self.version = object.as_ref().map(|object| object.info.etag.clone());
+            let version = object.as_ref().map(|object| object.info.etag.clone());
+            changed = version != self.version;
+            self.version = version;
             self.manifest =
                 object.map(|object| Manifest::decode(self.animation, &object.body)).transpose()?;
         }

@@ -13,7 +13,7 @@ use clap::ValueEnum;
 use rayfold_scene::Screen;
 use serde::Serialize;
 
-use crate::console::Console;
+use crate::console::{Console, Format};
 use crate::outcome::Outcome;
 use crate::render::parse_size;
 use estimate::{Section, Workload, estimate};
@@ -85,15 +85,6 @@ enum Architecture {
     #[value(name = "x86_64")]
     X86_64,
     Arm64,
-}
-
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-enum Format {
-    /// A table for people
-    #[default]
-    Text,
-    /// For programs
-    Json,
 }
 
 #[derive(Serialize)]

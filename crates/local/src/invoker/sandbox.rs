@@ -64,6 +64,8 @@ impl Sandbox {
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
+            // A Ctrl-C in the terminal is the invoker's to answer.
+            .process_group(0)
             .kill_on_drop(true)
             .spawn()
             .map_err(|source| Error::Spawn { program, source })?;

@@ -72,6 +72,8 @@ pub struct Connection {
     pub access_key: String,
     /// Its secret.
     pub secret_key: String,
+    /// What comes with a temporary key.
+    pub session_token: Option<String>,
 }
 
 impl S3Store {
@@ -99,11 +101,17 @@ impl S3Store {
 
     /// The bucket at an endpoint.
     pub fn at(connection: &Connection, bucket: &str) -> Self {
-        let Connection { endpoint, region, access_key, secret_key } = connection;
+        let Connection { endpoint, region, access_key, secret_key, session_token } = connection;
         let config = aws_sdk_s3::Config::builder()
             .behavior_version(BehaviorVersion::latest())
             .region(Region::new(region.clone()))
-            .credentials_provider(Credentials::new(access_key, secret_key, None, None, "rayfold"))
+            .credentials_provider(Credentials::new(
+                access_key,
+                secret_key,
+                session_token.clone(),
+                None,
+                "rayfold",
+            ))
             .http_client(https_client())
             .endpoint_url(endpoint);
         Self::new(config, Some(endpoint), bucket)

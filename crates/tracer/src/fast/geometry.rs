@@ -9,6 +9,7 @@ use rayfold_scene::model::unit;
 use rayfold_scene::{Camera, Light, Object, Scene, Screen};
 
 use crate::RenderError;
+use crate::parallel::map;
 
 /// The shape of an object.
 #[derive(Clone, Copy, Debug)]
@@ -22,7 +23,7 @@ pub(super) enum Shape {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Solid {
     pub(super) shape: Shape,
-    pub(super) order: usize,
+    pub(super) order: u32,
 }
 
 /// Where the rays of the pixels come from.
@@ -74,7 +75,8 @@ impl Geometry {
             Camera::Pinhole(pinhole) => pinhole.eye(),
             Camera::Orthographic => middle(scene.screen),
         };
-        let reach = scene.objects.iter().map(|object| reach(object, center)).fold(0.0, f64::max);
+        let reaches = map(&scene.objects, |object| reach(object, center));
+        let reach = reaches.into_iter().fold(0.0, f64::max);
         let reach = match scene.camera {
             Camera::Pinhole(_) => reach,
             Camera::Orthographic => reach.max(center.max_element()),
@@ -85,9 +87,9 @@ impl Geometry {
         let scale = power_of_two_below_inverse(reach);
         let view = view(scene, scale);
         let place = |point: DVec3| (point - center) * scale;
-        let solids = scene.objects.iter().enumerate();
-        let solids =
-            solids.filter_map(|(order, object)| Some(Solid { shape: shape(object, place, scale)?, order }));
+        let shapes = map(&scene.objects, |object| shape(object, place, scale));
+        let solids = shapes.into_iter().enumerate();
+        let solids = solids.filter_map(|(order, shape)| Some(Solid { shape: shape?, order: order as u32 }));
         let suns = scene
             .lights
             .iter()

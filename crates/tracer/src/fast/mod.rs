@@ -46,6 +46,7 @@ macro_rules! on {
 
 mod geometry;
 mod intersect;
+mod lists;
 mod precision;
 mod prepare;
 pub mod probe;
@@ -70,6 +71,10 @@ use window::Window;
 
 /// Columns and rows of a tile.
 const SIDE: (u32, u32) = (16, 16);
+
+/// The same for scenes of more than so many objects: small tiles show few of them.
+const SMALL_SIDE: (u32, u32) = (8, 8);
+const MANY: usize = 512;
 
 /// Draws a scene.
 ///
@@ -119,9 +124,10 @@ fn draw<E: Kernels>(
     geometry: &Geometry,
     options: &RenderOptions,
 ) -> Result<RgbImage, RenderError> {
-    let prepared = Prepared::<E>::new(scene, geometry, options.tree);
     let size = (scene.screen.width(), scene.screen.height());
-    let side = options.tile.unwrap_or(SIDE);
+    let many = geometry.solids.len() > MANY;
+    let side = options.tile.unwrap_or(if many { SMALL_SIDE } else { SIDE });
+    let prepared = Prepared::<E>::new(scene, geometry, options.tree, side);
     let whole = geometry.whole();
     let mut solids: Vec<&Solid> =
         if prepared.tree.is_some() { vec![&whole] } else { geometry.solids.iter().collect() };
@@ -152,12 +158,14 @@ impl<E: Real> Job<'_, E> {
         let (width, _) = band.size;
         let height = (band.bytes.len() / (width as usize * CHANNELS)) as u32;
         for (column, left) in (0..width).step_by(self.side.0 as usize).enumerate() {
+            let place = (column, (self.row / self.side.1) as usize);
             let tile = Tile {
                 left,
                 top: self.row,
                 width: self.side.0.min(width - left),
                 height,
-                candidates: self.window.candidates(column, (self.row / self.side.1) as usize),
+                candidates: self.window.candidates(place.0, place.1),
+                place,
             };
             tile::draw::<S, E, F>(simd, self.prepared, tile, &mut scratch, &mut band);
         }

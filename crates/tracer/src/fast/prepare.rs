@@ -7,8 +7,10 @@ use glam::{DMat3, DVec3};
 use rayfold_scene::{Object, Scene};
 
 use super::geometry::{Geometry, Shape, Solid, Sun, View};
+use super::lists::{LISTED, LightBuffer, Outline, Sights};
 use super::real::Real;
 use super::tree::{self, Tree};
+use crate::parallel::map;
 
 /// Rounding errors that add up on the way to a hit and to a shadow ray's test, in roundoffs of the largest coordinate;
 /// the offset of a new ray's origin exceeds them.
@@ -90,6 +92,20 @@ pub(super) struct Light<E> {
     pub(super) shades: Vec<Shade<E>>,
     /// For scenes without a tree: what can meet a ray from a region.
     pub(super) outlines: Outlines<E>,
+    /// For scenes of many objects, where it helps.
+    pub(super) buffer: Option<LightBuffer>,
+}
+
+/// An object by its kind and its position in the array of that kind.
+pub(super) type Item = (Kind, u32);
+
+/// How a scene's objects are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Search {
+    Masks,
+    /// Lists, and down a tree where they would be long.
+    Lists,
+    Tree,
 }
 
 /// Per object, in the order of the masks' bits: a box along the light's axes, and one along the scene's.
@@ -140,6 +156,8 @@ pub(super) struct Prepared<E> {
     pub(super) entries: Vec<Entry<E>>,
     pub(super) lights: Vec<Light<E>>,
     pub(super) tree: Option<Tree<E>>,
+    /// For scenes of many objects, where it helps: what the tiles show.
+    pub(super) sights: Option<Sights>,
     /// Unclamped, for mirrored rays.
     pub(super) background: [E; 3],
     pub(super) mirrors: bool,
@@ -150,45 +168,50 @@ pub(super) const MASKED: usize = 64;
 
 impl<E: Real> Prepared<E> {
     /// `tree` says whether to look for objects down a tree, if it matters; what masks cannot hold then is one leaf.
-    pub(super) fn new(scene: &Scene, geometry: &Geometry, tree: Option<bool>) -> Self {
-        let mut solids = geometry.solids.clone();
-        let many = solids.len() > MASKED;
-        let branches = match tree {
-            _ if solids.is_empty() => None,
-            Some(false) if many => Some(tree::stump(&solids)),
-            None if !many => None,
-            Some(false) => None,
-            _ => Some(tree::plant(&mut solids)),
+    /// Tiles have the size of `side`.
+    pub(super) fn new(scene: &Scene, geometry: &Geometry, tree: Option<bool>, side: (u32, u32)) -> Self {
+        let size = (scene.screen.width(), scene.screen.height());
+        let count = geometry.solids.len();
+        let search = match tree {
+            _ if count == 0 => Search::Masks,
+            None if (MASKED + 1..=LISTED).contains(&count) => Search::Lists,
+            None | Some(false) if count <= MASKED => Search::Masks,
+            _ => Search::Tree,
         };
-        let mut entries: Vec<Entry<E>> = scene.objects.iter().map(entry).collect();
-        let (mut spheres, mut cuboids, mut triangles) = (vec![], vec![], vec![]);
-        for solid in &solids {
-            let index = match solid.shape {
-                Shape::Sphere { center, radius } => push(&mut spheres, sphere(solid, center, radius)),
-                Shape::Cuboid { min, max } => {
-                    push(&mut cuboids, Cuboid { min: point(min), max: point(max), order: order(solid) })
-                }
-                Shape::Triangle { vertices, normal } => {
-                    push(&mut triangles, triangle(solid, vertices, normal))
-                }
+        let planted = match search {
+            Search::Masks => None,
+            _ if tree == Some(false) => Some((geometry.solids.clone(), tree::stump(&geometry.solids))),
+            _ => Some(tree::plant(&geometry.solids)),
+        };
+        let (solids, branches) = match &planted {
+            Some((solids, branches)) => (solids, Some(branches)),
+            None => (&geometry.solids, None),
+        };
+        let mut entries: Vec<Entry<E>> = map(&scene.objects, entry);
+        let mut sorted = Sorted { balls: vec![], boxes: vec![], facets: vec![] };
+        for solid in solids {
+            let of_kind = match solid.shape {
+                Shape::Sphere { .. } => &mut sorted.balls,
+                Shape::Cuboid { .. } => &mut sorted.boxes,
+                Shape::Triangle { .. } => &mut sorted.facets,
             };
-            entries[solid.order].index = index;
+            entries[solid.order as usize].index = of_kind.len() as u32;
+            of_kind.push(solid);
         }
-        let tree = branches.map(|branches| Tree::new(branches, &solids, &entries));
-        let mut by_kind: Vec<&Solid> = solids.iter().collect();
-        by_kind.sort_by_key(|solid| solid.kind_rank());
-        let lights = geometry.suns.iter().map(|sun| light(sun, &by_kind, tree.is_none())).collect();
-        let mirrors = geometry.solids.iter().any(|solid| entries[solid.order].mirrors);
+        let sights = (search == Search::Lists)
+            .then(|| Sights::new(&geometry.view, &sorted.all(), sorted.items(), size, side, E::ROUNDOFF))
+            .flatten();
         Self {
             rays: rays(&geometry.view),
-            spheres,
-            cuboids,
-            triangles,
-            entries,
-            lights,
-            tree,
+            spheres: map(&sorted.balls, |solid| sphere(solid)),
+            cuboids: map(&sorted.boxes, |solid| cuboid(solid)),
+            triangles: map(&sorted.facets, |solid| triangle(solid)),
+            lights: geometry.suns.iter().map(|sun| light(sun, &sorted, search)).collect(),
+            mirrors: solids.iter().any(|solid| entries[solid.order as usize].mirrors),
             background: point(scene.background()),
-            mirrors,
+            tree: branches.map(|branches| Tree::new(branches, solids, &entries)),
+            sights,
+            entries,
         }
     }
 }
@@ -198,12 +221,7 @@ fn point<E: Real>(v: DVec3) -> [E; 3] {
 }
 
 fn order<E: Real>(solid: &Solid) -> E {
-    E::narrow(solid.order as f64)
-}
-
-fn push<T>(items: &mut Vec<T>, item: T) -> u32 {
-    items.push(item);
-    items.len() as u32 - 1
+    E::narrow(f64::from(solid.order))
 }
 
 fn entry<E: Real>(object: &Object) -> Entry<E> {
@@ -233,7 +251,16 @@ fn rays<E: Real>(view: &View) -> Rays<E> {
     }
 }
 
-fn sphere<E: Real>(solid: &Solid, center: DVec3, radius: f64) -> Sphere<E> {
+/// Shapes are sorted by kind before.
+const SORTED: &str = "solids are sorted by kind";
+
+fn cuboid<E: Real>(solid: &Solid) -> Cuboid<E> {
+    let Shape::Cuboid { min, max } = solid.shape else { unreachable!("{SORTED}") };
+    Cuboid { min: point(min), max: point(max), order: order(solid) }
+}
+
+fn sphere<E: Real>(solid: &Solid) -> Sphere<E> {
+    let Shape::Sphere { center, radius } = solid.shape else { unreachable!("{SORTED}") };
     let away = center.length();
     let offset = OFFSET * E::ROUNDOFF * (center.abs().max_element() + radius);
     Sphere {
@@ -246,7 +273,8 @@ fn sphere<E: Real>(solid: &Solid, center: DVec3, radius: f64) -> Sphere<E> {
     }
 }
 
-fn triangle<E: Real>(solid: &Solid, vertices: [DVec3; 3], normal: DVec3) -> Triangle<E> {
+fn triangle<E: Real>(solid: &Solid) -> Triangle<E> {
+    let Shape::Triangle { vertices, normal } = solid.shape else { unreachable!("{SORTED}") };
     let [a, b, c] = vertices;
     let edges = [(b, c), (c, a), (a, b)].map(|(p, q)| (q - p, p.cross(q)));
     let volume = a.dot(b.cross(c));
@@ -286,35 +314,52 @@ fn l1(v: DVec3) -> f64 {
     v.abs().element_sum()
 }
 
-fn light<E: Real>(sun: &Sun, solids: &[&Solid], outlined: bool) -> Light<E> {
+/// The scene's solids by kind, each in the order of its array.
+struct Sorted<'a> {
+    balls: Vec<&'a Solid>,
+    boxes: Vec<&'a Solid>,
+    facets: Vec<&'a Solid>,
+}
+
+impl Sorted<'_> {
+    /// In the order of the masks' bits.
+    fn all(&self) -> Vec<&Solid> {
+        [&self.balls, &self.boxes, &self.facets].into_iter().flatten().copied().collect()
+    }
+
+    fn items(&self) -> Vec<Item> {
+        let of = |kind: Kind, solids: &[&Solid]| (0..solids.len() as u32).map(move |index| (kind, index));
+        of(Kind::Sphere, &self.balls)
+            .chain(of(Kind::Cuboid, &self.boxes))
+            .chain(of(Kind::Triangle, &self.facets))
+            .collect()
+    }
+}
+
+fn light<E: Real>(sun: &Sun, sorted: &Sorted, search: Search) -> Light<E> {
     let (x, y) = sun.towards.any_orthonormal_pair();
     let axes: [[E; 3]; 3] = [point(x), point(y), point(sun.towards)];
     // The axes as the kernels have them, so that both sides of a test see the same map.
     let rounded = DMat3::from_cols_array_2d(&axes.map(|axis| axis.map(Real::widen))).transpose();
-    let mut light = Light {
+    let circle = |solid: &&Solid| {
+        let Shape::Sphere { center, radius } = solid.shape else { unreachable!("{SORTED}") };
+        let [x, y, z] = point(rounded * center);
+        [x, y, z, E::narrow(radius * radius)]
+    };
+    let facet = |solid: &&Solid| {
+        let Shape::Triangle { vertices, normal } = solid.shape else { unreachable!("{SORTED}") };
+        shade(vertices, normal, rounded.row(2))
+    };
+    let outlines = || map(&sorted.all(), |solid| Outline::new::<E>(solid, rounded));
+    Light {
         axes,
         color: point(sun.color),
         inverse: sun.towards.to_array().map(|d| (d != 0.0).then(|| E::narrow(1.0 / d))),
-        spheres: vec![],
-        shades: vec![],
-        outlines: Outlines::default(),
-    };
-    for solid in solids {
-        match solid.shape {
-            Shape::Sphere { center, radius } => {
-                let [x, y, z] = point(rounded * center);
-                light.spheres.push([x, y, z, E::narrow(radius * radius)]);
-            }
-            Shape::Cuboid { .. } => {}
-            Shape::Triangle { vertices, normal } => {
-                light.shades.push(shade(vertices, normal, rounded.row(2)))
-            }
-        }
+        spheres: map(&sorted.balls, circle),
+        shades: map(&sorted.facets, facet),
+        outlines: if search == Search::Masks { masks(&outlines()) } else { Outlines::default() },
+        buffer: if search == Search::Lists { LightBuffer::new(outlines(), sorted.items()) } else { None },
     }
-    if outlined {
-        light.outlines = outlines(solids, rounded);
-    }
-    light
 }
 
 /// From the Plücker coordinates of the ray through `o` along `d`: `d · moment + direction · (o × d)`.
@@ -344,36 +389,16 @@ fn shade<E: Real>(vertices: [DVec3; 3], normal: DVec3, towards: DVec3) -> Shade<
     }
 }
 
-fn outlines<E: Real>(solids: &[&Solid], axes: DMat3) -> Outlines<E> {
-    let mut outlines = Outlines::default();
-    for solid in solids {
-        let slack = BOUNDS * E::ROUNDOFF * solid.magnitude();
-        for axis in 0..2 {
-            let direction = axes.row(axis);
-            outlines.low[axis].push(E::narrow(-solid.support(-direction) - 2.0 * slack));
-            outlines.high[axis].push(E::narrow(solid.support(direction) + 2.0 * slack));
-        }
-        outlines.top.push(E::narrow(solid.support(axes.row(2)) + 2.0 * slack));
-        let (min, max) = solid.bounds();
-        for axis in 0..3 {
-            let towards = axes.row(2)[axis];
-            // A light along the other two axes passes on both sides.
-            let exit = if towards > 0.0 {
-                max[axis]
-            } else if towards < 0.0 {
-                -min[axis]
-            } else {
-                f64::MAX.sqrt()
-            };
-            // A face is exact: what starts beyond it, if only by its offset, is beyond it.
-            let slack = if matches!(solid.shape, Shape::Cuboid { .. }) { 0.0 } else { slack };
-            outlines.exits[axis].push(E::narrow((exit + slack).min(E::FAR)));
-        }
+fn masks<E: Real>(of: &[Outline]) -> Outlines<E> {
+    let column = |value: &dyn Fn(&Outline) -> f64, never: f64| {
+        let mut column: Vec<E> = of.iter().map(|outline| E::narrow(value(outline))).collect();
+        column.resize(MASKED, E::narrow(never));
+        column
+    };
+    Outlines {
+        low: [0, 1].map(|axis| column(&|o| o.low[axis], E::FAR)),
+        high: [0, 1].map(|axis| column(&|o| o.high[axis], -E::FAR)),
+        exits: [0, 1, 2].map(|axis| column(&|o| o.exits[axis], -E::FAR)),
+        top: column(&|o| o.top, -E::FAR),
     }
-    let Outlines { low, high, exits, top } = &mut outlines;
-    for (never, arrays) in [(E::FAR, &mut low[..]), (-E::FAR, &mut high[..]), (-E::FAR, &mut exits[..])] {
-        arrays.iter_mut().for_each(|array| array.resize(MASKED, E::narrow(never)));
-    }
-    top.resize(MASKED, E::narrow(-E::FAR));
-    outlines
 }

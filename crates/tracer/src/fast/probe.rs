@@ -85,7 +85,7 @@ fn probe<E: Real, T>(
     options: &RenderOptions,
     run: impl Fn(&Batch<E>, Level, &mut Vec<T>),
 ) -> Result<Vec<T>, RenderError> {
-    let prepared = Prepared::<E>::new(scene, geometry, options.tree);
+    let prepared = Prepared::<E>::new(scene, geometry, options.tree, super::SIDE);
     let mut out = Vec::with_capacity(rays.len());
     run(&Batch { scene: &prepared, geometry, rays }, options.level.unwrap_or_else(Level::new), &mut out);
     Ok(out)
@@ -120,9 +120,9 @@ impl<E: Real> Batch<'_, E> {
             #[inline(always)]
             |ray, from_eye, count| {
                 let found = if from_eye {
-                    nearest::<S, E, Everything, true>(simd, self.scene, ray, Candidates::MAX)
+                    nearest::<S, E, Everything, true>(simd, self.scene, ray, Candidates::All)
                 } else {
-                    nearest::<S, E, Everything, false>(simd, self.scene, ray, Candidates::MAX)
+                    nearest::<S, E, Everything, false>(simd, self.scene, ray, Candidates::All)
                 };
                 let hit = found.hit(simd).to_bitmask();
                 let mut normals = [DVec3::ZERO; 16];
@@ -168,7 +168,7 @@ impl<E: Real> Batch<'_, E> {
                 let all = zero.simd_eq(zero);
                 let light = &self.scene.lights[0];
                 let lit =
-                    unshaded::<S, E, Everything>(simd, self.scene, light, ray.origin, all, Candidates::MAX)
+                    unshaded::<S, E, Everything>(simd, self.scene, light, ray.origin, all, Candidates::All)
                         .to_bitmask();
                 out.extend((0..count).map(|lane| lit >> lane & 1 != 0));
             },

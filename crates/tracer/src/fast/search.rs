@@ -9,7 +9,7 @@ use super::intersect::{
     Moment, Nearest, Ray, Slopes, cuboid, cuboid_shades, facing, sphere, sphere_from_eye, sphere_shades,
     triangle, triangle_from_eye, triangle_shades,
 };
-use super::prepare::{Kind, Light, Prepared};
+use super::prepare::{Item, Kind, Light, Prepared};
 use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
 use super::tree::{Node, Tree};
 
@@ -21,8 +21,35 @@ pub(super) trait Features: 'static {
     const TREE: bool;
 }
 
-/// Objects by bits: spheres first, then boxes, then triangles, each in the order of its array.
-pub(super) type Candidates = u64;
+/// The objects to look at.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Candidates<'a> {
+    /// By bits: spheres first, then boxes, then triangles, each in the order of its array.
+    Masked(u64),
+    Listed(&'a [Item]),
+    /// All of them, down the tree where there is one.
+    All,
+}
+
+impl Candidates<'_> {
+    /// Whether it is certain that there are none.
+    #[inline(always)]
+    pub(super) fn are_none(self) -> bool {
+        match self {
+            Self::Masked(bits) => bits == 0,
+            Self::Listed(items) => items.is_empty(),
+            Self::All => false,
+        }
+    }
+
+    #[inline(always)]
+    fn bits(self) -> u64 {
+        match self {
+            Self::Masked(bits) => bits,
+            Self::Listed(_) | Self::All => u64::MAX,
+        }
+    }
+}
 
 /// The positions of the bits that are set.
 struct Positions(u64);
@@ -43,7 +70,7 @@ impl Iterator for Positions {
 
 /// The bits of a kind whose array begins at `from` and has `count` items, moved to the front.
 #[inline(always)]
-fn of_kind(bits: Candidates, from: usize, count: usize) -> u64 {
+fn of_kind(bits: u64, from: usize, count: usize) -> u64 {
     if from >= 64 || count == 0 {
         return 0;
     }
@@ -61,8 +88,12 @@ pub(super) fn nearest<S: Simd, E: Real, F: Features, const EYE: bool>(
     if F::TREE
         && let Some(tree) = &scene.tree
     {
+        if EYE && let Candidates::Listed(items) = candidates {
+            return nearest_of_list(simd, scene, items, ray.direction);
+        }
         return nearest_in_tree::<S, E, EYE>(simd, scene, tree, ray);
     }
+    let candidates = candidates.bits();
     let mut nearest = Nearest::none(simd);
     let (spheres, cuboids, triangles) = (scene.spheres.len(), scene.cuboids.len(), scene.triangles.len());
     for at in Positions(of_kind(candidates, 0, spheres)) {
@@ -110,8 +141,12 @@ pub(super) fn unshaded<S: Simd, E: Real, F: Features>(
     if F::TREE
         && let Some(tree) = &scene.tree
     {
+        if let Candidates::Listed(items) = candidates {
+            return unshaded_by_list(simd, scene, items, light, point, lit);
+        }
         return unshaded_in_tree(simd, scene, tree, light, point, lit);
     }
+    let candidates = candidates.bits();
     let (spheres, cuboids, triangles) = (scene.spheres.len(), scene.cuboids.len(), scene.triangles.len());
     let bits = of_kind(candidates, 0, spheres);
     if bits != 0 {
@@ -129,6 +164,49 @@ pub(super) fn unshaded<S: Simd, E: Real, F: Features>(
         for at in Positions(of_kind(candidates, spheres + cuboids, triangles)) {
             lit &= !triangle_shades(simd, &light.shades[at], point);
         }
+    }
+    lit
+}
+
+/// The nearest hits of rays from the eye.
+#[inline(always)]
+fn nearest_of_list<S: Simd, E: Real>(
+    simd: S,
+    scene: &Prepared<E>,
+    items: &[Item],
+    direction: Vec3<S, E>,
+) -> Nearest<S, E> {
+    let mut nearest = Nearest::none(simd);
+    let ray = Ray { origin: Vec3::zero(simd), direction };
+    let slopes = Slopes::new(simd, direction);
+    for &(kind, index) in items {
+        let index = index as usize;
+        match kind {
+            Kind::Sphere => sphere_from_eye(simd, &scene.spheres[index], direction, &mut nearest),
+            Kind::Cuboid => cuboid(simd, &scene.cuboids[index], ray, slopes, &mut nearest),
+            Kind::Triangle => triangle_from_eye(simd, &scene.triangles[index], direction, &mut nearest),
+        }
+    }
+    nearest
+}
+
+#[inline(always)]
+fn unshaded_by_list<S: Simd, E: Real>(
+    simd: S,
+    scene: &Prepared<E>,
+    items: &[Item],
+    light: &Light<E>,
+    point: Vec3<S, E>,
+    mut lit: Mask<S, E>,
+) -> Mask<S, E> {
+    let faced = facing(simd, light, point);
+    for &(kind, index) in items {
+        let index = index as usize;
+        lit &= !match kind {
+            Kind::Sphere => sphere_shades(simd, &light.spheres[index], faced),
+            Kind::Cuboid => cuboid_shades(simd, &scene.cuboids[index], light, point),
+            Kind::Triangle => triangle_shades(simd, &light.shades[index], point),
+        };
     }
     lit
 }

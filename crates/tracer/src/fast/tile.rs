@@ -2,13 +2,15 @@
 //!
 //! Generation by generation: the first holds the tile's pixels, each further one the mirrored rays of the one before,
 //! closed up so that packets stay full. In a generation all hits are found first; the region that they fill then decides
-//! which objects can stand in the way of each light.
+//! which objects can stand in the way of each light. Each of the steps is compiled as one function with the instruction
+//! set's features (`vectorize`); all in one would take the compiler much longer.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use super::intersect::{Ray, Slopes, Surface, cuboid_surface, sphere_surface, triangle_surface};
-use super::prepare::{Entry, Kind, Light, OFFSET, Prepared, Rays};
+use super::lists::{Beam, Seen};
+use super::prepare::{Entry, Item, Kind, Light, OFFSET, Outlines, Prepared, Rays};
 use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
 use super::search::{Candidates, Features, nearest, unshaded};
 use crate::MAX_BOUNCES;
@@ -59,7 +61,7 @@ struct Hits<E> {
     diffuse: Columns<E>,
     color: Columns<E>,
     /// For each packet with hits: where it begins, and the object that cannot be in its way, as a bit.
-    packets: Vec<(usize, Candidates)>,
+    packets: Vec<(usize, u64)>,
     /// The box that the starts lie in.
     low: [E; 3],
     high: [E; 3],
@@ -70,8 +72,24 @@ pub(super) struct Scratch<E> {
     queues: [Queue<E>; 2],
     hits: Hits<E>,
     pixels: Columns<E>,
-    /// Candidates per light.
-    obstacles: Vec<Candidates>,
+    obstacles: Obstacles,
+    sights: Vec<Item>,
+}
+
+/// What can stand in the way of each light.
+#[derive(Default)]
+struct Obstacles {
+    of: Vec<InTheWay>,
+    /// The lists, one after another.
+    items: Vec<Item>,
+    seen: Seen,
+}
+
+enum InTheWay {
+    Masked(u64),
+    /// From where to where the list goes.
+    Listed(usize, usize),
+    Anything,
 }
 
 impl<E: Real> Scratch<E> {
@@ -97,7 +115,8 @@ impl<E: Real> Scratch<E> {
                 high: [E::narrow(0.0); 3],
             },
             pixels: columns(),
-            obstacles: Vec::new(),
+            obstacles: Obstacles::default(),
+            sights: Vec::new(),
         }
     }
 }
@@ -109,7 +128,10 @@ pub(super) struct Tile {
     pub(super) top: u32,
     pub(super) width: u32,
     pub(super) height: u32,
-    pub(super) candidates: Candidates,
+    /// What it can show, by bits; with a tree, whether it can show anything.
+    pub(super) candidates: u64,
+    /// Columns and rows of tiles before it.
+    pub(super) place: (usize, usize),
 }
 
 /// Where a tile's pixels go: the bytes of its rows, from the image's left edge.
@@ -154,9 +176,19 @@ pub(super) fn draw<S: Simd, E: Real, F: Features>(
     if tile.candidates == 0 {
         return fill(tile, band);
     }
-    let Scratch { queues: [queue, next], hits, pixels, obstacles } = scratch;
+    let Scratch { queues: [queue, next], hits, pixels, obstacles, sights } = scratch;
     next.count = 0;
-    first_generation::<S, E, F>(simd, scene, tile, band, hits, queue, next);
+    let candidates = match &scene.sights {
+        _ if scene.tree.is_none() => Candidates::Masked(tile.candidates),
+        Some(all) if all.gather(tile.place.0, tile.place.1, sights) => {
+            if sights.is_empty() {
+                return fill(tile, band);
+            }
+            Candidates::Listed(sights)
+        }
+        _ => Candidates::All,
+    };
+    first_generation::<S, E, F>(simd, scene, tile, candidates, band, hits, (&mut *queue, &mut *next));
     light_up::<S, E, F>(simd, scene, hits, obstacles);
     if F::MIRRORS && next.count > 0 {
         core::mem::swap(&mut hits.color, pixels);
@@ -165,7 +197,7 @@ pub(super) fn draw<S: Simd, E: Real, F: Features>(
             core::mem::swap(&mut queue, &mut next);
             next.count = 0;
             let after = (bounce < MAX_BOUNCES).then_some(&mut *next);
-            later_generation::<S, E, F>(simd, scene, Candidates::MAX, scene.background, hits, queue, after);
+            later_generation::<S, E, F>(simd, scene, Candidates::All, scene.background, hits, queue, after);
             light_up::<S, E, F>(simd, scene, hits, obstacles);
             for ray in 0..queue.count {
                 let pixel = queue.pixel.0[ray].to_index();
@@ -236,67 +268,77 @@ fn first_generation<S: Simd, E: Real, F: Features>(
     simd: S,
     scene: &Prepared<E>,
     tile: Tile,
+    candidates: Candidates,
     band: &Band,
     hits: &mut Hits<E>,
-    queue: &mut Queue<E>,
-    next: &mut Queue<E>,
+    (queue, next): (&mut Queue<E>, &mut Queue<E>),
 ) {
-    let (width, height) = packet_shape::<S, E>();
-    let columns = lanes::<S, E>(simd, 0, width);
-    let rows = (lanes::<S, E>(simd, 0, usize::MAX) - columns) * E::narrow(1.0 / width as f64);
-    let right = constant::<S, E>(simd, f64::from(tile.left + tile.width - 1));
-    let bottom = constant::<S, E>(simd, f64::from(tile.top + tile.height - 1));
-    let last_row = constant::<S, E>(simd, f64::from(band.size.1 - 1));
-    let background = band.background.map(|level| E::narrow(f64::from(level) / 255.0));
-    clear(hits);
-    let mut region = Region::new(simd);
-    let mut at = 0;
-    for top in (0..tile.height as usize).step_by(height) {
-        for left in (0..tile.width as usize).step_by(width) {
-            // Lanes beyond the edge draw the pixel on the edge again.
-            let i = (columns + E::narrow((tile.left as usize + left) as f64)).min(right);
-            let row = (rows + E::narrow((tile.top as usize + top) as f64)).min(bottom);
-            let j = last_row - row;
-            match scene.rays {
-                Rays::Pinhole { corner, right, up } => {
-                    let along = Vec3::splat(simd, right).scale_add(i, Vec3::splat(simd, corner));
-                    let direction = Vec3::splat(simd, up).scale_add(j, along).normalize(simd);
-                    let ray = Ray { origin: Vec3::zero(simd), direction };
-                    let next = (None, Some(&mut *next));
-                    trace::<S, E, F, true>(
-                        simd,
-                        scene,
-                        ray,
-                        tile.candidates,
-                        background,
-                        at,
-                        hits,
-                        &mut region,
-                        next,
-                    );
-                }
-                Rays::Parallel { corner, pixel } => {
-                    let pixel = splat::<S, E>(simd, pixel);
-                    let corner = Vec3::<S, E>::splat(simd, corner);
-                    Vec3::<S, E>::new(i.mul_add(pixel, corner.x), j.mul_add(pixel, corner.y), corner.z)
-                        .store(&mut queue.origin, at);
-                    let (zero, one) = (E::narrow(0.0), E::narrow(1.0));
-                    Vec3::<S, E>::splat(simd, [zero, zero, E::narrow(-1.0)]).store(&mut queue.direction, at);
-                    Vec3::<S, E>::splat(simd, [one; 3]).store(&mut queue.weight, at);
-                    lanes::<S, E>(simd, at, usize::MAX)
-                        .store_slice(&mut queue.pixel.0[at..at + Lanes::<S, E>::LEN]);
-                    queue.count = at + Lanes::<S, E>::LEN;
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let (width, height) = packet_shape::<S, E>();
+            let columns = lanes::<S, E>(simd, 0, width);
+            let rows = (lanes::<S, E>(simd, 0, usize::MAX) - columns) * E::narrow(1.0 / width as f64);
+            let right = constant::<S, E>(simd, f64::from(tile.left + tile.width - 1));
+            let bottom = constant::<S, E>(simd, f64::from(tile.top + tile.height - 1));
+            let last_row = constant::<S, E>(simd, f64::from(band.size.1 - 1));
+            let background = band.background.map(|level| E::narrow(f64::from(level) / 255.0));
+            clear(hits);
+            let mut region = Region::new(simd);
+            let mut at = 0;
+            for top in (0..tile.height as usize).step_by(height) {
+                for left in (0..tile.width as usize).step_by(width) {
+                    // Lanes beyond the edge draw the pixel on the edge again.
+                    let i = (columns + E::narrow((tile.left as usize + left) as f64)).min(right);
+                    let row = (rows + E::narrow((tile.top as usize + top) as f64)).min(bottom);
+                    let j = last_row - row;
+                    match scene.rays {
+                        Rays::Pinhole { corner, right, up } => {
+                            let along = Vec3::splat(simd, right).scale_add(i, Vec3::splat(simd, corner));
+                            let direction = Vec3::splat(simd, up).scale_add(j, along).normalize(simd);
+                            let ray = Ray { origin: Vec3::zero(simd), direction };
+                            let next = (None, Some(&mut *next));
+                            trace::<S, E, F, true>(
+                                simd,
+                                scene,
+                                ray,
+                                candidates,
+                                background,
+                                at,
+                                hits,
+                                &mut region,
+                                next,
+                            );
+                        }
+                        Rays::Parallel { corner, pixel } => {
+                            let pixel = splat::<S, E>(simd, pixel);
+                            let corner = Vec3::<S, E>::splat(simd, corner);
+                            Vec3::<S, E>::new(
+                                i.mul_add(pixel, corner.x),
+                                j.mul_add(pixel, corner.y),
+                                corner.z,
+                            )
+                            .store(&mut queue.origin, at);
+                            let (zero, one) = (E::narrow(0.0), E::narrow(1.0));
+                            Vec3::<S, E>::splat(simd, [zero, zero, E::narrow(-1.0)])
+                                .store(&mut queue.direction, at);
+                            Vec3::<S, E>::splat(simd, [one; 3]).store(&mut queue.weight, at);
+                            lanes::<S, E>(simd, at, usize::MAX)
+                                .store_slice(&mut queue.pixel.0[at..at + Lanes::<S, E>::LEN]);
+                            queue.count = at + Lanes::<S, E>::LEN;
+                        }
+                    }
+                    at += Lanes::<S, E>::LEN;
                 }
             }
-            at += Lanes::<S, E>::LEN;
-        }
-    }
-    match scene.rays {
-        Rays::Pinhole { .. } => region.close(hits),
-        Rays::Parallel { .. } => {
-            later_generation::<S, E, F>(simd, scene, tile.candidates, background, hits, queue, Some(next));
-        }
-    }
+            match scene.rays {
+                Rays::Pinhole { .. } => region.close(hits),
+                Rays::Parallel { .. } => {
+                    later_generation::<S, E, F>(simd, scene, candidates, background, hits, queue, Some(next));
+                }
+            }
+        },
+    );
 }
 
 /// The rays of a queue: those that the generation before sent on.
@@ -310,26 +352,41 @@ fn later_generation<S: Simd, E: Real, F: Features>(
     queue: &mut Queue<E>,
     mut next: Option<&mut Queue<E>>,
 ) {
-    // Lanes beyond the last ray trace it again.
-    let (last, end) = (queue.count - 1, queue.count.next_multiple_of(Lanes::<S, E>::LEN));
-    for columns in [&mut queue.origin, &mut queue.direction, &mut queue.weight] {
-        for column in columns {
-            let value = column.0[last];
-            column.0[last + 1..end].fill(value);
-        }
-    }
-    queue.pixel.0[last + 1..end].fill(E::narrow(-1.0));
-    clear(hits);
-    let mut region = Region::new(simd);
-    for at in (0..queue.count).step_by(Lanes::<S, E>::LEN) {
-        let ray = Ray {
-            origin: Vec3::load(simd, &queue.origin, at),
-            direction: Vec3::load(simd, &queue.direction, at),
-        };
-        let queues = (Some(&*queue), next.as_deref_mut());
-        trace::<S, E, F, false>(simd, scene, ray, candidates, background, at, hits, &mut region, queues);
-    }
-    region.close(hits);
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            // Lanes beyond the last ray trace it again.
+            let (last, end) = (queue.count - 1, queue.count.next_multiple_of(Lanes::<S, E>::LEN));
+            for columns in [&mut queue.origin, &mut queue.direction, &mut queue.weight] {
+                for column in columns {
+                    let value = column.0[last];
+                    column.0[last + 1..end].fill(value);
+                }
+            }
+            queue.pixel.0[last + 1..end].fill(E::narrow(-1.0));
+            clear(hits);
+            let mut region = Region::new(simd);
+            for at in (0..queue.count).step_by(Lanes::<S, E>::LEN) {
+                let ray = Ray {
+                    origin: Vec3::load(simd, &queue.origin, at),
+                    direction: Vec3::load(simd, &queue.direction, at),
+                };
+                let queues = (Some(&*queue), next.as_deref_mut());
+                trace::<S, E, F, false>(
+                    simd,
+                    scene,
+                    ray,
+                    candidates,
+                    background,
+                    at,
+                    hits,
+                    &mut region,
+                    queues,
+                );
+            }
+            region.close(hits);
+        },
+    );
 }
 
 /// Finds what a packet of rays sees: stores hits that wait for light, their colour without it, and mirrored rays.
@@ -369,7 +426,7 @@ fn trace<S: Simd, E: Real, F: Features, const EYE: bool>(
     let mut color = background;
     let mut mirror = zero;
     let mut mirrors = hit & !hit;
-    let mut alone = Candidates::MAX;
+    let mut alone = u64::MAX;
     while remaining != 0 {
         let order = found.order[remaining.trailing_zeros() as usize];
         let entry = &scene.entries[order.to_index()];
@@ -384,7 +441,7 @@ fn trace<S: Simd, E: Real, F: Features, const EYE: bool>(
             mirror = Vec3::select(same, Vec3::splat(simd, entry.mirror), mirror);
         }
         let bits = same.to_bitmask();
-        alone &= if bits == hit.to_bitmask() { own_shadow::<E, EYE>(scene, entry) } else { Candidates::MAX };
+        alone &= if bits == hit.to_bitmask() { own_shadow::<E, EYE>(scene, entry) } else { u64::MAX };
         remaining &= !bits;
     }
     region.include(hit, start);
@@ -433,10 +490,10 @@ fn compress<S: Simd, E: Real>(v: Vec3<S, E>, lanes: Mask<S, E>, into: &mut Colum
 
 /// All candidates but the object itself, where it cannot be in its own light: a convex one, seen from outside.
 #[inline(always)]
-fn own_shadow<E: Real, const EYE: bool>(scene: &Prepared<E>, entry: &Entry<E>) -> Candidates {
+fn own_shadow<E: Real, const EYE: bool>(scene: &Prepared<E>, entry: &Entry<E>) -> u64 {
     let outside =
         EYE && entry.kind == Kind::Sphere && scene.spheres[entry.index as usize].power > E::narrow(0.0);
-    if outside && scene.tree.is_none() { !(1 << entry.index) } else { Candidates::MAX }
+    if outside && scene.tree.is_none() { !(1 << entry.index) } else { u64::MAX }
 }
 
 /// An object's surface where the rays meet it.
@@ -465,54 +522,69 @@ fn light_up<S: Simd, E: Real, F: Features>(
     simd: S,
     scene: &Prepared<E>,
     hits: &mut Hits<E>,
-    obstacles: &mut Vec<Candidates>,
+    obstacles: &mut Obstacles,
 ) {
-    if hits.packets.is_empty() {
-        return;
-    }
-    obstacles.clear();
-    for light in &scene.lights {
-        obstacles.push(if scene.tree.is_some() {
-            Candidates::MAX
-        } else {
-            in_the_way(simd, light, hits.low, hits.high)
-        });
-    }
-    let zero = constant::<S, E>(simd, 0.0);
-    for &(at, others) in &hits.packets {
-        let normal = Vec3::load(simd, &hits.normal, at);
-        let start = Vec3::load(simd, &hits.start, at);
-        let mut sum = Vec3::zero(simd);
-        for (light, candidates) in scene.lights.iter().zip(obstacles.iter()) {
-            let cosine = normal.dot(Vec3::splat(simd, light.axes[2]));
-            let mut lit = cosine.simd_gt(zero);
-            if !lit.any_true() {
-                continue;
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            if hits.packets.is_empty() {
+                return;
             }
-            let candidates = candidates & others;
-            if candidates != 0 {
-                lit = unshaded::<S, E, F>(simd, scene, light, start, lit, candidates);
+            let Obstacles { of, items, seen } = obstacles;
+            of.clear();
+            items.clear();
+            for light in &scene.lights {
+                let from = items.len();
+                of.push(match &light.buffer {
+                    _ if scene.tree.is_none() => {
+                        InTheWay::Masked(in_the_way(simd, &light.outlines, beam(light, hits.low, hits.high)))
+                    }
+                    Some(buffer) if buffer.gather(&beam(light, hits.low, hits.high), seen, items) => {
+                        InTheWay::Listed(from, items.len())
+                    }
+                    _ => InTheWay::Anything,
+                });
             }
-            sum = Vec3::splat(simd, light.color).scale_add(lit.select(cosine, zero), sum);
-        }
-        let diffuse = Vec3::load(simd, &hits.diffuse, at);
-        let color = Vec3::load(simd, &hits.color, at);
-        let lit = Vec3::<S, E>::new(
-            diffuse.x.mul_add(sum.x, color.x),
-            diffuse.y.mul_add(sum.y, color.y),
-            diffuse.z.mul_add(sum.z, color.z),
-        );
-        lit.store(&mut hits.color, at);
-    }
+            let zero = constant::<S, E>(simd, 0.0);
+            for &(at, others) in &hits.packets {
+                let normal = Vec3::load(simd, &hits.normal, at);
+                let start = Vec3::load(simd, &hits.start, at);
+                let mut sum = Vec3::zero(simd);
+                for (light, obstacles) in scene.lights.iter().zip(of.iter()) {
+                    let cosine = normal.dot(Vec3::splat(simd, light.axes[2]));
+                    let mut lit = cosine.simd_gt(zero);
+                    if !lit.any_true() {
+                        continue;
+                    }
+                    let candidates = match *obstacles {
+                        InTheWay::Masked(bits) => Candidates::Masked(bits & others),
+                        InTheWay::Listed(from, to) => Candidates::Listed(&items[from..to]),
+                        InTheWay::Anything => Candidates::All,
+                    };
+                    if !candidates.are_none() {
+                        lit = unshaded::<S, E, F>(simd, scene, light, start, lit, candidates);
+                    }
+                    sum = Vec3::splat(simd, light.color).scale_add(lit.select(cosine, zero), sum);
+                }
+                let diffuse = Vec3::load(simd, &hits.diffuse, at);
+                let color = Vec3::load(simd, &hits.color, at);
+                let lit = Vec3::<S, E>::new(
+                    diffuse.x.mul_add(sum.x, color.x),
+                    diffuse.y.mul_add(sum.y, color.y),
+                    diffuse.z.mul_add(sum.z, color.z),
+                );
+                lit.store(&mut hits.color, at);
+            }
+        },
+    );
 }
 
-/// The objects that can stand between a box and a light.
+/// The shadow rays that start in a box, wider by the rounding errors.
 #[inline(always)]
-fn in_the_way<S: Simd, E: Real>(simd: S, light: &Light<E>, low: [E; 3], high: [E; 3]) -> Candidates {
-    let outlines = &light.outlines;
-    // The box as the light sees it, wider by the rounding errors.
-    let mut region = [(0.0, 0.0); 3];
-    for (axis, (from, to)) in light.axes.iter().zip(&mut region) {
+fn beam<E: Real>(light: &Light<E>, low: [E; 3], high: [E; 3]) -> Beam {
+    let mut spans = [(0.0, 0.0); 3];
+    let mut starts = [0.0; 3];
+    for ((axis, (from, to)), nearest) in light.axes.iter().zip(&mut spans).zip(0..3) {
         let mut slack = 0.0;
         for ((direction, low), high) in axis.iter().zip(low).zip(high) {
             let (a, b) = (direction.widen() * low.widen(), direction.widen() * high.widen());
@@ -522,17 +594,21 @@ fn in_the_way<S: Simd, E: Real>(simd: S, light: &Light<E>, low: [E; 3], high: [E
         }
         *from -= 16.0 * E::ROUNDOFF * slack;
         *to += 16.0 * E::ROUNDOFF * slack;
+        let backwards = light.axes[2][nearest] < E::narrow(0.0);
+        starts[nearest] = if backwards { -high[nearest].widen() } else { low[nearest].widen() };
     }
-    let (left, right) = (constant::<S, E>(simd, region[0].0), constant::<S, E>(simd, region[0].1));
-    let (bottom, top) = (constant::<S, E>(simd, region[1].0), constant::<S, E>(simd, region[1].1));
-    let near = constant::<S, E>(simd, region[2].0);
-    let mut starts = low;
-    for axis in 0..3 {
-        if light.axes[2][axis] < E::narrow(0.0) {
-            starts[axis] = E::narrow(0.0) - high[axis];
-        }
-    }
-    let starts = Vec3::<S, E>::splat(simd, starts);
+    let [x, y, z] = spans;
+    Beam { low: [x.0, y.0], high: [x.1, y.1], height: z.0, starts }
+}
+
+/// The objects that can stand in a beam's way, by bits.
+#[inline(always)]
+fn in_the_way<S: Simd, E: Real>(simd: S, outlines: &Outlines<E>, beam: Beam) -> u64 {
+    let (left, right) = (constant::<S, E>(simd, beam.low[0]), constant::<S, E>(simd, beam.high[0]));
+    let (bottom, top) = (constant::<S, E>(simd, beam.low[1]), constant::<S, E>(simd, beam.high[1]));
+    let near = constant::<S, E>(simd, beam.height);
+    let [x, y, z] = beam.starts;
+    let starts = Vec3::<S, E>::splat(simd, [E::narrow(x), E::narrow(y), E::narrow(z)]);
     let mut candidates = 0;
     let count = outlines.top.len();
     for at in (0..count).step_by(Lanes::<S, E>::LEN) {

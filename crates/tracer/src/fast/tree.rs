@@ -12,6 +12,7 @@ use obvhs::{Boundable, BvhBuildParams};
 use super::geometry::Solid;
 use super::prepare::{BOUNDS, Entry, Kind};
 use super::real::Real;
+use crate::parallel::map;
 
 /// Objects of a leaf at most.
 const LEAF: u32 = 4;
@@ -51,20 +52,17 @@ pub(super) fn stump(solids: &[Solid]) -> Branches {
     Branches(vec![(0, solids.len() as u32)])
 }
 
-/// Groups the solids and puts them in the order of the leaves; there is at least one.
-pub(super) fn plant(solids: &mut Vec<Solid>) -> Branches {
-    let single = |v: DVec3| Vec3A::from(v.as_vec3());
-    let bounds: Vec<Bounds> = solids
-        .iter()
-        .map(|solid| {
-            let (min, max) = solid.bounds();
-            Bounds(Aabb { min: single(min), max: single(max) })
-        })
-        .collect();
+/// Groups the solids: in the order of the leaves, and their shape. There is at least one.
+pub(super) fn plant(solids: &[Solid]) -> (Vec<Solid>, Branches) {
+    let bounds = map(solids, |solid| {
+        let (min, max) = solid.bounds();
+        Bounds(Aabb { min: Vec3A::from(min.as_vec3()), max: Vec3A::from(max.as_vec3()) })
+    });
     let params = BvhBuildParams { max_prims_per_leaf: LEAF, ..BvhBuildParams::fast_build() };
     let grown = build_bvh2(&bounds, params, &mut Default::default());
     // Depth first, children side by side and after their parent.
-    let mut branches = vec![(0, 0)];
+    let mut branches = Vec::with_capacity(grown.nodes.len());
+    branches.push((0, 0));
     let mut order = Vec::with_capacity(solids.len());
     let mut pending = vec![(0usize, 0usize)];
     while let Some((node, at)) = pending.pop() {
@@ -77,20 +75,20 @@ pub(super) fn plant(solids: &mut Vec<Solid>) -> Branches {
             pending.extend([(first + 1, children + 1), (first, children)]);
         } else {
             branches[at] = (order.len() as u32, node.prim_count);
-            let items = &grown.primitive_indices[first..first + node.prim_count as usize];
-            order.extend(items.iter().map(|&item| solids[item as usize]));
+            order.extend_from_slice(&grown.primitive_indices[first..first + node.prim_count as usize]);
         }
     }
-    *solids = order;
-    Branches(branches)
+    (map(&order, |&item| solids[item as usize]), Branches(branches))
 }
 
 impl<E: Real> Tree<E> {
     /// `solids` are in the order of [`plant`].
-    pub(super) fn new(branches: Branches, solids: &[Solid], entries: &[Entry<E>]) -> Self {
-        let items =
-            solids.iter().map(|solid| (entries[solid.order].kind, entries[solid.order].index)).collect();
-        let branches = branches.0;
+    pub(super) fn new(branches: &Branches, solids: &[Solid], entries: &[Entry<E>]) -> Self {
+        let items = map(solids, |solid| {
+            let entry = &entries[solid.order as usize];
+            (entry.kind, entry.index)
+        });
+        let branches = &branches.0;
         let mut bounds = vec![(DVec3::INFINITY, DVec3::NEG_INFINITY); branches.len()];
         for (at, &(first, count)) in branches.iter().enumerate().rev() {
             let first = first as usize;

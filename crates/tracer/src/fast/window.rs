@@ -8,10 +8,9 @@ use glam::DVec3;
 
 use super::geometry::{Geometry, Shape, Solid, View};
 use super::prepare::BOUNDS;
-use super::search::Candidates;
 
 /// Part of a pixel by which tiles are widened.
-const MARGIN: f64 = 1.0 / 32.0;
+pub(super) const MARGIN: f64 = 1.0 / 32.0;
 
 /// A sphere as the eye sees it.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +35,7 @@ pub(super) struct Window {
 struct Span {
     from: f64,
     to: f64,
-    candidates: Candidates,
+    candidates: u64,
 }
 
 impl Window {
@@ -91,7 +90,7 @@ impl Window {
     }
 
     /// What the rays of the tile of this column and row can meet.
-    pub(super) fn candidates(&self, column: usize, row: usize) -> Candidates {
+    pub(super) fn candidates(&self, column: usize, row: usize) -> u64 {
         let (x, y) = (self.columns[column], self.rows[row]);
         let mut candidates = x.candidates & y.candidates;
         if candidates == 0 {
@@ -138,7 +137,7 @@ fn up(view: &View) -> DVec3 {
 }
 
 /// Start and step of the pixels' coordinates along both axes.
-fn steps(view: &View) -> ((f64, f64), (f64, f64)) {
+pub(super) fn steps(view: &View) -> ((f64, f64), (f64, f64)) {
     match *view {
         View::Pinhole { x, y, .. } => (widened(x), widened(y)),
         View::Parallel { corner, pixel } => ((corner.x, pixel), (corner.y, pixel)),
@@ -150,7 +149,7 @@ fn widened((start, step): (f64, f64)) -> (f64, f64) {
     (start, if step == 0.0 { 1e-3 * start.abs().max(1.0) } else { step })
 }
 
-fn mask(solids: &[&Solid], is_candidate: impl Fn(&Solid) -> bool) -> Candidates {
+fn mask(solids: &[&Solid], is_candidate: impl Fn(&Solid) -> bool) -> u64 {
     solids.iter().enumerate().fold(0, |mask, (bit, solid)| mask | u64::from(is_candidate(solid)) << bit)
 }
 

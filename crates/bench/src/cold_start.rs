@@ -1,0 +1,93 @@
+//! `rayfold-bench cold-start`: how large the functions are, and how soon a new process asks for its first invocation.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::{Context, Result, ensure};
+use rayfold_local::Functions;
+use rayfold_local::invoker::{Invoker, Settings};
+use rayfold_local::minio::any_port;
+use rayfold_local::observation::Seen;
+use rayfold_local::routes::Function;
+
+/// What to measure.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Processes of each function
+    #[arg(long, default_value = "50")]
+    rounds: usize,
+    /// The folder with the function binaries; without it those beside this program
+    #[arg(long, value_name = "DIR")]
+    functions: Option<PathBuf>,
+}
+
+/// A payload that no function can read: it is answered at once and without the store.
+const NOTHING: &str = "{}";
+
+/// Measures and prints.
+///
+/// # Errors
+/// When the functions cannot be started.
+pub fn run(args: &Args) -> Result<()> {
+    let functions = match &args.functions {
+        Some(folder) => Functions::in_folder(folder),
+        None => Functions::locate(&mut |line| eprintln!("{line}"))?,
+    };
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
+    for function in Function::ALL {
+        let binary = std::fs::read(functions.path(function))?;
+        let mut times = Vec::new();
+        for _ in 0..args.rounds {
+            times.push(runtime.block_on(first_next(&functions, function))?);
+        }
+        times.sort();
+        let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize].as_secs_f64() * 1e3;
+        eprintln!(
+            "{}: {:.2} MB, {:.2} MB deflated; from spawn to the first `next` {:.1} ms (median of {}; least {:.1}, 90 % \
+             within {:.1})",
+            function.binary(),
+            binary.len() as f64 / 1e6,
+            deflated(&binary)? as f64 / 1e6,
+            at(0.5),
+            times.len(),
+            at(0.0),
+            at(0.9),
+        );
+    }
+    Ok(())
+}
+
+/// Of a new process.
+async fn first_next(functions: &Functions, function: Function) -> Result<Duration> {
+    let mut settings = Settings::new(functions.clone(), any_port(), any_port(), String::new());
+    settings.sweep_every = None;
+    settings.environment = [
+        ("AWS_REGION", "us-east-1"),
+        ("AWS_ACCESS_KEY_ID", "none"),
+        ("AWS_SECRET_ACCESS_KEY", "none"),
+        ("RAYFOLD_BUCKET", "none"),
+    ]
+    .map(|(name, value)| (name.to_owned(), value.to_owned()))
+    .to_vec();
+    let (sender, mut seen) = tokio::sync::mpsc::unbounded_channel();
+    let invoker = Invoker::start(settings, Some(sender)).await?;
+    let outcome = invoker.invoke(function, NOTHING).await;
+    ensure!(outcome.is_success(), "{outcome:?}");
+    let mut init = None;
+    while let Ok(observation) = seen.try_recv() {
+        if let Seen::Finished { attempt, init: Some(took), .. } = observation.seen
+            && attempt.function == function
+        {
+            init = Some(took);
+        }
+    }
+    invoker.stop().await;
+    init.context("the process was new")
+}
+
+fn deflated(bytes: &[u8]) -> Result<usize> {
+    let mut encoder = flate2::write::DeflateEncoder::new(Vec::new(), flate2::Compression::best());
+    encoder.write_all(bytes)?;
+    Ok(encoder.finish()?.len())
+}

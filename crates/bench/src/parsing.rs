@@ -1,0 +1,132 @@
+//! `rayfold-bench parsing`: what it takes to read and write the largest scripts, right and wrong ones.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, ensure};
+use rayfold_scene::{Limits, Parsed, parse};
+
+use crate::cpu_time;
+
+/// What to measure.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The folder that receives parsing.md
+    #[arg(long, default_value = "docs/reports")]
+    output: PathBuf,
+    /// Size of each script in MiB
+    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=256))]
+    mebibytes: u32,
+    /// How often each script is read; the median counts
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
+    rounds: u32,
+}
+
+/// A kind of script: what it is, and a line of it.
+struct Kind {
+    about: &'static str,
+    line: fn(&mut fastrand::Rng) -> String,
+}
+
+const KINDS: [Kind; 6] = [
+    Kind { about: "triangles, numbers with all their digits", line: |rng| triangle(rng, 17) },
+    Kind { about: "triangles, numbers with four decimals", line: |rng| triangle(rng, 4) },
+    Kind { about: "nothing but `Trace`", line: |_| "Trace".into() },
+    Kind { about: "every triangle has no area", line: |_| format!("Triangle{}", " 0".repeat(15)) },
+    Kind { about: "every command is misspelt", line: |_| "Sphree 1 0 0 0 1 1 1 0 0 0".into() },
+    Kind { about: "no parameter is a number", line: |_| format!("Triangle{}", " x".repeat(15)) },
+];
+
+fn triangle(rng: &mut fastrand::Rng, decimals: usize) -> String {
+    (0..15).fold("Triangle".to_string(), |mut line, _| {
+        let _ = write!(line, " {:.decimals$}", 200.0 * rng.f64() - 100.0);
+        line
+    })
+}
+
+/// Measures and writes the report.
+///
+/// # Errors
+/// When the clock cannot be read or the report cannot be written.
+pub fn run(args: &Args) -> Result<()> {
+    let mut report = format!(
+        "# Parsing\n\n\
+         Written by `cargo run --release -p rayfold-bench -- parsing`; all figures are of one run, seconds of processor \
+         time on one thread, the median of {} rounds. Every script has {} MiB, the default limit; \
+         *show* is the rendering of all diagnostics that are described (at most {} errors and as many warnings, the \
+         rest is counted), *write* that of the script as text.\n\n\
+         | script | lines | parse | MiB/s | errors and warnings described | show | write |\n\
+         | --- | --: | --: | --: | --: | --: | --: |\n",
+        args.rounds,
+        args.mebibytes,
+        Limits::DESCRIBED,
+    );
+    for kind in &KINDS {
+        eprintln!("{}", kind.about);
+        report += &row(kind, args)?;
+    }
+    std::fs::create_dir_all(&args.output)?;
+    let path = args.output.join("parsing.md");
+    std::fs::write(&path, report).with_context(|| path.display().to_string())
+}
+
+fn row(kind: &Kind, args: &Args) -> Result<String> {
+    let text = script(kind, (args.mebibytes as usize) << 20);
+    let mut seconds = Vec::new();
+    let mut parsed = None;
+    for _ in 0..args.rounds {
+        drop(parsed.take());
+        let (time, result) = cpu_time::of(|| parse("measured.txt", text.as_bytes(), &Limits::default()))?;
+        seconds.push(time);
+        parsed = Some(result);
+    }
+    let Parsed { script, diagnostics } = parsed.context("at least one round")?;
+    let parse_seconds = cpu_time::median(seconds);
+    let (show, shown) = cpu_time::of(|| diagnostics.iter().map(|d| d.render(true).len()).sum::<usize>())?;
+    ensure!((shown == 0) == diagnostics.is_empty(), "a diagnostic that shows nothing");
+    let write = match script {
+        Some(script) => format!("{:.2}", cpu_time::of(|| script.to_string())?.0),
+        None => "–".to_string(),
+    };
+    Ok(format!(
+        "| {} | {} | {parse_seconds:.2} | {:.0} | {} | {show:.2} | {write} |\n",
+        kind.about,
+        text.lines().count(),
+        f64::from(args.mebibytes) / parse_seconds,
+        diagnostics.len(),
+    ))
+}
+
+/// A script of at most `size` bytes, and not a line less.
+fn script(kind: &Kind, size: usize) -> String {
+    let mut rng = fastrand::Rng::with_seed(1);
+    let mut text = String::with_capacity(size);
+    text.push_str("Screen 640 480\n");
+    loop {
+        let line = (kind.line)(&mut rng);
+        if text.len() + line.len() + "\nTrace\n".len() > size {
+            text.push_str("Trace\n");
+            return text;
+        }
+        text.push_str(&line);
+        text.push('\n');
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scripts_are_what_they_are_called() {
+        let errors: Vec<_> = KINDS
+            .iter()
+            .map(|kind| {
+                let text = script(kind, 10_000);
+                assert!((9_500..=10_000).contains(&text.len()), "{}: {}", kind.about, text.len());
+                parse("small.txt", text.as_bytes(), &Limits::default()).script.is_none()
+            })
+            .collect();
+        assert_eq!(errors, [false, false, false, false, true, true]);
+    }
+}

@@ -1,0 +1,129 @@
+//! `rayfold-bench pipeline`: the paper's table on MinIO and the local invoker.
+//!
+//! For each scene and each number of invocations at once: the GIF made by the assemble function, with cold and with warm
+//! processes, and the GIF made here from fetched frames; and every frame drawn one after the other, without a GIF.
+//! Uploads go through the store, events through MinIO's webhook, and the function binaries are the ones that ship.
+
+mod report;
+mod run;
+mod timeline;
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, anyhow};
+use rayfold_local::{Functions, Plan, Platform};
+use rayfold_scene::{Limits, parse};
+use rayfold_tracer::{RenderOptions, render};
+
+use run::{Compiled, Folder, Run};
+
+/// What to measure.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The folder that receives pipeline.md and its plot
+    #[arg(long, default_value = "docs/reports")]
+    output: PathBuf,
+    /// The folder with the scenes
+    #[arg(long, default_value = "scenes")]
+    scenes: PathBuf,
+    /// Only these scenes
+    #[arg(long, value_name = "NAME")]
+    only: Vec<String>,
+}
+
+/// As the paper names them, in its order, with its seconds: at 10 invocations compiled locally and in the cloud, at 5
+/// the same, and locally without a GIF.
+const PAPER: [(&str, &str, [Option<f64>; 5]); 5] = [
+    ("sphere_light", "sphere_lig", [Some(55.885), Some(61.226), Some(68.147), Some(73.453), Some(37.43)]),
+    ("moving_up", "moving_u", [Some(56.500), Some(61.993), Some(73.279), Some(78.626), Some(44.38)]),
+    ("artistic", "artistic", [Some(87.063), Some(93.499), Some(92.668), Some(98.393), Some(97.32)]),
+    ("artisticsss", "artisticsss", [Some(86.850), Some(92.991), Some(88.014), Some(93.742), Some(101.41)]),
+    ("hello", "hello", [Some(183.565), None, Some(171.016), None, Some(359.61)]),
+];
+
+/// Invocations of a function at once, as many as the paper had ray tracers.
+const AT_ONCE: [usize; 2] = [10, 5];
+
+/// All runs of a scene.
+pub(crate) struct Scene {
+    pub(crate) folder: Folder,
+    pub(crate) paper: [Option<f64>; 5],
+    /// For each of [`AT_ONCE`].
+    pub(crate) runs: Vec<Runs>,
+    /// Drawing frame after frame on one thread.
+    pub(crate) sequential: Duration,
+}
+
+/// The runs at one number of invocations at once.
+pub(crate) struct Runs {
+    pub(crate) cold: Run,
+    pub(crate) warm: Run,
+    pub(crate) local: Run,
+}
+
+/// Measures and writes the report.
+///
+/// # Errors
+/// When MinIO or the functions cannot be started, an animation fails, or the report cannot be written.
+pub fn run(args: &Args) -> Result<()> {
+    std::fs::create_dir_all(&args.output)?;
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+    let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let scenes = runtime.block_on(measure(args))?;
+    timeline::plot(&args.output.join("pipeline-timeline.svg"), scenes.last().context("no scene")?)?;
+    let path = args.output.join("pipeline.md");
+    std::fs::write(&path, report::text(&scenes, load.trim())?).with_context(|| path.display().to_string())
+}
+
+async fn measure(args: &Args) -> Result<Vec<Scene>> {
+    let functions = Functions::locate(&mut |line| eprintln!("{line}"))?;
+    let data = tempfile::tempdir()?;
+    let plan = Plan::new(data.path(), functions);
+    let settings = |settings: &mut rayfold_local::invoker::Settings| settings.sweep_every = None;
+    let mut platform = Platform::start(&plan, settings, &mut |line| eprintln!("{line}")).await?;
+    let mut scenes = Vec::new();
+    for (name, _, paper) in PAPER {
+        if !args.only.is_empty() && !args.only.iter().any(|only| only == name) {
+            continue;
+        }
+        let folder = Folder::read(name, &args.scenes.join(name))?;
+        let mut runs = Vec::new();
+        for at_once in AT_ONCE {
+            eprintln!("{name}: {at_once} at once");
+            platform.settings_mut().concurrency = at_once;
+            let (sender, mut seen) = tokio::sync::mpsc::unbounded_channel();
+            platform.start_invoker(Some(sender)).await?;
+            platform.invoker().context("the invoker has just been started")?.idle().await;
+            while seen.try_recv().is_ok() {}
+            let mut take = async |label: &str, compiled| {
+                let animation = format!("{name}-{at_once}-{label}");
+                run::run(&platform, &mut seen, &folder, &animation, compiled).await
+            };
+            let cold = take("cold", Compiled::ByTheFunction).await?;
+            let warm = take("warm", Compiled::ByTheFunction).await?;
+            let local = take("local", Compiled::Here).await?;
+            runs.push(Runs { cold, warm, local });
+        }
+        eprintln!("{name}: one after the other");
+        let sequential = sequential(&folder)?;
+        scenes.push(Scene { folder, paper, runs, sequential });
+    }
+    platform.stop_invoker().await;
+    Ok(scenes)
+}
+
+/// Draws every frame on one thread, one after the other.
+fn sequential(folder: &Folder) -> Result<Duration> {
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    one.install(|| {
+        let start = Instant::now();
+        for (name, text) in folder.scripts() {
+            let script = parse(name, text, &Limits::default()).script;
+            for scene in script.ok_or_else(|| anyhow!("{name} has errors"))?.frames() {
+                std::hint::black_box(render(&scene, &RenderOptions::default())?);
+            }
+        }
+        Ok(start.elapsed())
+    })
+}

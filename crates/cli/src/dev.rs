@@ -1,0 +1,142 @@
+//! `rayfold dev`: the whole pipeline on this machine, until told to stop.
+//!
+//! MinIO, the bucket, its notifications and the local invoker with the function binaries. Everything it started ends with
+//! it; the data stays, and the next start goes on from there.
+
+mod news;
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use rayfold_local::invoker::Settings;
+use rayfold_local::{Error, Functions, Plan, Platform};
+use tokio::sync::mpsc::unbounded_channel;
+
+use crate::console::Console;
+use crate::interrupt;
+use crate::outcome::Outcome;
+use news::News;
+
+/// Between two looks at whether to stop.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// How long the first lines wait for what was missed since the last run.
+const CATCH_UP: Duration = Duration::from_secs(3);
+
+/// Run the whole pipeline on this machine: MinIO, the bucket and the functions
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+MinIO is taken from RAYFOLD_MINIO or the PATH; without one it is installed from source, once, which needs Go 1.25 or
+later. Stop with Ctrl-C; the data is kept, and the next start goes on where this one was.
+
+Example:
+  rayfold dev                                        # prints what to set in another terminal
+  aws s3 sync scenes/hello s3://rayfold/scripts/hello/   # there; the GIF appears below animations/")]
+pub(crate) struct Args {
+    /// Where objects and credentials are kept [default: rayfold/dev in the user's data folder]
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// How many processes of a function run at once
+    #[arg(long, value_name = "N", default_value = "10", value_parser = clap::value_parser!(u16).range(1..))]
+    concurrency: u16,
+    /// Where S3 listens; port 0 stands for any [default: 127.0.0.1:9000, or any port when that is taken]
+    #[arg(long, value_name = "IP:PORT")]
+    address: Option<SocketAddr>,
+    /// The bucket's name
+    #[arg(long, value_name = "NAME", default_value = "rayfold")]
+    bucket: String,
+}
+
+pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .context("cannot start")?;
+    runtime.block_on(serve(args, console))
+}
+
+async fn serve(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
+    let mut say = |line: &str| console.note(line);
+    let functions = Functions::locate(&mut say)?;
+    let data = match &args.data {
+        Some(data) => data.clone(),
+        None => default_data()?,
+    };
+    let address = match args.address {
+        Some(address) => address,
+        None => usual_address(),
+    };
+    let plan = Plan { data: data.clone(), address, bucket: args.bucket.clone(), functions };
+    let settings = |settings: &mut Settings| {
+        settings.concurrency = usize::from(args.concurrency);
+        // An animation in which nothing has happened for so long has lost an event.
+        settings.environment.push(("RAYFOLD_STUCK_AFTER_MS".into(), "60000".into()));
+    };
+    let start = Platform::start(&plan, settings, &mut say);
+    let mut platform = tokio::select! {
+        platform = start => match platform {
+            Err(error @ Error::DataInUse(_)) => bail!("{error}: stop that one, or choose another folder by --data"),
+            platform => platform?,
+        },
+        () = told_to_stop() => return Ok(Outcome::Interrupted),
+    };
+    let (sender, mut seen) = unbounded_channel();
+    let invoker = platform.start_invoker(Some(sender)).await?;
+    // So that the sweep that catches up does not meet what is uploaded next.
+    let _ = tokio::time::timeout(CATCH_UP, invoker.idle()).await;
+    console.print(exports(&platform))?;
+    console.note(format_args!("data in {}; Ctrl-C stops everything", data.display()));
+    console.print(format!("aws s3 sync scenes/hello s3://{0}/scripts/hello/\n", args.bucket))?;
+    let mut news = News::new(console, platform.store());
+    loop {
+        tokio::select! {
+            observation = seen.recv() => match observation {
+                Some(observation) => news.hear(&observation),
+                None => bail!("the invoker has ended"),
+            },
+            () = news.tick() => news.look().await,
+            status = platform.minio().ended() => {
+                bail!("MinIO has ended ({status}); its log is in {}", data.display());
+            }
+            () = told_to_stop() => break,
+        }
+    }
+    console.note("stopping");
+    platform.stop_invoker().await;
+    drop(platform);
+    Ok(Outcome::Done)
+}
+
+async fn told_to_stop() {
+    while !interrupt::stopping() {
+        tokio::time::sleep(LOOK).await;
+    }
+}
+
+/// What makes every AWS tool speak with this S3; `eval`-able.
+fn exports(platform: &Platform) -> String {
+    let mut text = String::new();
+    for (name, value) in platform.minio().environment() {
+        text.push_str(&format!("export {name}={value}\n"));
+        if name == "AWS_REGION" {
+            // Older versions of the AWS command line know this name alone.
+            text.push_str(&format!("export AWS_DEFAULT_REGION={value}\n"));
+        }
+    }
+    text
+}
+
+fn default_data() -> anyhow::Result<PathBuf> {
+    let base = std::env::var_os("XDG_DATA_HOME").map(PathBuf::from).filter(|path| path.is_absolute());
+    let base = base.or_else(|| std::env::home_dir().map(|home| home.join(".local/share")));
+    Ok(base.context("no home folder: say where the data goes by --data")?.join("rayfold/dev"))
+}
+
+/// MinIO's usual port, so that what another terminal has exported stays right from run to run.
+fn usual_address() -> SocketAddr {
+    let usual = SocketAddr::from(([127, 0, 0, 1], 9000));
+    if std::net::TcpListener::bind(usual).is_ok() { usual } else { rayfold_local::minio::any_port() }
+}

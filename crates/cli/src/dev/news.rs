@@ -1,0 +1,139 @@
+//! What `rayfold dev` tells while it runs: each event as it ends, and how far each animation is.
+
+use std::collections::BTreeSet;
+use std::time::{Duration, Instant};
+
+use rayfold_local::observation::{Observation, Outcome, Seen};
+use rayfold_pipeline::keys::Animation;
+use rayfold_pipeline::manifest::{FrameState, Manifest, Status};
+use rayfold_pipeline::store::{S3Store, Store};
+use serde_json::Value;
+
+use crate::console::Console;
+
+/// Between two looks at the manifests of animations in which something happened.
+const APART: Duration = Duration::from_millis(500);
+
+/// Tells what happens.
+pub(crate) struct News<'a> {
+    console: &'a Console,
+    store: &'a S3Store,
+    changed: BTreeSet<Animation>,
+    told: Vec<(Animation, String)>,
+    next: Instant,
+}
+
+impl<'a> News<'a> {
+    pub(crate) fn new(console: &'a Console, store: &'a S3Store) -> Self {
+        Self { console, store, changed: BTreeSet::new(), told: Vec::new(), next: Instant::now() }
+    }
+
+    /// Returns when it is time to look at what has changed; never while nothing has.
+    pub(crate) async fn tick(&self) {
+        if self.changed.is_empty() {
+            std::future::pending::<()>().await;
+        }
+        tokio::time::sleep_until(self.next.into()).await;
+    }
+
+    /// Tells of an observation.
+    pub(crate) fn hear(&mut self, observation: &Observation) {
+        match &observation.seen {
+            Seen::Log { line, .. } => match serde_json::from_str(line) {
+                Ok(line) => self.hear_log(&line),
+                Err(_) => self.console.note(line),
+            },
+            Seen::Finished { attempt, outcome, .. } => match outcome {
+                Outcome::Crashed(how) => self.console.note(format_args!(
+                    "{}: process {} ended ({how}) in attempt {}",
+                    attempt.function, attempt.pid, attempt.number
+                )),
+                Outcome::TimedOut => self.console.note(format_args!(
+                    "{}: killed at its deadline in attempt {}",
+                    attempt.function, attempt.number
+                )),
+                Outcome::Succeeded(_) | Outcome::Failed(_) => {}
+            },
+            Seen::DeadLetter { body } => self.console.note(format_args!("given up: {body}")),
+            Seen::Event { .. } | Seen::Started(_) | Seen::Requested { .. } => {}
+        }
+    }
+
+    fn hear_log(&mut self, line: &Value) {
+        let text = |field: &str| line[field].as_str().unwrap_or_default();
+        if let Ok(animation) = Animation::new(text("animation")) {
+            if self.changed.is_empty() {
+                self.next = Instant::now() + APART;
+            }
+            self.changed.insert(animation);
+        }
+        match text("message") {
+            "rendered" => {
+                let frame = if text("frame").is_empty() { "animation.json" } else { text("frame") };
+                let took = line["draw_ms"].as_u64().filter(|_| text("outcome") == "drawn");
+                let took = took.map(|ms| format!(" in {ms} ms")).unwrap_or_default();
+                self.console.note(format_args!("{}/{frame}: {}{took}", text("animation"), text("outcome")));
+            }
+            "assembled" if line["built"].as_u64() > Some(0) => self.console.note(format_args!(
+                "{0}: {1} frames assembled in {2} ms: s3://{3}/animations/{0}.gif",
+                text("animation"),
+                line["frames"],
+                line["building_ms"],
+                self.store.bucket(),
+            )),
+            _ if matches!(text("level"), "ERROR" | "WARN") => {
+                let about = [text("animation"), text("key")].join("");
+                self.console.note(format_args!(
+                    "{} {about}: {} {}",
+                    text("level").to_lowercase(),
+                    text("message"),
+                    text("error")
+                ));
+            }
+            _ => {}
+        }
+    }
+
+    /// Tells how far the animations are in which something happened.
+    pub(crate) async fn look(&mut self) {
+        for animation in std::mem::take(&mut self.changed) {
+            let Ok(object) = self.store.get(&animation.manifest()).await else { continue };
+            let Ok(manifest) = Manifest::decode(&animation, &object.body) else { continue };
+            let text = state(&manifest);
+            self.told.retain(|(of, told)| *of != animation || *told == text);
+            if !self.told.iter().any(|(of, _)| *of == animation) {
+                self.console.note(&text);
+                self.told.push((animation, text));
+            }
+        }
+        self.next = Instant::now() + APART;
+    }
+}
+
+fn state(manifest: &Manifest) -> String {
+    let head = &manifest.head;
+    let (name, done, total) = (&head.animation, head.done, head.total);
+    match head.status {
+        Status::Empty => format!("{name}: no scripts"),
+        Status::Waiting => {
+            let wanted = head.settings.value.as_ref().and_then(|settings| settings.frames());
+            format!("{name}: waiting ({done} of {})", wanted.unwrap_or(total))
+        }
+        Status::Rendering => format!("{name}: {done} of {total} frames drawn"),
+        Status::Done => format!("{name}: all {total} frames drawn"),
+        Status::Refused => format!("{name}: cannot be assembled"),
+        Status::Failed => {
+            let mut text = format!("{name}: failed");
+            if let Some(fault) = &head.settings.fault {
+                text.push_str(&format!("\n  animation.json: {}", fault.message));
+            }
+            for frame in &manifest.frames {
+                if let FrameState::Failed(fault) = &frame.state {
+                    let why = fault.reason.as_ref().map_or("", |reason| reason.message.as_str());
+                    text.push_str(&format!("\n  {}: {why}", frame.script));
+                }
+            }
+            text
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! `rayfold dev` as a user meets it: started, fed by the SDK, interrupted, killed, started again.
+
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use rayfold_pipeline::store::{Connection, PutOptions, S3Store, Store};
+
+const RAYFOLD: &str = env!("CARGO_BIN_EXE_rayfold");
+
+/// Longer than anything here takes on a loaded machine, a build of the functions included.
+const PATIENCE: Duration = Duration::from_secs(600);
+
+struct Dev {
+    child: Child,
+    exports: BTreeMap<String, String>,
+    sync: String,
+}
+
+impl Dev {
+    fn start(data: &Path) -> Self {
+        let mut command = Command::new(RAYFOLD);
+        command.arg("dev").arg("--data").arg(data).args(["--address", "127.0.0.1:0", "--concurrency", "4"]);
+        let beside = Path::new(RAYFOLD).parent().unwrap();
+        if beside.join("rayfold-render").is_file() && beside.join("rayfold-assemble").is_file() {
+            // Built with this test; without them `rayfold dev` builds them itself.
+            command.env("RAYFOLD_FUNCTIONS", beside);
+        }
+        let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
+        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        let mut exports = BTreeMap::new();
+        let sync = loop {
+            let line = lines.next().expect("it prints what to set").unwrap();
+            match line.strip_prefix("export ").and_then(|pair| pair.split_once('=')) {
+                Some((name, value)) => drop(exports.insert(name.to_owned(), value.to_owned())),
+                None => break line,
+            }
+        };
+        Self { child, exports, sync }
+    }
+
+    fn store(&self) -> S3Store {
+        let of = |name: &str| self.exports[name].clone();
+        let connection = Connection {
+            endpoint: of("AWS_ENDPOINT_URL"),
+            region: of("AWS_REGION"),
+            access_key: of("AWS_ACCESS_KEY_ID"),
+            secret_key: of("AWS_SECRET_ACCESS_KEY"),
+            session_token: None,
+        };
+        S3Store::at(&connection, "rayfold")
+    }
+
+    /// By process id, as a terminal's Ctrl-C or an administrator would.
+    fn signal(&self, signal: &str) {
+        let status = Command::new("kill").args([signal, &self.child.id().to_string()]).status().unwrap();
+        assert!(status.success());
+    }
+}
+
+impl Drop for Dev {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+async fn put(store: &S3Store, key: &str, body: Vec<u8>) {
+    store.put(key, body.into(), PutOptions::always()).await.unwrap();
+}
+
+async fn gif(store: &S3Store, key: &str) -> bytes::Bytes {
+    let start = Instant::now();
+    loop {
+        match store.get(key).await {
+            Ok(object) => return object.body,
+            Err(error) => assert!(error.is_not_found() && start.elapsed() < PATIENCE, "{key}: {error:?}"),
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
+/// MinIO's answer to anybody; none when it is gone.
+async fn answers(store: &S3Store) -> bool {
+    store.check().await.is_ok()
+}
+
+#[tokio::test]
+async fn it_goes_on_where_it_was_after_a_kill_and_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    let ball = "Screen 24 16\nBackground .2 .2 .2\nSphere 6 12 8 -9 .2 .2 .2 .7 .6 .5\nTrace\n";
+
+    let dev = Dev::start(&data);
+    assert_eq!(dev.sync, "aws s3 sync scenes/hello s3://rayfold/scripts/hello/");
+    let store = dev.store();
+    put(&store, "scripts/ball/animation.json", b"{\"frames\": 2}".to_vec()).await;
+    put(&store, "scripts/ball/a.txt", ball.into()).await;
+    dev.signal("-KILL");
+    let start = Instant::now();
+    while answers(&store).await {
+        assert!(start.elapsed() < PATIENCE, "MinIO outlives a killed `rayfold dev`");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    let exports = dev.exports.clone();
+    drop(dev);
+
+    let mut dev = Dev::start(&data);
+    assert_eq!(
+        dev.exports["AWS_SECRET_ACCESS_KEY"], exports["AWS_SECRET_ACCESS_KEY"],
+        "credentials are kept"
+    );
+    let store = dev.store();
+    assert_eq!(store.get("scripts/ball/a.txt").await.unwrap().body, ball, "objects are kept");
+    put(&store, "scripts/ball/b.txt", ball.replace("12 8", "8 8").into()).await;
+    assert!(gif(&store, "animations/ball.gif").await.starts_with(b"GIF89a"));
+    dev.signal("-INT");
+    assert!(dev.child.wait().unwrap().success());
+    assert!(!answers(&store).await, "Ctrl-C stops MinIO too");
+}

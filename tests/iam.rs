@@ -1,0 +1,202 @@
+//! The roles' policies, enforced by MinIO: every operation on a key of every kind, by either role. What the protocol
+//! needs is allowed, all else is denied. That it is enough the end-to-end tests show, which run under the same documents.
+
+#![allow(clippy::print_stderr, reason = "installing MinIO takes minutes and says so")]
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
+
+mod stage;
+
+use std::collections::BTreeSet;
+
+use bytes::Bytes;
+use rayfold_local::connection;
+use rayfold_local::minio::{Minio, any_port, find_or_install};
+use rayfold_local::routes::Function;
+use rayfold_pipeline::store::{ListRequest, PutOptions, S3Store, Store, Upload};
+use rayfold_pipeline::{Error, Result};
+
+use stage::role::assume;
+
+const BUCKET: &str = "films";
+
+/// One of each kind, and some that the pipeline knows nothing of.
+const KEYS: [&str; 15] = [
+    "scripts/a/1.txt",
+    "scripts/a/animation.json",
+    "parts/a/1@v-p1/2.json",
+    "frames/a/1@v-p1.png",
+    "frames/a/1@v-p1/2.png",
+    "frames/a/1@v-p1.error.json",
+    "frames/a/1@v-p1/2.error.json",
+    "frames/a/1@v-p1.split-3",
+    "manifests/a.json",
+    "assemblies/a/1-g.json",
+    "retries/a/1@v-p1/1",
+    "animations/a.gif",
+    "films/a.gif",
+    "frames.json",
+    "animation.json",
+];
+
+const PREFIXES: [&str; 10] = [
+    "scripts/",
+    "scripts/a/",
+    "parts/a/",
+    "frames/a/",
+    "manifests/",
+    "assemblies/a/",
+    "retries/a/",
+    "animations/",
+    "films/",
+    "frames",
+];
+
+/// What a role may do, operation by operation. Whatever is not here must be denied.
+fn allowed(role: Function) -> Vec<(&'static str, Vec<&'static str>)> {
+    let keys = |starts: &[&str]| -> Vec<&'static str> {
+        KEYS.into_iter()
+            .chain(PREFIXES)
+            .filter(|key| starts.iter().any(|start| key.starts_with(start)))
+            .collect()
+    };
+    let errors = ["frames/a/1@v-p1.error.json", "frames/a/1@v-p1/2.error.json"];
+    match role {
+        Function::Render => vec![
+            ("list", keys(&["scripts/", "frames/"])),
+            ("read", [keys(&["scripts/", "manifests/"]), errors.to_vec()].concat()),
+            ("put", keys(&["parts/", "frames/", "manifests/", "assemblies/"])),
+            ("upload", keys(&["parts/", "frames/", "manifests/", "assemblies/"])),
+            ("delete", vec![]),
+        ],
+        Function::Assemble => {
+            let written =
+                [keys(&["manifests/", "animations/", "retries/", "assemblies/"]), errors.to_vec()].concat();
+            vec![
+                ("list", keys(&["scripts/", "parts/", "frames/", "manifests/", "retries/"])),
+                ("read", keys(&["scripts/", "frames/", "manifests/", "animations/"])),
+                ("put", written.clone()),
+                ("upload", written),
+                ("delete", keys(&["parts/", "frames/", "animations/"])),
+            ]
+        }
+    }
+}
+
+async fn attempt(store: &S3Store, operation: &str, key: &str) -> Result<()> {
+    match operation {
+        "list" => store.list(ListRequest::all(key)).await.map(drop),
+        "read" => {
+            let read = store.get(key).await.map(drop);
+            let head = store.head(key).await.map(drop);
+            assert_eq!(
+                read.is_ok(),
+                head.is_ok(),
+                "{key}: reading and asking for the size need the same right"
+            );
+            read
+        }
+        "put" => store.put(key, Bytes::from_static(b"new"), PutOptions::always()).await.map(drop),
+        "upload" => {
+            let mut upload = store.upload(key, PutOptions::always()).await?;
+            upload.write(Bytes::from(vec![7; 20 << 20])).await?;
+            upload.finish().await.map(drop)
+        }
+        "delete" => store.delete(key).await,
+        other => panic!("no operation {other}"),
+    }
+}
+
+async fn started() -> (Minio, tempfile::TempDir) {
+    let data = tempfile::tempdir().unwrap();
+    let binary = find_or_install(&mut |line| eprintln!("{line}")).unwrap();
+    (Minio::start(&binary, data.path(), any_port(), None).await.unwrap(), data)
+}
+
+async fn filled(minio: &Minio, bucket: &str) -> S3Store {
+    let owner = S3Store::at(&connection(minio), bucket);
+    owner.create_bucket().await.unwrap();
+    for key in KEYS {
+        owner.put(key, Bytes::from_static(b"old"), PutOptions::always()).await.unwrap();
+    }
+    owner
+}
+
+#[tokio::test]
+async fn a_role_may_do_what_it_needs_and_nothing_else() {
+    let (minio, _data) = started().await;
+    let owner = filled(&minio, BUCKET).await;
+    for role in Function::ALL {
+        let store = S3Store::at(&assume(&minio, role, BUCKET).await, BUCKET);
+        for (operation, keys) in allowed(role) {
+            let keys: BTreeSet<&str> = keys.into_iter().collect();
+            let tried: &[&str] = if operation == "list" { &PREFIXES } else { &KEYS };
+            for key in tried {
+                let outcome = attempt(&store, operation, key).await;
+                match outcome {
+                    Ok(()) => assert!(keys.contains(key), "{role} may {operation} {key}"),
+                    Err(error) => {
+                        assert!(is_denial(&error), "{role}, {operation} {key}: {error:?}");
+                        assert!(!keys.contains(key), "{role} may not {operation} {key}");
+                    }
+                }
+                let body =
+                    if operation == "list" { Ok("old".into()) } else { owner.get(key).await.map(|o| o.body) };
+                let is_old = body.is_ok_and(|body| body == "old");
+                let writes = matches!(operation, "put" | "upload" | "delete");
+                assert_eq!(
+                    is_old,
+                    !(writes && keys.contains(key)),
+                    "{role}, {operation} {key}: what is there now"
+                );
+                if !is_old {
+                    owner.put(key, Bytes::from_static(b"old"), PutOptions::always()).await.unwrap();
+                }
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_role_ends_at_its_bucket() {
+    let (minio, _data) = started().await;
+    filled(&minio, BUCKET).await;
+    let other = filled(&minio, "films-of-others").await;
+    for role in Function::ALL {
+        let store = S3Store::at(&assume(&minio, role, BUCKET).await, "films-of-others");
+        for operation in ["list", "read", "put", "upload", "delete"] {
+            let tried: &[&str] = if operation == "list" { &PREFIXES } else { &KEYS };
+            for key in tried {
+                let error = attempt(&store, operation, key).await.expect_err(key);
+                assert!(is_denial(&error), "{role}, {operation} {key}: {error:?}");
+            }
+        }
+    }
+    for key in KEYS {
+        assert_eq!(other.get(key).await.unwrap().body, "old");
+    }
+}
+
+/// A function that is told "forbidden" where nothing is would take each first manifest for a failure.
+#[tokio::test]
+async fn what_is_not_there_is_said_to_be_absent() {
+    let (minio, _data) = started().await;
+    filled(&minio, BUCKET).await;
+    for (role, keys) in [
+        (Function::Render, ["scripts/b/1.txt", "scripts/b/animation.json", "manifests/b.json"]),
+        (Function::Assemble, ["animations/b.gif", "scripts/b/animation.json", "manifests/b.json"]),
+    ] {
+        let store = S3Store::at(&assume(&minio, role, BUCKET).await, BUCKET);
+        for key in keys {
+            let error = store.get(key).await.expect_err(key);
+            assert!(error.is_not_found(), "{role}, {key}: {error:?}");
+            let error = store.head(key).await.expect_err(key);
+            assert!(error.is_not_found(), "{role}, {key}: {error:?}");
+        }
+    }
+}
+
+fn is_denial(error: &Error) -> bool {
+    let source = std::error::Error::source(error).map(ToString::to_string).unwrap_or_default();
+    // An answer to HEAD has no body that could say so.
+    matches!(error, Error::Refused { .. }) && (source.contains("AccessDenied") || source.contains("403"))
+}
