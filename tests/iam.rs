@@ -62,8 +62,8 @@ fn allowed(role: Function) -> Vec<(&'static str, Vec<&'static str>)> {
     let errors = ["frames/a/1@v-p1.error.json", "frames/a/1@v-p1/2.error.json"];
     match role {
         Function::Render => vec![
-            ("list", keys(&["scripts/", "frames/"])),
-            ("read", [keys(&["scripts/", "manifests/"]), errors.to_vec()].concat()),
+            ("list", keys(&["scripts/", "parts/", "frames/"])),
+            ("read", [keys(&["scripts/", "parts/", "manifests/"]), errors.to_vec()].concat()),
             ("put", keys(&["parts/", "frames/", "manifests/", "assemblies/"])),
             ("upload", keys(&["parts/", "frames/", "manifests/", "assemblies/"])),
             ("delete", vec![]),
