@@ -7,6 +7,7 @@
 mod bad_input;
 mod check;
 mod cost;
+mod encode;
 mod images;
 mod interrupted;
 mod render;

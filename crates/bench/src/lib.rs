@@ -9,7 +9,9 @@
 pub mod accuracy;
 pub mod cold_start;
 pub mod cpu_time;
+pub mod gif;
 pub mod hard_cases;
+pub mod measure;
 pub mod oracle;
 pub mod parsing;
 pub mod pipeline;

@@ -1,7 +1,7 @@
 //! The program that measures: a subcommand a report.
 
 use clap::{Parser, Subcommand};
-use rayfold_bench::{accuracy, cold_start, parsing, pipeline, simulate};
+use rayfold_bench::{accuracy, cold_start, gif, measure, parsing, pipeline, simulate};
 
 #[derive(Debug, Parser)]
 #[command(name = "rayfold-bench", about = "Measures rayfold and writes the reports in docs/reports")]
@@ -22,6 +22,11 @@ enum Measurement {
     Parsing(parsing::Args),
     /// The pipeline's protocol in a simulated world: seeds, broken rules, requests at scale
     Simulate(simulate::Args),
+    /// Time, memory, size and quality of GIFs, beside those of other encoders
+    Gif(gif::Args),
+    /// Run a program and print what it took
+    #[command(hide = true)]
+    Measure(measure::Args),
 }
 
 fn main() -> anyhow::Result<()> {
@@ -31,5 +36,7 @@ fn main() -> anyhow::Result<()> {
         Measurement::ColdStart(args) => cold_start::run(&args),
         Measurement::Parsing(args) => parsing::run(&args),
         Measurement::Simulate(args) => simulate::run(&args),
+        Measurement::Gif(args) => gif::run(&args),
+        Measurement::Measure(args) => measure::run(&args),
     }
 }

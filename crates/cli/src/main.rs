@@ -14,6 +14,7 @@ mod console;
 mod cost;
 #[cfg(unix)]
 mod dev;
+mod encode;
 mod input;
 mod interrupt;
 mod outcome;

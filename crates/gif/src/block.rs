@@ -32,24 +32,21 @@ impl Block {
     }
 
     /// Cuts a whole frame's indices to the rectangle outside of which all are transparent.
+    ///
+    /// Without a transparent index the whole frame is drawn.
     pub(crate) fn cut(
-        indices: &[u8],
+        indices: Vec<u8>,
         width: usize,
-        palette: Vec<u8>,
+        colours: &[[u8; 3]],
         transparent: Option<u8>,
         delay_cs: u16,
     ) -> Self {
+        let filler = transparent.map(|_| [0; 3]);
+        let palette = colours.iter().chain(&filler).flatten().copied().collect();
         let Some(clear) = transparent else {
-            return Self {
-                left: 0,
-                top: 0,
-                width: width as u16,
-                height: (indices.len() / width) as u16,
-                indices: indices.to_vec(),
-                palette,
-                transparent,
-                delay_cs,
-            };
+            let height = (indices.len() / width) as u16;
+            let width = width as u16;
+            return Self { left: 0, top: 0, width, height, indices, palette, transparent, delay_cs };
         };
         let (mut left, mut right, mut top, mut bottom) = (width, 0, usize::MAX, 0);
         for (y, row) in indices.chunks_exact(width).enumerate() {
@@ -89,13 +86,13 @@ mod tests {
         let mut indices = vec![7; 5 * 4];
         indices[5 + 2] = 1;
         indices[3 * 5 + 3] = 2;
-        let block = Block::cut(&indices, 5, vec![0; 24], Some(7), 4);
+        let block = Block::cut(indices, 5, &[[0; 3]; 7], Some(7), 4);
         assert_eq!((block.left, block.top, block.width, block.height), (2, 1, 2, 3));
         assert_eq!(block.indices, [1, 7, 7, 7, 7, 2]);
     }
 
     #[test]
     fn nothing_drawn_is_one_clear_pixel() {
-        assert_eq!(Block::cut(&[3; 6], 2, vec![0; 12], Some(3), 9), Block::nothing(9));
+        assert_eq!(Block::cut(vec![3; 6], 2, &[[0; 3]; 3], Some(3), 9), Block::nothing(9));
     }
 }

@@ -6,6 +6,7 @@ use gif::{DisposalMethod, Repeat};
 use image::RgbImage;
 
 use crate::block::Block;
+use crate::lzw;
 use crate::quantise::Quantiser;
 use crate::timeline::Timeline;
 
@@ -202,7 +203,9 @@ fn begin<W: Write>(writer: W, size: (u32, u32), loops: u16) -> io::Result<gif::E
 }
 
 fn compress(block: Block) -> gif::Frame<'static> {
-    let mut frame = gif::Frame {
+    let colours = block.palette.len() / 3;
+    let bits = (2..8).find(|&bits| colours <= 1 << bits).unwrap_or(8);
+    gif::Frame {
         delay: block.delay_cs,
         dispose: DisposalMethod::Keep,
         transparent: block.transparent,
@@ -211,11 +214,9 @@ fn compress(block: Block) -> gif::Frame<'static> {
         width: block.width,
         height: block.height,
         palette: Some(block.palette),
-        buffer: block.indices.into(),
+        buffer: lzw::compress(&block.indices, bits).into(),
         ..gif::Frame::default()
-    };
-    frame.make_lzw_pre_encoded();
-    frame
+    }
 }
 
 fn write<W: Write>(file: &mut gif::Encoder<Counting<W>>, frame: &gif::Frame<'_>) -> io::Result<()> {

@@ -50,7 +50,7 @@ impl Histogram {
         self.bins.clear();
     }
 
-    /// The bins in order of first appearance.
+    /// The bins in order of first appearance, or of colour after [`sort`](Self::sort).
     pub(crate) fn bins(&self) -> &[Bin] {
         &self.bins
     }
@@ -58,6 +58,26 @@ impl Histogram {
     /// Whether each bin is one colour.
     pub(crate) fn is_exact(&self) -> bool {
         self.shift == 0
+    }
+
+    /// Adds what another one counted.
+    pub(crate) fn absorb(&mut self, other: &Self) {
+        while self.shift < other.shift {
+            self.coarsen();
+        }
+        for bin in &other.bins {
+            let [_, r, g, b] = bin.key.to_be_bytes();
+            self.merge(Bin { key: self.key([r, g, b]), ..*bin });
+        }
+    }
+
+    /// Puts the bins in order of colour, so that the order of counting leaves no trace.
+    pub(crate) fn sort(&mut self) {
+        self.bins.sort_unstable_by_key(|bin| bin.key);
+        for number in 0..self.bins.len() {
+            let at = self.slot(self.bins[number].key);
+            self.slots[at].bin = number as u32;
+        }
     }
 
     /// Counts pixels of one colour.

@@ -27,12 +27,17 @@
 //! # Ok::<(), rayfold_gif::Error>(())
 //! ```
 
+mod allowance;
 mod block;
 mod colour;
 mod encoder;
+mod exact;
 mod histogram;
+mod ink;
+mod lzw;
 mod palette;
 mod quantise;
+mod stripe;
 mod timeline;
 
 pub use encoder::{Encoder, Error, Settings, Summary};

@@ -7,7 +7,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use crate::colour::{self, DIMENSIONS, Point};
-use crate::histogram::Bin;
+use crate::histogram::{Bin, Histogram};
 
 /// Rounds of k-means at most.
 const ROUNDS: usize = 5;
@@ -16,10 +16,10 @@ pub(crate) const NEIGHBOURS: usize = 16;
 
 /// A weighted colour.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Sample {
-    pub(crate) point: Point,
-    pub(crate) rgb: [f32; 3],
-    pub(crate) weight: f32,
+struct Sample {
+    point: Point,
+    rgb: [f32; 3],
+    weight: f32,
 }
 
 impl From<&Bin> for Sample {
@@ -52,8 +52,19 @@ impl Palette {
         Self { colours, points, neighbours }
     }
 
+    /// The colours of the bins if there are at most `size`, else so many that fit them well.
+    pub(crate) fn of_bins(histogram: &Histogram, size: usize) -> Self {
+        let samples = histogram.bins().iter().map(Sample::from).collect::<Vec<_>>();
+        if histogram.is_exact() && samples.len() <= size {
+            let mut colours = samples.iter().map(|s| s.rgb.map(|level| level as u8)).collect::<Vec<_>>();
+            colours.sort_unstable();
+            return Self::new(colours);
+        }
+        Self::of(&samples, size)
+    }
+
     /// At most `size` colours that fit the samples well, of which there is at least one.
-    pub(crate) fn of(samples: &[Sample], size: usize) -> Self {
+    fn of(samples: &[Sample], size: usize) -> Self {
         let mut owners = split(samples, size);
         for _ in 0..ROUNDS {
             let centres = centres(samples, &mut owners);
@@ -226,8 +237,9 @@ fn split(samples: &[Sample], size: usize) -> Vec<u8> {
             continue;
         }
         let middle = members.start + below;
-        clusters.push(Cluster::new(samples, &order, members.start..middle));
-        clusters.push(Cluster::new(samples, &order, middle..members.end));
+        let parts =
+            [members.start..middle, middle..members.end].map(|part| Cluster::new(samples, &order, part));
+        clusters.extend(parts);
     }
     let mut owners = vec![0; samples.len()];
     for (number, cluster) in done.iter().chain(&clusters).enumerate() {

@@ -24,7 +24,7 @@ use crate::progress::Progress;
 use crate::threads::Threads;
 use crate::wording::{Size, number};
 
-mod ahead;
+pub(crate) mod ahead;
 pub(crate) mod target;
 
 use target::{Format, Pattern, Target};
@@ -154,11 +154,12 @@ fn animation(
     let out =
         out.into_inner().map_err(|e| OutputError::Io { path: path.to_path_buf(), source: e.into_error() })?;
     out.finish(true)?;
-    tell(path, &summary, settings, took, console);
+    tell(path, &summary, settings.fps(), took, console);
     Ok(())
 }
 
-fn tell(path: &Path, summary: &Summary, settings: &AnimationSettings, took: Duration, console: &Console) {
+/// Says what was written.
+pub(crate) fn tell(path: &Path, summary: &Summary, fps: f64, took: Duration, console: &Console) {
     console.note(format_args!(
         "{}: {} of {} x {}, {}, in {:.2} s",
         path.display(),
@@ -172,7 +173,7 @@ fn tell(path: &Path, summary: &Summary, settings: &AnimationSettings, took: Dura
         console.note(format_args!(
             "{} left out: a GIF shows at most 50 frames a second, not {}",
             number(summary.dropped, "frame"),
-            settings.fps()
+            fps
         ));
     }
 }
