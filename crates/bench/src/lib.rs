@@ -18,4 +18,5 @@ pub mod pipeline;
 mod plot;
 pub mod scenes;
 pub mod simulate;
+pub mod speed;
 pub mod tracers;

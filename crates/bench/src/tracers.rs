@@ -5,7 +5,7 @@
 use glam::DVec3;
 use image::RgbImage;
 use rayfold_scene::Scene;
-use rayfold_tracer::{RenderOptions, reference};
+use rayfold_tracer::{Level, Precision, RenderOptions, probe, reference};
 
 /// A half-line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,8 +23,8 @@ pub struct Hit {
     pub object: usize,
     /// In lengths of the ray's direction.
     pub t: f64,
-    /// Unit normal, facing the ray, where the way tells it.
-    pub normal: Option<DVec3>,
+    /// Unit normal, facing the ray.
+    pub normal: DVec3,
 }
 
 /// The numbers that a way computes with.
@@ -88,14 +88,77 @@ impl Tracer {
     }
 }
 
-/// Every way that there is on this machine.
+/// Every way that there is on this machine: each precision with each width of vectors, and what must not be seen in a
+/// picture (the tree, the tile's size, the number of threads) with the widest.
 pub fn all() -> Vec<Tracer> {
-    vec![reference()]
+    let mut all = vec![reference()];
+    for ((precision, name), tile) in PRECISIONS.into_iter().zip([(4, 4), (64, 4), (8, 32)]) {
+        let options = RenderOptions { precision, ..Default::default() };
+        for (width, level) in levels() {
+            all.push(packets(format!("{name} {width}"), RenderOptions { level: Some(level), ..options }));
+        }
+        all.push(packets(format!("{name} by a tree"), RenderOptions { tree: Some(true), ..options }));
+        all.push(packets(
+            format!("{name} {} x {} tiles", tile.0, tile.1),
+            RenderOptions { tile: Some(tile), ..options },
+        ));
+    }
+    all
 }
 
 /// The truth first, then the ways between which the user can choose.
 pub fn for_pictures() -> Vec<Tracer> {
-    vec![reference()]
+    let packets = |(precision, name)| packets(name, RenderOptions { precision, ..Default::default() });
+    std::iter::once(reference()).chain(PRECISIONS.map(packets)).collect()
+}
+
+const PRECISIONS: [(Precision, &str); 3] =
+    [(Precision::Auto, "auto"), (Precision::F32, "f32 robust"), (Precision::F64, "f64")];
+
+/// The widths of vectors that the processor has, the widest first.
+pub fn levels() -> Vec<(&'static str, Level)> {
+    let best = Level::new();
+    #[cfg(target_arch = "x86_64")]
+    return [
+        best.as_avx512().map(|level| ("AVX-512", Level::Avx512(level))),
+        best.as_avx2().map(|level| ("AVX2", Level::Avx2(level))),
+        best.as_sse4_2().map(|level| ("SSE4.2", Level::Sse4_2(level))),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    #[cfg(not(target_arch = "x86_64"))]
+    return vec![("the machine's vectors", best)];
+}
+
+/// The tracer that pictures are made with.
+pub(crate) fn packets(name: impl Into<String>, options: RenderOptions<'static>) -> Tracer {
+    let arithmetic = match options.precision {
+        Precision::Auto => Arithmetic::Chosen,
+        Precision::F32 => Arithmetic::Single,
+        Precision::F64 => Arithmetic::Double,
+    };
+    let nearest = move |scene: &Scene, rays: &[Ray]| packet_nearest(scene, rays, &options);
+    Tracer::new(name, arithmetic, nearest, move |scene| Ok(rayfold_tracer::render(scene, &options)?))
+}
+
+fn packet_nearest(scene: &Scene, rays: &[Ray], options: &RenderOptions) -> Hits {
+    // A direction that `f32` holds stays one.
+    let about_unit =
+        |d: DVec3| if (d.length() - 1.0).abs() < f64::from(f32::EPSILON) { d } else { d.normalize() };
+    let precision = match options.precision {
+        Precision::Auto => rayfold_tracer::precision(scene),
+        forced => forced,
+    };
+    let single = precision == Precision::F32;
+    let unit = |d: DVec3| if single { about_unit(d) } else { d.normalize() };
+    let units: Vec<_> = rays.iter().map(|ray| (ray.origin, unit(ray.direction))).collect();
+    let found = probe::nearest_hits(scene, &units, &RenderOptions { precision, ..*options })?;
+    let hit = |(found, ray): (Option<probe::Found>, &Ray)| {
+        let found = found?;
+        Some(Hit { object: found.object, t: found.distance / ray.direction.length(), normal: found.normal })
+    };
+    Ok(found.into_iter().zip(rays).map(hit).collect())
 }
 
 /// The plain `f64` tracer.
@@ -111,5 +174,5 @@ pub fn reference() -> Tracer {
 fn reference_nearest(scene: &Scene, ray: Ray) -> Option<Hit> {
     let length = ray.direction.length();
     let hit = reference::nearest(&scene.objects, ray.origin, ray.direction / length)?;
-    Some(Hit { object: hit.object, t: hit.distance / length, normal: Some(hit.surface.normal) })
+    Some(Hit { object: hit.object, t: hit.distance / length, normal: hit.surface.normal })
 }

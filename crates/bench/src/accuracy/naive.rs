@@ -31,7 +31,7 @@ fn hit(objects: &[Shape], ray: &Ray) -> Option<Hit> {
     let (object, t) = nearest(objects, ray.origin.as_vec3(), direction, 0.0)?;
     let point = ray.origin.as_vec3() + t * direction;
     let normal = objects[object].normal(point, direction).as_dvec3();
-    Some(Hit { object, t: f64::from(t), normal: Some(normal) })
+    Some(Hit { object, t: f64::from(t), normal })
 }
 
 enum Shape {

@@ -16,7 +16,8 @@ pub(crate) fn count(scene: &Scene, tracer: &Tracer) -> Result<u64> {
         total += rays.len() as u64;
         let mut mirrored = Vec::new();
         for (ray, hit) in rays.iter().zip(tracer.nearest(scene, &rays)?) {
-            let Some((hit, normal)) = hit.and_then(|hit| Some((hit, hit.normal?))) else { continue };
+            let Some(hit) = hit else { continue };
+            let normal = hit.normal;
             let lit = |light: &&Light| {
                 let Light::Directional(light) = light;
                 normal.dot(-unit(light.direction())) > 0.0

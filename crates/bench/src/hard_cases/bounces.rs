@@ -55,7 +55,7 @@ pub(super) fn face_to_face(tracers: &[Tracer], size: Size, figures: &mut Figures
         starts.push((Ray { origin, direction }, last.to_dvec3(), growth));
     }
     anyhow::ensure!(starts.len() >= size.pick(15, 500), "rays leave the mirrors early");
-    'ways: for tracer in tracers {
+    for tracer in tracers {
         let mut worst = 0f64;
         for (start, last, growth) in &starts {
             let mut ray = *start;
@@ -64,11 +64,10 @@ pub(super) fn face_to_face(tracers: &[Tracer], size: Size, figures: &mut Figures
                     ray.direction = DVec3::NAN;
                     break;
                 };
-                let Some(normal) = hit.normal else { continue 'ways };
                 let point = ray.origin + hit.t * ray.direction;
-                let mirrored = ray.direction - 2.0 * ray.direction.dot(normal) * normal;
+                let mirrored = ray.direction - 2.0 * ray.direction.dot(hit.normal) * hit.normal;
                 // Off the surface by what the distance is uncertain.
-                let origin = point + 4.0 * tracer.ulp(100.0) * normal;
+                let origin = point + 4.0 * tracer.ulp(100.0) * hit.normal;
                 ray = Ray { origin, direction: mirrored.normalize() };
             }
             worst = worse(worst, (ray.direction - last).length() / growth);

@@ -4,7 +4,7 @@ use anyhow::Result;
 use glam::DVec3;
 use rayfold_scene::{Cuboid, Material, Object};
 
-use super::{Figures, Size, objects_only, truths};
+use super::{Figures, Size, from_eyes, truths};
 use crate::tracers::{Ray, Tracer};
 
 fn cuboid(corners: [DVec3; 2]) -> Result<Object> {
@@ -54,22 +54,19 @@ fn wrong(tracers: &[Tracer], boxes: &[[DVec3; 2]], figures: &mut Figures) -> Res
         for &corners in boxes {
             let object = cuboid(corners)?;
             let rays = along_faces(corners);
-            let scene = objects_only(vec![object])?;
             let truths = truths(&[object], &rays);
-            for ((ray, truth), hit) in rays.iter().zip(truths).zip(tracer.nearest(&scene, &rays)?) {
+            for ((ray, truth), hit) in rays.iter().zip(truths).zip(from_eyes(tracer, object, &rays)?) {
                 count += 1;
                 match (truth, hit) {
                     (Some(truth), Some(hit)) => {
-                        let ulps =
-                            (hit.t - truth.t).abs() / tracer.ulp(truth.t.max(ray.origin.abs().max_element()));
+                        let ulps = (hit.t - truth.t).abs() / tracer.ulp(truth.t);
                         distance = distance.max(ulps);
-                        let Some(normal) = hit.normal else { continue };
                         // On an edge either face will do.
-                        let faces = normal.abs().max_element() == 1.0 && normal.length() == 1.0;
+                        let faces = hit.normal.abs().max_element() == 1.0 && hit.normal.length() == 1.0;
                         let point = ray.origin + truth.t * ray.direction;
                         let on = |p: DVec3| (p - corners[0]).abs().min((p - corners[1]).abs());
                         let touched = on(point).to_array().iter().filter(|&&d| d < 1e-5).count();
-                        let right = faces && (touched > 1 || normal == truth.normal);
+                        let right = faces && (touched > 1 || hit.normal == truth.normal);
                         normals += usize::from(!right);
                     }
                     (None, None) => {}

@@ -20,7 +20,7 @@ use glam::DVec3;
 use rayfold_scene::{Camera, Object, Scene, Screen};
 
 use crate::oracle;
-use crate::tracers::{Arithmetic, Ray, Tracer};
+use crate::tracers::{Arithmetic, Hit, Ray, Tracer};
 
 /// Where all random numbers of the cases come from.
 pub const SEED: u64 = 20_240_607;
@@ -161,6 +161,26 @@ fn direction(rng: &mut fastrand::Rng) -> DVec3 {
 fn objects_only(objects: Vec<Object>) -> Result<Scene> {
     let mut scene = Scene::new(Screen::new(1, 1)?, Camera::Orthographic);
     scene.objects = objects.into();
+    Ok(scene)
+}
+
+/// The nearest hits on an object of rays that are those of a camera: it stands wherever rays start.
+fn from_eyes(tracer: &Tracer, object: Object, rays: &[Ray]) -> Result<Vec<Option<Hit>>> {
+    let mut hits = Vec::new();
+    for rays in rays.chunk_by(|a, b| a.origin == b.origin) {
+        let eye = rays[0].origin;
+        let scene = objects_seen(vec![object], eye, eye + DVec3::new(0.3, 0.2, -1.0), 1.0)?;
+        hits.extend(tracer.nearest(&scene, rays)?);
+    }
+    Ok(hits)
+}
+
+/// A scene of objects that a camera at `eye` sees `width` wide a unit of distance, and whose rays are given: what
+/// chooses the arithmetic looks at all of it.
+fn objects_seen(objects: Vec<Object>, eye: DVec3, target: DVec3, width: f64) -> Result<Scene> {
+    let mut scene = objects_only(objects)?;
+    scene.screen = Screen::new(1000, 1000)?;
+    scene.camera = crate::scenes::looking_at(eye, target, width, scene.screen)?;
     Ok(scene)
 }
 

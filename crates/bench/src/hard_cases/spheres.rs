@@ -4,7 +4,10 @@ use anyhow::Result;
 use glam::DVec3;
 use rayfold_scene::{Cuboid, Material, Object, Sphere};
 
-use super::{Figures, Size, aimed, direction, objects_only, random, truths, unless_single, worse};
+use super::{
+    Figures, Size, aimed, direction, from_eyes, objects_only, objects_seen, random, truths, unless_single,
+    worse,
+};
 use crate::oracle::{nearest, sphere_clearance};
 use crate::scenes::single;
 use crate::tracers::{Arithmetic, Ray, Tracer};
@@ -33,7 +36,7 @@ pub(super) fn distant(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
                 })
                 .collect();
             let truths = truths(&objects, &rays);
-            let scene = objects_only(objects.to_vec())?;
+            let scene = objects_seen(objects.to_vec(), origin, ball.center(), 2.5 / distance)?;
             for (tracer, worst) in tracers.iter().zip(&mut worst) {
                 for ((ray, truth), hit) in rays.iter().zip(&truths).zip(tracer.nearest(&scene, &rays)?) {
                     let clearance = sphere_clearance(&ball, ray.origin, ray.direction);
@@ -72,7 +75,7 @@ pub(super) fn distant(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
 pub(super) fn horizon(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
     const RADIUS: f64 = 1e7;
     let objects = [Object::Sphere(sphere(RADIUS, DVec3::new(0.0, -RADIUS, 0.0))?)];
-    let scene = objects_only(objects.to_vec())?;
+    let scene = objects_seen(objects.to_vec(), DVec3::Y, DVec3::new(1.0, 0.5, 0.0), 1.0)?;
     let mut rng = random(3);
     // Down to the horizon at a depression of 4.5e-4; from 0.1 on downwards for `f32` by force.
     for (what, least) in [("steeper than 0.1", 0.1f64), ("down to 1.1 of the horizon's depression", 4.92e-4)]
@@ -136,9 +139,7 @@ pub(super) fn tangent(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
                 rays.iter().zip(&truths).zip(tracer.nearest(&scene, &rays)?).enumerate()
             {
                 count += 1;
-                if hit.is_some_and(|hit| {
-                    !hit.t.is_finite() || hit.normal.is_some_and(|normal| !normal.is_finite())
-                }) {
+                if hit.is_some_and(|hit| !hit.t.is_finite() || !hit.normal.is_finite()) {
                     invalid += 1;
                 }
                 if hit.is_some() != truth.is_some() {
@@ -163,35 +164,41 @@ pub(super) fn inside(tracers: &[Tracer], size: Size, figures: &mut Figures) -> R
         let on = [[3.0, 4.0, 0.0], [0.0, -3.0, 4.0], [-5.0, 0.0, 0.0], [-4.0, 0.0, 3.0]];
         let on = on.map(|p| DVec3::from(p) * (radius / 5.0));
         let mut rays = Vec::new();
-        for _ in 0..size.pick(30, 3000) {
-            let towards = single(direction(&mut rng));
-            rays.extend(on.map(|p| Ray { origin: center + p, direction: towards }));
-            rays.extend(on.map(|p| Ray { origin: center + p, direction: -p }));
+        let mut around = |origin: DVec3, rng: &mut fastrand::Rng, count: usize| {
+            rays.extend((0..count).map(|_| Ray { origin, direction: single(direction(rng)) }));
+            rays.push(Ray { origin, direction: center - origin });
+        };
+        for p in on {
+            around(center + p, &mut rng, size.pick(60, 20_000));
+        }
+        for _ in 0..size.pick(10, 300) {
             let depth = radius * rng.f64() * 0.99;
-            rays.push(Ray { origin: single(center + depth * direction(&mut rng)), direction: towards });
+            let within = single(center + depth * direction(&mut rng));
+            around(within, &mut rng, 16);
         }
         sets.push((Object::Sphere(sphere(radius, center)?), rays));
     }
     let corners = [DVec3::new(-1.0, -2.0, -3.0), DVec3::new(1.0, 2.0, 4.0)];
     let mut rays = Vec::new();
-    for _ in 0..size.pick(100, 10_000) {
+    for _ in 0..size.pick(20, 500) {
         let part = DVec3::new(rng.f64(), rng.f64(), rng.f64());
         let within = single(corners[0] + (corners[1] - corners[0]) * part);
-        let towards = single(direction(&mut rng));
-        rays.push(Ray { origin: within, direction: towards });
+        let mut origins = vec![within];
         for axis in 0..3 {
             let mut on = within;
             on[axis] = corners[rng.usize(0..2)][axis];
-            rays.push(Ray { origin: on, direction: towards });
-            rays.push(Ray { origin: on, direction: DVec3::AXES[axis] });
+            origins.push(on);
+        }
+        for origin in origins {
+            rays.extend((0..16).map(|_| Ray { origin, direction: single(direction(&mut rng)) }));
+            rays.extend(DVec3::AXES.map(|direction| Ray { origin, direction }));
         }
     }
     sets.push((Object::Cuboid(Cuboid::new(corners, Material::default())?), rays));
     for tracer in tracers {
         let (mut wrong, mut count) = (0, 0);
         for (object, rays) in &sets {
-            let scene = objects_only(vec![*object])?;
-            for (ray, hit) in rays.iter().zip(tracer.nearest(&scene, rays)?) {
+            for (ray, hit) in rays.iter().zip(from_eyes(tracer, *object, rays)?) {
                 count += 1;
                 let truth = nearest(&[*object], ray.origin, ray.direction).map(|hit| hit.t.to_f64());
                 let right = match (truth, hit) {
@@ -213,12 +220,13 @@ pub(super) fn giant_and_dwarf(tracers: &[Tracer], size: Size, figures: &mut Figu
         Object::Sphere(sphere(1e7, DVec3::new(0.0, -1e7, 0.0))?),
         Object::Sphere(sphere(1.0, DVec3::new(0.5, 1.5, -6.0))?),
     ];
-    let scene = objects_only(objects.to_vec())?;
+    let eye = DVec3::new(0.0, 2.0, 0.0);
+    let scene = objects_seen(objects.to_vec(), eye, eye - DVec3::Z, 1.0)?;
     let side = size.pick(96, 512);
     let pixel = 0.8 / f64::from(side);
     let ray = |i: f64, j: f64| {
         let across = DVec3::new((i + 0.5) * pixel - 0.4, (j + 0.5) * pixel - 0.4, -1.0);
-        Ray { origin: DVec3::new(0.0, 2.0, 0.0), direction: across.normalize() }
+        Ray { origin: eye, direction: across.normalize() }
     };
     let seen = |ray: Ray| nearest(&objects, ray.origin, ray.direction).map(|hit| hit.object);
     let places: Vec<(f64, f64)> =

@@ -1,0 +1,319 @@
+//! `rayfold-bench speed`: processor time against the work asked for, and side by side with peers.
+
+mod embree;
+mod povray;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use image::RgbImage;
+use rayfold_scene::{Scene, Screen};
+use rayfold_tracer::RenderOptions;
+
+use crate::cpu_time::{self, median};
+use crate::plot::{Labels, Series, log_log};
+use crate::scenes::{EXAMPLES, cloud, example, rock, table};
+use crate::tracers::{Tracer, levels, packets, reference};
+
+/// What to measure.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The folder that receives speed.md and its plots
+    #[arg(long, default_value = "docs/reports")]
+    output: PathBuf,
+    /// Small sizes and few rounds: a check that everything runs, not a measurement
+    #[arg(long)]
+    quick: bool,
+}
+
+/// Sizes of everything.
+struct Plan {
+    rounds: usize,
+    objects: &'static [u32],
+    triangles: &'static [usize],
+    screens: &'static [(u32, u32)],
+    peer_triangles: usize,
+    peer_side: u32,
+}
+
+const FULL: Plan = Plan {
+    rounds: 7,
+    objects: &[4, 16, 64, 256, 1024, 4096, 10_000],
+    triangles: &[1280, 20_480, 327_680, 1_310_720],
+    screens: &[(256, 256), (512, 512), (1024, 1024), (2048, 2048), (3840, 2160)],
+    peer_triangles: 1_310_720,
+    peer_side: 1024,
+};
+
+const QUICK: Plan = Plan {
+    rounds: 1,
+    objects: &[4, 64, 1024],
+    triangles: &[1280, 20_480],
+    screens: &[(64, 64), (256, 256)],
+    peer_triangles: 20_480,
+    peer_side: 256,
+};
+
+/// Measures and writes the report.
+///
+/// # Errors
+/// When a scene cannot be rendered, a peer that is here fails, or the report cannot be written.
+pub fn run(args: &Args) -> Result<()> {
+    let plan = if args.quick { &QUICK } else { &FULL };
+    std::fs::create_dir_all(&args.output)?;
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let command = if args.quick { " --quick" } else { "" };
+    let widths: Vec<_> = levels().iter().map(|(name, _)| *name).collect();
+    let mut report = format!(
+        "# Speed\n\n\
+         Written by `cargo run --release -p rayfold-bench -- speed{command}`; all figures are of one run on a machine \
+         with {}. Times are processor time, not that of the clock: the machine may be busy with other work. What is \
+         compared is run in turn, {} times; medians are shown. *One core* is a pool of one thread.\n\n",
+        widths.join(", "),
+        plan.rounds
+    );
+    report += &one.install(|| beside_povray(plan))?;
+    report += &one.install(|| beside_embree(plan))?;
+    report += &examples(plan, &one)?;
+    report += &one.install(|| growth(plan, &args.output))?;
+    let path = args.output.join("speed.md");
+    std::fs::write(&path, report).with_context(|| path.display().to_string())
+}
+
+fn best() -> Tracer {
+    packets("rayfold", RenderOptions::default())
+}
+
+/// Median processor time of the images of several ways, drawn in turn.
+fn in_turn(scene: &Scene, tracers: &[&Tracer], rounds: usize) -> Result<Vec<f64>> {
+    let mut seconds = vec![Vec::new(); tracers.len()];
+    for _ in 0..rounds {
+        for (tracer, seconds) in tracers.iter().zip(&mut seconds) {
+            let (time, image) = cpu_time::of(|| tracer.render(scene))?;
+            image?;
+            seconds.push(time);
+        }
+    }
+    Ok(seconds.into_iter().map(median).collect())
+}
+
+fn beside_povray(plan: &Plan) -> Result<String> {
+    let mut text = String::from("## Beside POV-Ray\n\n");
+    if !povray::is_here() {
+        text += "`povray` is not on this machine: not measured.\n\n";
+        return Ok(text);
+    }
+    eprintln!("POV-Ray");
+    let folder = tempfile::tempdir()?;
+    let scene = table(1024, 768)?;
+    let mut tracers: Vec<Tracer> = levels()
+        .into_iter()
+        .map(|(name, level)| packets(name, RenderOptions { level: Some(level), ..Default::default() }))
+        .collect();
+    tracers.push(reference());
+    let mut ours = vec![Vec::new(); tracers.len()];
+    let (mut whole, mut start) = (Vec::new(), Vec::new());
+    let mut theirs = RgbImage::new(0, 0);
+    for _ in 0..plan.rounds {
+        for (tracer, ours) in tracers.iter().zip(&mut ours) {
+            let (time, image) = cpu_time::of(|| tracer.render(&scene))?;
+            image?;
+            ours.push(time);
+        }
+        start.push(povray::render(&scene, folder.path(), (8, 6))?.0);
+        let (time, image) = povray::render(&scene, folder.path(), (1024, 768))?;
+        whole.push(time);
+        theirs = image;
+    }
+    let (whole, start) = (median(whole), median(start));
+    let drawing = whole - start;
+    let image = tracers[0].render(&scene)?;
+    let off =
+        image.pixels().zip(theirs.pixels()).filter(|(a, b)| (0..3).any(|c| a.0[c].abs_diff(b.0[c]) > 2));
+    let off = 100.0 * off.count() as f64 / image.pixels().len() as f64;
+    write!(
+        text,
+        "1024 x 768, 22 spheres, 2 boxes, 2 triangles, 2 lights, shadows, 5 bounces, one core, precision chosen by the \
+         program. POV-Ray draws the same picture ({off:.3} % of the pixels off by more than 2 levels), without \
+         anti-aliasing and radiosity. Its time includes starting and reading the scene; *drawing* is what is left when \
+         the time of an image of 8 x 6 pixels is taken off. Ours is that of `render`.\n\n\
+         | renderer | CPU ms | POV-Ray's / ours | POV-Ray's drawing / ours |\n| --- | --- | --- | --- |\n\
+         | POV-Ray | {:.1}, drawing {:.1} | 1 | 1 |\n",
+        1e3 * whole,
+        1e3 * drawing
+    )?;
+    for (tracer, ours) in tracers.iter().zip(ours) {
+        let ours = median(ours);
+        let name = &tracer.name;
+        writeln!(
+            text,
+            "| rayfold, {name} | {:.2} | {:.2} | {:.2} |",
+            1e3 * ours,
+            whole / ours,
+            drawing / ours
+        )?;
+    }
+    text.push('\n');
+    Ok(text)
+}
+
+fn beside_embree(plan: &Plan) -> Result<String> {
+    let mut text = String::from("## Beside Embree\n\n");
+    let folder = tempfile::tempdir()?;
+    let program = match embree::compile(folder.path())? {
+        Ok(program) => program,
+        Err(reason) => {
+            writeln!(text, "The peer program could not be compiled, so this was not measured: {reason}\n")?;
+            return Ok(text);
+        }
+    };
+    eprintln!("Embree");
+    let mut scene = rock(plan.peer_triangles, plan.peer_side, plan.peer_side)?;
+    scene.lights = Vec::new().into();
+    let mut small = scene.clone();
+    small.screen = Screen::new(8, 8)?;
+    let tracer = best();
+    let (mut ours, mut single, mut several) = (Vec::new(), Vec::new(), Vec::new());
+    let mut hits = 0;
+    for _ in 0..plan.rounds.min(3) {
+        let (whole, image) = cpu_time::of(|| tracer.render(&scene))?;
+        image?;
+        let (start, image) = cpu_time::of(|| tracer.render(&small))?;
+        image?;
+        ours.push(whole - start);
+        let theirs = embree::run(&program, folder.path(), &scene, 3)?;
+        single.push(theirs.one_by_one);
+        several.push(theirs.packets);
+        hits = theirs.hits;
+    }
+    let (ours, single, several) = (median(ours), median(single), median(several));
+    let rays = f64::from(plan.peer_side).powi(2);
+    write!(
+        text,
+        "{} triangles, {rays} camera rays of which {hits} hit, one core, robust intersection, no shading to speak of. \
+         Embree's time is that of its intersection calls, the fastest of three passes; ours is the time of an image less \
+         that of an image of 8 x 8 pixels, which leaves out building the tree but not writing the pixels.\n\n\
+         | way | CPU ms | Mrays/s | Embree's time / ours |\n| --- | --- | --- | --- |\n",
+        scene.objects.len()
+    )?;
+    let row = |name, seconds: f64| {
+        format!("| {name} | {:.1} | {:.2} | {:.2} |\n", 1e3 * seconds, rays / seconds / 1e6, seconds / ours)
+    };
+    text += &row("Embree 3, one ray at a time", single);
+    text += &row("Embree 3, packets of 8", several);
+    text += &row("rayfold", ours);
+    text.push('\n');
+    Ok(text)
+}
+
+fn examples(plan: &Plan, one: &rayon::ThreadPool) -> Result<String> {
+    let all = rayon::ThreadPoolBuilder::new().build()?;
+    let mut text = format!(
+        "## The five scenes\n\nOne frame of each, on one core and with all {} cores: the processor time of both should be \
+         the same, as nothing is done twice.\n\n\
+         | scene | CPU ms, one core | Mpixels/s | CPU ms, all cores | the plain tracer, CPU ms | plain / ours |\n\
+         | --- | --- | --- | --- | --- | --- |\n",
+        all.current_num_threads()
+    );
+    let (tracer, plain) = (best(), reference());
+    for name in EXAMPLES {
+        eprintln!("scene {name}");
+        let scene = example(name)?;
+        let mut together = Vec::new();
+        let mut alone = [Vec::new(), Vec::new()];
+        for _ in 0..plan.rounds {
+            let times = one.install(|| in_turn(&scene, &[&tracer, &plain], 1))?;
+            alone[0].push(times[0]);
+            alone[1].push(times[1]);
+            together.push(all.install(|| in_turn(&scene, &[&tracer], 1))?[0]);
+        }
+        let [ours, theirs] = alone.map(median);
+        writeln!(
+            text,
+            "| {name} | {:.2} | {:.1} | {:.2} | {:.1} | {:.1} |",
+            1e3 * ours,
+            scene.screen.pixels() as f64 / ours / 1e6,
+            1e3 * median(together),
+            1e3 * theirs,
+            theirs / ours
+        )?;
+    }
+    text.push('\n');
+    Ok(text)
+}
+
+/// Time over objects, triangles and pixels, with the exponent of the power that fits best.
+fn growth(plan: &Plan, folder: &Path) -> Result<String> {
+    let tracer = best();
+    let time = |scene: Result<Scene>, rounds: usize| -> Result<f64> {
+        let seconds = in_turn(&scene?, &[&tracer], rounds)?;
+        Ok(seconds[0])
+    };
+    let mut courses = Vec::new();
+    let mut objects = Vec::new();
+    for &count in plan.objects {
+        eprintln!("{count} spheres");
+        objects.push((f64::from(count), time(cloud(count, 512, 512), plan.rounds)?));
+    }
+    courses.push(("spheres, 512 x 512", objects));
+    let (mut drawn, mut prepared) = (Vec::new(), Vec::new());
+    for &count in plan.triangles {
+        eprintln!("{count} triangles");
+        let scene = rock(count, 512, 512)?;
+        let mut small = scene.clone();
+        small.screen = Screen::new(8, 8)?;
+        let rounds = plan.rounds.min(3);
+        let start = time(Ok(small), rounds)?;
+        let count = scene.objects.len() as f64;
+        drawn.push((count, time(Ok(scene), rounds)? - start));
+        prepared.push((count, start));
+    }
+    courses.push(("triangles, 512 x 512, drawing alone", drawn));
+    courses.push(("triangles, preparing alone", prepared));
+    let mut pixels = Vec::new();
+    for &(width, height) in plan.screens {
+        eprintln!("{width} x {height}");
+        pixels.push((f64::from(width) * f64::from(height), time(table(width, height), plan.rounds)?));
+    }
+    courses.push(("pixels of the table", pixels));
+
+    let mut text = String::from(
+        "## Cost against work\n\nOne core. The exponent is that of the power law fitted to the points (least squares of \
+         the logarithms): 1 is cost in proportion, 0 no cost.\n\n![Cost against work](speed-growth.svg)\n\n\
+         | what grows | exponent | points: count, CPU ms |\n| --- | --- | --- |\n",
+    );
+    for (name, points) in &courses {
+        let shown: Vec<_> = points.iter().map(|(count, s)| format!("{count}: {:.2}", 1e3 * s)).collect();
+        writeln!(text, "| {name} | {:.2} | {} |", exponent(points), shown.join(", "))?;
+    }
+    let series: Vec<Series> = courses
+        .into_iter()
+        .map(|(name, points)| Series { name: name.into(), points, joined: true })
+        .collect();
+    let labels =
+        Labels { title: "Cost against work", x: "spheres, triangles, pixels", y: "CPU seconds an image" };
+    log_log(&folder.join("speed-growth.svg"), &labels, &series)?;
+    Ok(text)
+}
+
+/// The slope of the line through the logarithms.
+fn exponent(points: &[(f64, f64)]) -> f64 {
+    let logs: Vec<_> = points.iter().map(|&(x, y)| (x.ln(), y.ln())).collect();
+    let count = logs.len() as f64;
+    let (mx, my) = logs.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / count, b + y / count));
+    let over: f64 = logs.iter().map(|(x, y)| (x - mx) * (y - my)).sum();
+    let under: f64 = logs.iter().map(|(x, _)| (x - mx).powi(2)).sum();
+    over / under
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_exponent_of_a_power_is_found() {
+        let points: Vec<_> = [1.0f64, 10.0, 1000.0].iter().map(|&x| (x, 3.0 * x.powf(0.75))).collect();
+        assert!((exponent(&points) - 0.75).abs() < 1e-12);
+    }
+}
