@@ -1,6 +1,6 @@
 //! The `rayfold` command.
 //!
-//! One module a subcommand, each with its flags (`Args`) and a `run` that takes them together with the [`Console`],
+//! One module a subcommand, each with its flags (`Args`) and a `run` that takes them together with the `Console`,
 //! which holds what the global flags and the environment resolved to. Data goes to standard output, everything for
 //! people to standard error. Exit codes: see [`outcome`].
 

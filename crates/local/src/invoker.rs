@@ -111,7 +111,7 @@ impl Invoker {
     /// Listens for events, and sweeps what was missed before.
     ///
     /// # Errors
-    /// [`Error::NoFunction`](crate::Error::NoFunction), [`Error::Listen`](crate::Error::Listen).
+    /// [`Error::NoFunction`], [`Error::Listen`].
     pub async fn start(settings: Settings, observer: Option<UnboundedSender<Observation>>) -> Result<Self> {
         let (listener, _) = listen(settings.webhook).await?;
         Self::start_on(listener, settings, observer)

@@ -3,7 +3,7 @@
 //! The trait is what the protocol needs of S3 and no more; it knows nothing of animations. Every call is one request
 //! (an [`Upload`] is several), and every `await` of one is a point at which an invocation may be killed.
 //!
-//! What every store guarantees, and [`conformance`] holds:
+//! What every store guarantees, and the suite `conformance` holds:
 //!
 //! - A read or listing that starts after a put was answered sees that put, or a later one.
 //! - An object appears whole or not at all.

@@ -10,7 +10,7 @@
 //! - that holds **without** a sweep, unless something happened that by design only the sweep heals;
 //! - manifests' revisions grow by one, no function writes below `scripts/`, every GIF has its frames in order.
 //!
-//! What the scripts give is worked out here, apart from [`crate::reconcile`].
+//! What the scripts give is worked out here, apart from [`crate::reconcile()`].
 //!
 //! ```
 //! rayfold_pipeline::simulation::run(1, None).expect("the protocol holds");
