@@ -76,7 +76,7 @@ fn unknown_subcommand() {
     Folder::new().rayfold("rendr").assert().code(2).stderr_eq(str![[r#"
 error: unrecognized subcommand 'rendr'
 
-  tip: some similar subcommands exist: 'retry', 'render'
+  tip: some similar subcommands exist: [..]'render'
 
 Usage: rayfold [OPTIONS] <COMMAND>
 

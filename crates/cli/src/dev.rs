@@ -28,12 +28,13 @@ const CATCH_UP: Duration = Duration::from_secs(3);
 /// Run the whole pipeline on this machine: MinIO, the bucket and the functions
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-MinIO is taken from RAYFOLD_MINIO or the PATH; without one it is installed from source, once, which needs Go 1.25 or
-later. Stop with Ctrl-C; the data is kept, and the next start goes on where this one was.
+MinIO is taken from RAYFOLD_MINIO or the PATH; without one it is installed from source, once,
+which needs Go 1.25 or later. Stop with Ctrl-C; the data is kept, and the next start goes on where
+this one was.
 
-Example:
-  rayfold dev                                        # prints what to set in another terminal
-  aws s3 sync scenes/hello s3://rayfold/scripts/hello/   # there; the GIF appears below animations/")]
+Examples:
+  rayfold dev                                            prints what to set in another terminal
+  aws s3 sync scenes/hello s3://rayfold/scripts/hello/   there; the GIF appears below animations/")]
 pub(crate) struct Args {
     /// Where objects and credentials are kept [default: rayfold/dev in the user's data folder]
     #[arg(long, value_name = "DIR")]
