@@ -52,7 +52,10 @@ async fn a_render_process_killed_in_the_middle_is_made_good() {
             let mut stage = stage(|settings| settings.fates = Some(fates)).await;
             stage.upload("film", &film()).await;
             stage.until_gif_of("film", &film()).await;
-            assert!(met.load(Ordering::SeqCst) > 1, "{prefix} was written again");
+            // A manifest that was committed although nobody heard of it may be the last one that is needed.
+            let again = prefix != "manifests/" || fate == Fate::KillBefore;
+            let met = met.load(Ordering::SeqCst);
+            assert!(met > usize::from(again), "{fate:?} at {prefix}: written {met} times");
             let expected = usize::from(fate != Fate::LoseAnswer);
             assert_eq!(crashes(&mut stage), expected, "{fate:?} at {prefix}");
         }
