@@ -12,6 +12,7 @@ pub mod cpu_time;
 pub mod gif;
 pub mod hard_cases;
 pub mod measure;
+pub mod needs;
 pub mod oracle;
 pub mod parsing;
 pub mod pipeline;

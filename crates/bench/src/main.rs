@@ -1,7 +1,7 @@
 //! The program that measures: a subcommand a report.
 
 use clap::{Parser, Subcommand};
-use rayfold_bench::{accuracy, cold_start, gif, measure, parsing, pipeline, simulate, speed};
+use rayfold_bench::{accuracy, cold_start, gif, measure, needs, parsing, pipeline, simulate, speed};
 
 #[derive(Debug, Parser)]
 #[command(name = "rayfold-bench", about = "Measures rayfold and writes the reports in docs/reports")]
@@ -27,6 +27,8 @@ enum Measurement {
     /// Run a program and print what it took
     #[command(hide = true)]
     Measure(measure::Args),
+    /// Instructions that scenes execute for parts of the tracer that they do not use (needs valgrind)
+    Needs(needs::Args),
     /// Processor time against the work asked for, and beside POV-Ray and Embree where they are
     Speed(speed::Args),
 }
@@ -40,6 +42,7 @@ fn main() -> anyhow::Result<()> {
         Measurement::Simulate(args) => simulate::run(&args),
         Measurement::Gif(args) => gif::run(&args),
         Measurement::Measure(args) => measure::run(&args),
+        Measurement::Needs(args) => needs::run(&args),
         Measurement::Speed(args) => speed::run(&args),
     }
 }

@@ -81,6 +81,12 @@ pub enum RenderError {
         /// Rows.
         height: u32,
     },
+    /// The scene needs a part of the tracer that this build was told to leave out.
+    #[error("the scene needs {feature}, and this build of the tracer is without (a cargo feature)")]
+    LeftOut {
+        /// The cargo feature.
+        feature: &'static str,
+    },
 }
 
 /// The numbers that [`Precision::Auto`] chooses for a scene.

@@ -1,19 +1,23 @@
-//! Embree as a peer, where a C++ compiler and its headers are: camera rays against a mesh.
+//! Embree as a peer, where a C++ compiler and its headers are: camera and shadow rays against a mesh.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
-use rayfold_scene::{Camera, Object, Scene};
+use rayfold_scene::{Camera, Light, Object, Scene};
 
 const SOURCE: &str = include_str!("embree_peer.cpp");
 
-/// Processor time of one image's camera rays, without building the tree, on one thread.
+/// Processor time of one image's rays, without building the tree, on one thread.
 pub(crate) struct Seconds {
-    pub(crate) one_by_one: f64,
-    pub(crate) packets: f64,
+    /// Camera rays, one by one and in packets.
+    pub(crate) camera: [f64; 2],
+    /// The same with a shadow ray from each hit.
+    pub(crate) lit: [f64; 2],
     /// Rays that meet the mesh.
     pub(crate) hits: u64,
+    /// Hits that the light does not reach.
+    pub(crate) dark: u64,
 }
 
 /// The peer program; `None` where it cannot be compiled, with the reason.
@@ -31,7 +35,7 @@ pub(crate) fn compile(folder: &Path) -> Result<Result<PathBuf, String>> {
     })
 }
 
-/// Runs the peer on the triangles of a scene with a pinhole camera and a square screen, a multiple of 4 wide.
+/// Runs the peer on the triangles of a scene with a pinhole camera, a light and a square screen, a multiple of 4 wide.
 pub(crate) fn run(program: &Path, folder: &Path, scene: &Scene, rounds: u32) -> Result<Seconds> {
     let mut corners = Vec::new();
     for object in scene.objects.iter() {
@@ -47,7 +51,9 @@ pub(crate) fn run(program: &Path, folder: &Path, scene: &Scene, rounds: u32) -> 
     let (a, b) = (pinhole.lower_left(), pinhole.upper_right());
     let steps = f64::from(scene.screen.width() - 1);
     let corner = a.x * u + a.y * v - pinhole.distance() * w;
-    let numbers = [pinhole.eye(), corner, (b.x - a.x) / steps * u, (b.y - a.y) / steps * v];
+    let [Light::Directional(light)] = scene.lights[..] else { anyhow::bail!("only one light") };
+    let towards = -light.direction().normalize();
+    let numbers = [pinhole.eye(), corner, (b.x - a.x) / steps * u, (b.y - a.y) / steps * v, towards];
     let text: Vec<String> = numbers.iter().flat_map(|v| v.to_array()).map(|x| format!("{x:e}")).collect();
     std::fs::write(&view, text.join(" "))?;
     let run = Command::new(program)
@@ -57,10 +63,15 @@ pub(crate) fn run(program: &Path, folder: &Path, scene: &Scene, rounds: u32) -> 
     ensure!(run.status.success(), "the Embree peer: {}", run.status);
     let answer = String::from_utf8(run.stdout)?;
     let fields: Vec<&str> = answer.split_whitespace().collect();
-    let [one_by_one, packets, hits, same] = fields[..] else {
+    let [single, packets, lit_single, lit_packets, hits, same, dark, _] = fields[..] else {
         anyhow::bail!("the Embree peer says {answer}")
     };
     ensure!(hits == same, "Embree's own ways meet {hits} and {same} times");
     let number = |text: &str| text.parse().with_context(|| format!("the Embree peer says {answer}"));
-    Ok(Seconds { one_by_one: number(one_by_one)?, packets: number(packets)?, hits: hits.parse()? })
+    Ok(Seconds {
+        camera: [number(single)?, number(packets)?],
+        lit: [number(lit_single)?, number(lit_packets)?],
+        hits: hits.parse()?,
+        dark: dark.parse()?,
+    })
 }

@@ -8,7 +8,7 @@
 use glam::{DMat3, DVec3};
 
 use super::geometry::{Shape, Solid, View};
-use super::prepare::{BOUNDS, Item};
+use super::prepare::BOUNDS;
 use super::real::Real;
 use super::window::MARGIN;
 
@@ -20,6 +20,37 @@ const LOOKED_AT: usize = 192;
 
 /// Objects up to this many are put on lists.
 pub(super) const LISTED: usize = 100_000;
+
+/// Objects by their positions in the arrays of each kind.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Picked {
+    pub(super) spheres: Vec<u32>,
+    pub(super) cuboids: Vec<u32>,
+    pub(super) triangles: Vec<u32>,
+}
+
+impl Picked {
+    pub(super) fn len(&self) -> usize {
+        self.spheres.len() + self.cuboids.len() + self.triangles.len()
+    }
+
+    fn clear(&mut self) {
+        self.spheres.clear();
+        self.cuboids.clear();
+        self.triangles.clear();
+    }
+
+    /// An object by its position among all; `before` is how many come before the boxes and before the triangles.
+    fn push(&mut self, item: u32, before: (u32, u32)) {
+        if item < before.0 {
+            self.spheres.push(item);
+        } else if item < before.1 {
+            self.cuboids.push(item - before.0);
+        } else {
+            self.triangles.push(item - before.1);
+        }
+    }
+}
 
 /// Lists one after another.
 #[derive(Debug, Default)]
@@ -80,16 +111,18 @@ impl Rectangle {
 #[derive(Debug)]
 pub(super) struct Sights {
     lists: Lists,
-    items: Vec<Item>,
+    /// Objects before the boxes and before the triangles.
+    before: (u32, u32),
     columns: usize,
 }
 
 impl Sights {
-    /// `solids` and `items` name the same objects; sizes are in pixels. None where lists would be long.
+    /// `solids` are sorted by kind, `before` are those before the boxes and before the triangles; sizes are in pixels.
+    /// None where lists would be long.
     pub(super) fn new(
         view: &View,
         solids: &[&Solid],
-        items: Vec<Item>,
+        before: (u32, u32),
         (width, height): (u32, u32),
         side: (u32, u32),
         roundoff: f64,
@@ -117,17 +150,17 @@ impl Sights {
         };
         let rectangles: Vec<_> = solids.iter().map(rectangle).collect();
         let lists = Lists::new(columns, rows, &rectangles, LONGEST * columns * rows)?;
-        Some(Self { lists, items, columns })
+        Some(Self { lists, before, columns })
     }
 
     /// The tile's candidates, or none if they are too many.
-    pub(super) fn gather(&self, column: usize, row: usize, into: &mut Vec<Item>) -> bool {
+    pub(super) fn gather(&self, column: usize, row: usize, into: &mut Picked) -> bool {
         into.clear();
         let list = self.lists.list(row * self.columns + column);
         if list.len() > LONGEST {
             return false;
         }
-        into.extend(list.iter().map(|&item| self.items[item as usize]));
+        list.iter().for_each(|&item| into.push(item, self.before));
         true
     }
 }
@@ -227,7 +260,8 @@ pub(super) struct LightBuffer(std::sync::Arc<Grid>);
 struct Grid {
     lists: Lists,
     outlines: Vec<Outline>,
-    items: Vec<Item>,
+    /// Objects before the boxes and before the triangles.
+    before: (u32, u32),
     /// Cells of a side.
     side: usize,
     corner: [f64; 2],
@@ -253,7 +287,8 @@ pub(super) struct Beam {
 }
 
 impl LightBuffer {
-    pub(super) fn new(outlines: Vec<Outline>, items: Vec<Item>) -> Option<Self> {
+    /// `outlines` are sorted by kind, `before` are those before the boxes and before the triangles.
+    pub(super) fn new(outlines: Vec<Outline>, before: (u32, u32)) -> Option<Self> {
         let side = (outlines.len() as f64).sqrt().ceil() as usize;
         let fold = |f: fn(f64, f64) -> f64, start: f64, of: fn(&Outline) -> [f64; 2]| {
             [0, 1].map(|axis| outlines.iter().map(|o| of(o)[axis]).fold(start, f))
@@ -266,13 +301,14 @@ impl LightBuffer {
         let rectangles: Vec<_> =
             outlines.iter().map(|o| Some(Rectangle { columns: span(o, 0), rows: span(o, 1) })).collect();
         let lists = Lists::new(side, side, &rectangles, LONGEST * side * side)?;
-        Some(Self(Grid { lists, outlines, items, side, corner, pitch }.into()))
+        Some(Self(Grid { lists, outlines, before, side, corner, pitch }.into()))
     }
 
-    /// Adds what can stand in a beam's way, or returns false if that is too much.
-    pub(super) fn gather(&self, beam: &Beam, seen: &mut Seen, into: &mut Vec<Item>) -> bool {
+    /// What can stand in a beam's way; false if that is too much.
+    pub(super) fn gather(&self, beam: &Beam, seen: &mut Seen, into: &mut Picked) -> bool {
+        into.clear();
         let grid = &*self.0;
-        let Grid { lists, outlines, items, side, corner, pitch } = grid;
+        let Grid { lists, outlines, before, side, corner, pitch } = grid;
         if seen.marks.len() < outlines.len() {
             seen.marks.resize(outlines.len(), 0);
         }
@@ -287,7 +323,6 @@ impl LightBuffer {
         if lists.clone().map(|list| list.len()).sum::<usize>() > LOOKED_AT {
             return false;
         }
-        let from = into.len();
         for &item in lists.flat_map(|list| &grid.lists.items[list]) {
             let (mark, o) = (&mut seen.marks[item as usize], &outlines[item as usize]);
             if *mark == seen.gathering {
@@ -303,10 +338,10 @@ impl LightBuffer {
                 && o.exits[1] >= beam.starts[1]
                 && o.exits[2] >= beam.starts[2];
             if meets {
-                if into.len() - from == LONGEST {
+                if into.len() == LONGEST {
                     return false;
                 }
-                into.push(items[item as usize]);
+                into.push(item, *before);
             }
         }
         true

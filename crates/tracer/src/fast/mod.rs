@@ -44,6 +44,7 @@ macro_rules! on {
     };
 }
 
+mod features;
 mod geometry;
 mod intersect;
 mod lists;
@@ -62,10 +63,10 @@ use rayfold_scene::Scene;
 
 use crate::parallel::{CHANNELS, bands};
 use crate::{Precision, RenderError, RenderOptions};
+use features::{Balls, Everything, Features, Mesh, Mirrors, Solids};
 use geometry::{Geometry, Solid};
 use prepare::Prepared;
 use real::Real;
-use search::Features;
 use tile::{Band, Scratch, Tile};
 use window::Window;
 
@@ -127,7 +128,7 @@ fn draw<E: Kernels>(
     let size = (scene.screen.width(), scene.screen.height());
     let many = geometry.solids.len() > MANY;
     let side = options.tile.unwrap_or(if many { SMALL_SIDE } else { SIDE });
-    let prepared = Prepared::<E>::new(scene, geometry, options.tree, side);
+    let prepared = Prepared::<E>::new(scene, geometry, options.tree, side)?;
     let whole = geometry.whole();
     let mut solids: Vec<&Solid> =
         if prepared.tree.is_some() { vec![&whole] } else { geometry.solids.iter().collect() };
@@ -206,53 +207,28 @@ impl Job<'_, f32> {
     /// With the kernel that has just what the scene has.
     #[inline(always)]
     fn draw_by_kernel<S: Simd>(&self, simd: S, band: Band) {
-        let scene = self.prepared;
-        let balls = scene.cuboids.is_empty() && scene.triangles.is_empty();
-        match (scene.tree.is_some(), balls, scene.mirrors) {
+        let needs = self.prepared.needs;
+        match (needs.tree, needs.cuboids || needs.triangles, needs.mirrors) {
+            (true, _, false) if !needs.cuboids => simd.vectorize(
+                #[inline(always)]
+                || self.draw::<S, Mesh>(simd, band),
+            ),
             (true, _, _) => simd.vectorize(
                 #[inline(always)]
                 || self.draw::<S, Everything>(simd, band),
             ),
-            (false, false, _) => simd.vectorize(
+            (false, true, _) => simd.vectorize(
                 #[inline(always)]
                 || self.draw::<S, Solids>(simd, band),
             ),
-            (false, true, true) => simd.vectorize(
+            (false, false, true) => simd.vectorize(
                 #[inline(always)]
                 || self.draw::<S, Mirrors>(simd, band),
             ),
-            (false, true, false) => simd.vectorize(
+            (false, false, false) => simd.vectorize(
                 #[inline(always)]
                 || self.draw::<S, Balls>(simd, band),
             ),
         }
     }
-}
-
-macro_rules! kernels {
-    ($($(#[$doc:meta])* $name:ident: $cuboids:literal, $triangles:literal, $mirrors:literal, $tree:literal;)*) => {
-        $(
-            $(#[$doc])*
-            struct $name;
-
-            impl Features for $name {
-                const CUBOIDS: bool = $cuboids;
-                const TRIANGLES: bool = $triangles;
-                const MIRRORS: bool = $mirrors;
-                const TREE: bool = $tree;
-            }
-        )*
-    };
-}
-
-kernels! {
-    // boxes, triangles, mirrors, tree
-    /// Spheres that mirror nothing.
-    Balls: false, false, false, false;
-    /// Spheres, some of them mirrors.
-    Mirrors: false, false, true, false;
-    /// All kinds, as many as masks have bits.
-    Solids: true, true, true, false;
-    /// All kinds, any number.
-    Everything: true, true, true, true;
 }

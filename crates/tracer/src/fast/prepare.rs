@@ -6,10 +6,12 @@
 use glam::{DMat3, DVec3};
 use rayfold_scene::{Object, Scene};
 
+use super::features::Needs;
 use super::geometry::{Geometry, Shape, Solid, Sun, View};
 use super::lists::{LISTED, LightBuffer, Outline, Sights};
 use super::real::Real;
 use super::tree::{self, Tree};
+use crate::RenderError;
 use crate::parallel::map;
 
 /// Rounding errors that add up on the way to a hit and to a shadow ray's test, in roundoffs of the largest coordinate;
@@ -96,9 +98,6 @@ pub(super) struct Light<E> {
     pub(super) buffer: Option<LightBuffer>,
 }
 
-/// An object by its kind and its position in the array of that kind.
-pub(super) type Item = (Kind, u32);
-
 /// How a scene's objects are found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Search {
@@ -160,7 +159,8 @@ pub(super) struct Prepared<E> {
     pub(super) sights: Option<Sights>,
     /// Unclamped, for mirrored rays.
     pub(super) background: [E; 3],
-    pub(super) mirrors: bool,
+    /// What it has.
+    pub(super) needs: Needs,
 }
 
 /// Objects up to this many are tested by masks over all of them; more are found by a tree.
@@ -169,7 +169,15 @@ pub(super) const MASKED: usize = 64;
 impl<E: Real> Prepared<E> {
     /// `tree` says whether to look for objects down a tree, if it matters; what masks cannot hold then is one leaf.
     /// Tiles have the size of `side`.
-    pub(super) fn new(scene: &Scene, geometry: &Geometry, tree: Option<bool>, side: (u32, u32)) -> Self {
+    ///
+    /// # Errors
+    /// When the build leaves out what the scene has.
+    pub(super) fn new(
+        scene: &Scene,
+        geometry: &Geometry,
+        tree: Option<bool>,
+        side: (u32, u32),
+    ) -> Result<Self, RenderError> {
         let size = (scene.screen.width(), scene.screen.height());
         let count = geometry.solids.len();
         let search = match tree {
@@ -178,9 +186,11 @@ impl<E: Real> Prepared<E> {
             None | Some(false) if count <= MASKED => Search::Masks,
             _ => Search::Tree,
         };
+        let mut needs = Needs { tree: search != Search::Masks, ..Needs::default() };
+        needs.check()?;
         let planted = match search {
             Search::Masks => None,
-            _ if tree == Some(false) => Some((geometry.solids.clone(), tree::stump(&geometry.solids))),
+            _ if tree == Some(false) => Some(tree::stump(&geometry.solids)),
             _ => Some(tree::plant(&geometry.solids)),
         };
         let (solids, branches) = match &planted {
@@ -195,24 +205,35 @@ impl<E: Real> Prepared<E> {
                 Shape::Cuboid { .. } => &mut sorted.boxes,
                 Shape::Triangle { .. } => &mut sorted.facets,
             };
-            entries[solid.order as usize].index = of_kind.len() as u32;
+            let entry = &mut entries[solid.order as usize];
+            entry.index = of_kind.len() as u32;
+            needs.mirrors |= entry.mirrors;
             of_kind.push(solid);
         }
+        needs.cuboids = !sorted.boxes.is_empty();
+        needs.triangles = !sorted.facets.is_empty();
+        let spheres: Vec<Sphere<E>> = map(&sorted.balls, |solid| sphere(solid));
+        let alone = match (&spheres[..], &geometry.view) {
+            ([sphere], View::Pinhole { .. }) => count == 1 && !needs.mirrors && sphere.power > E::narrow(0.0),
+            _ => count == 0,
+        };
+        needs.shadows = !geometry.suns.is_empty() && !alone;
+        needs.check()?;
         let sights = (search == Search::Lists)
-            .then(|| Sights::new(&geometry.view, &sorted.all(), sorted.items(), size, side, E::ROUNDOFF))
+            .then(|| Sights::new(&geometry.view, &sorted.all(), sorted.before(), size, side, E::ROUNDOFF))
             .flatten();
-        Self {
+        Ok(Self {
             rays: rays(&geometry.view),
-            spheres: map(&sorted.balls, |solid| sphere(solid)),
+            spheres,
             cuboids: map(&sorted.boxes, |solid| cuboid(solid)),
             triangles: map(&sorted.facets, |solid| triangle(solid)),
             lights: geometry.suns.iter().map(|sun| light(sun, &sorted, search)).collect(),
-            mirrors: solids.iter().any(|solid| entries[solid.order as usize].mirrors),
+            needs,
             background: point(scene.background()),
             tree: branches.map(|branches| Tree::new(branches, solids, &entries)),
             sights,
             entries,
-        }
+        })
     }
 }
 
@@ -327,12 +348,10 @@ impl Sorted<'_> {
         [&self.balls, &self.boxes, &self.facets].into_iter().flatten().copied().collect()
     }
 
-    fn items(&self) -> Vec<Item> {
-        let of = |kind: Kind, solids: &[&Solid]| (0..solids.len() as u32).map(move |index| (kind, index));
-        of(Kind::Sphere, &self.balls)
-            .chain(of(Kind::Cuboid, &self.boxes))
-            .chain(of(Kind::Triangle, &self.facets))
-            .collect()
+    /// How many come before the boxes, and before the triangles.
+    fn before(&self) -> (u32, u32) {
+        let spheres = self.balls.len() as u32;
+        (spheres, spheres + self.boxes.len() as u32)
     }
 }
 
@@ -358,7 +377,7 @@ fn light<E: Real>(sun: &Sun, sorted: &Sorted, search: Search) -> Light<E> {
         spheres: map(&sorted.balls, circle),
         shades: map(&sorted.facets, facet),
         outlines: if search == Search::Masks { masks(&outlines()) } else { Outlines::default() },
-        buffer: if search == Search::Lists { LightBuffer::new(outlines(), sorted.items()) } else { None },
+        buffer: if search == Search::Lists { LightBuffer::new(outlines(), sorted.before()) } else { None },
     }
 }
 

@@ -7,13 +7,14 @@ use fearless_simd::{Level, Simd};
 use glam::DVec3;
 use rayfold_scene::Scene;
 
+use super::features::Everything;
 use super::geometry::Geometry;
 use super::intersect::Ray;
 use super::prepare::Prepared;
 use super::real::{Lanes, Real, Vec3, splat};
+use super::resolve;
 use super::search::{Candidates, nearest, unshaded};
 use super::tile::surface;
-use super::{Everything, resolve};
 use crate::{Precision, RenderError, RenderOptions};
 
 /// What a ray meets first.
@@ -85,7 +86,7 @@ fn probe<E: Real, T>(
     options: &RenderOptions,
     run: impl Fn(&Batch<E>, Level, &mut Vec<T>),
 ) -> Result<Vec<T>, RenderError> {
-    let prepared = Prepared::<E>::new(scene, geometry, options.tree, super::SIDE);
+    let prepared = Prepared::<E>::new(scene, geometry, options.tree, super::SIDE)?;
     let mut out = Vec::with_capacity(rays.len());
     run(&Batch { scene: &prepared, geometry, rays }, options.level.unwrap_or_else(Level::new), &mut out);
     Ok(out)
@@ -120,9 +121,9 @@ impl<E: Real> Batch<'_, E> {
             #[inline(always)]
             |ray, from_eye, count| {
                 let found = if from_eye {
-                    nearest::<S, E, Everything, true>(simd, self.scene, ray, Candidates::All)
+                    nearest::<S, E, Everything, true>(simd, self.scene, ray, Candidates::all(self.scene))
                 } else {
-                    nearest::<S, E, Everything, false>(simd, self.scene, ray, Candidates::All)
+                    nearest::<S, E, Everything, false>(simd, self.scene, ray, Candidates::all(self.scene))
                 };
                 let hit = found.hit(simd).to_bitmask();
                 let mut normals = [DVec3::ZERO; 16];
@@ -167,9 +168,15 @@ impl<E: Real> Batch<'_, E> {
             |ray, _, count| {
                 let all = zero.simd_eq(zero);
                 let light = &self.scene.lights[0];
-                let lit =
-                    unshaded::<S, E, Everything>(simd, self.scene, light, ray.origin, all, Candidates::All)
-                        .to_bitmask();
+                let lit = unshaded::<S, E, Everything>(
+                    simd,
+                    self.scene,
+                    light,
+                    ray.origin,
+                    all,
+                    Candidates::all(self.scene),
+                )
+                .to_bitmask();
                 out.extend((0..count).map(|lane| lit >> lane & 1 != 0));
             },
         );

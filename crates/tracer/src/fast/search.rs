@@ -5,49 +5,56 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
+use super::features::Features;
 use super::intersect::{
     Moment, Nearest, Ray, Slopes, cuboid, cuboid_shades, facing, sphere, sphere_from_eye, sphere_shades,
     triangle, triangle_from_eye, triangle_shades,
 };
-use super::prepare::{Item, Kind, Light, Prepared};
+use super::lists::Picked;
+use super::prepare::{Kind, Light, Prepared};
 use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
-use super::tree::{Node, Tree};
+use super::tree::{Content, Node, Tree};
 
-/// What a scene has; what it has not is not compiled into the loops that draw it.
-pub(super) trait Features: 'static {
-    const CUBOIDS: bool;
-    const TRIANGLES: bool;
-    const MIRRORS: bool;
-    const TREE: bool;
+/// Objects by bits, a word a kind, each in the order of its array.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Masks {
+    spheres: u64,
+    cuboids: u64,
+    triangles: u64,
+}
+
+impl Masks {
+    /// Of a word with all: spheres first, then boxes, then triangles.
+    #[inline(always)]
+    pub(super) fn split<E: Real>(bits: u64, scene: &Prepared<E>) -> Self {
+        let (spheres, cuboids) = (scene.spheres.len(), scene.cuboids.len());
+        Self {
+            spheres: of_kind(bits, 0, spheres),
+            cuboids: of_kind(bits, spheres, cuboids),
+            triangles: of_kind(bits, spheres + cuboids, scene.triangles.len()),
+        }
+    }
+
+    /// Without the spheres whose bits are not set.
+    #[inline(always)]
+    pub(super) fn and_spheres(self, bits: u64) -> Self {
+        Self { spheres: self.spheres & bits, ..self }
+    }
 }
 
 /// The objects to look at.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Candidates<'a> {
-    /// By bits: spheres first, then boxes, then triangles, each in the order of its array.
-    Masked(u64),
-    Listed(&'a [Item]),
-    /// All of them, down the tree where there is one.
-    All,
+pub(super) struct Candidates<'a> {
+    /// In a scene without a tree.
+    pub(super) masks: Masks,
+    /// In one with a tree: instead of all that is in it.
+    pub(super) list: Option<&'a Picked>,
 }
 
 impl Candidates<'_> {
-    /// Whether it is certain that there are none.
     #[inline(always)]
-    pub(super) fn are_none(self) -> bool {
-        match self {
-            Self::Masked(bits) => bits == 0,
-            Self::Listed(items) => items.is_empty(),
-            Self::All => false,
-        }
-    }
-
-    #[inline(always)]
-    fn bits(self) -> u64 {
-        match self {
-            Self::Masked(bits) => bits,
-            Self::Listed(_) | Self::All => u64::MAX,
-        }
+    pub(super) fn all<E: Real>(scene: &Prepared<E>) -> Self {
+        Self { masks: Masks::split(u64::MAX, scene), list: None }
     }
 }
 
@@ -74,7 +81,7 @@ fn of_kind(bits: u64, from: usize, count: usize) -> u64 {
     if from >= 64 || count == 0 {
         return 0;
     }
-    (bits >> from) & (u64::MAX >> (64 - count))
+    (bits >> from) & (u64::MAX >> 64usize.saturating_sub(count))
 }
 
 /// The nearest hits; `EYE` says that the rays start at the origin of the coordinates.
@@ -88,39 +95,32 @@ pub(super) fn nearest<S: Simd, E: Real, F: Features, const EYE: bool>(
     if F::TREE
         && let Some(tree) = &scene.tree
     {
-        if EYE && let Candidates::Listed(items) = candidates {
-            return nearest_of_list(simd, scene, items, ray.direction);
+        if EYE && let Some(list) = candidates.list {
+            return nearest_of_list::<S, E, F>(simd, scene, list, ray.direction);
         }
-        return nearest_in_tree::<S, E, EYE>(simd, scene, tree, ray);
+        return nearest_in_tree::<S, E, F, EYE>(simd, scene, tree, ray);
     }
-    let candidates = candidates.bits();
+    let masks = candidates.masks;
     let mut nearest = Nearest::none(simd);
-    let (spheres, cuboids, triangles) = (scene.spheres.len(), scene.cuboids.len(), scene.triangles.len());
-    for at in Positions(of_kind(candidates, 0, spheres)) {
+    for at in Positions(masks.spheres) {
         if EYE {
             sphere_from_eye(simd, &scene.spheres[at], ray.direction, &mut nearest);
         } else {
             sphere(simd, &scene.spheres[at], ray, &mut nearest);
         }
     }
-    if F::CUBOIDS {
-        let bits = of_kind(candidates, spheres, cuboids);
-        if bits != 0 {
-            let slopes = Slopes::new(simd, ray.direction);
-            for at in Positions(bits) {
-                cuboid(simd, &scene.cuboids[at], ray, slopes, &mut nearest);
-            }
+    if F::CUBOIDS && masks.cuboids != 0 {
+        let slopes = Slopes::new(simd, ray.direction);
+        for at in Positions(masks.cuboids) {
+            cuboid(simd, &scene.cuboids[at], ray, slopes, &mut nearest);
         }
     }
-    if F::TRIANGLES {
-        let bits = of_kind(candidates, spheres + cuboids, triangles);
-        if EYE {
-            for at in Positions(bits) {
+    if F::TRIANGLES && masks.triangles != 0 {
+        let moment = Moment::new(ray);
+        for at in Positions(masks.triangles) {
+            if EYE {
                 triangle_from_eye(simd, &scene.triangles[at], ray.direction, &mut nearest);
-            }
-        } else if bits != 0 {
-            let moment = Moment::new(ray);
-            for at in Positions(bits) {
+            } else {
                 triangle(simd, &scene.triangles[at], ray, moment, &mut nearest);
             }
         }
@@ -141,27 +141,25 @@ pub(super) fn unshaded<S: Simd, E: Real, F: Features>(
     if F::TREE
         && let Some(tree) = &scene.tree
     {
-        if let Candidates::Listed(items) = candidates {
-            return unshaded_by_list(simd, scene, items, light, point, lit);
+        if let Some(list) = candidates.list {
+            return unshaded_by_list::<S, E, F>(simd, scene, list, light, point, lit);
         }
-        return unshaded_in_tree(simd, scene, tree, light, point, lit);
+        return unshaded_in_tree::<S, E, F>(simd, scene, tree, light, point, lit);
     }
-    let candidates = candidates.bits();
-    let (spheres, cuboids, triangles) = (scene.spheres.len(), scene.cuboids.len(), scene.triangles.len());
-    let bits = of_kind(candidates, 0, spheres);
-    if bits != 0 {
+    let masks = candidates.masks;
+    if masks.spheres != 0 {
         let faced = facing(simd, light, point);
-        for at in Positions(bits) {
+        for at in Positions(masks.spheres) {
             lit &= !sphere_shades(simd, &light.spheres[at], faced);
         }
     }
     if F::CUBOIDS {
-        for at in Positions(of_kind(candidates, spheres, cuboids)) {
+        for at in Positions(masks.cuboids) {
             lit &= !cuboid_shades(simd, &scene.cuboids[at], light, point);
         }
     }
     if F::TRIANGLES {
-        for at in Positions(of_kind(candidates, spheres + cuboids, triangles)) {
+        for at in Positions(masks.triangles) {
             lit &= !triangle_shades(simd, &light.shades[at], point);
         }
     }
@@ -170,43 +168,55 @@ pub(super) fn unshaded<S: Simd, E: Real, F: Features>(
 
 /// The nearest hits of rays from the eye.
 #[inline(always)]
-fn nearest_of_list<S: Simd, E: Real>(
+fn nearest_of_list<S: Simd, E: Real, F: Features>(
     simd: S,
     scene: &Prepared<E>,
-    items: &[Item],
+    list: &Picked,
     direction: Vec3<S, E>,
 ) -> Nearest<S, E> {
     let mut nearest = Nearest::none(simd);
-    let ray = Ray { origin: Vec3::zero(simd), direction };
-    let slopes = Slopes::new(simd, direction);
-    for &(kind, index) in items {
-        let index = index as usize;
-        match kind {
-            Kind::Sphere => sphere_from_eye(simd, &scene.spheres[index], direction, &mut nearest),
-            Kind::Cuboid => cuboid(simd, &scene.cuboids[index], ray, slopes, &mut nearest),
-            Kind::Triangle => triangle_from_eye(simd, &scene.triangles[index], direction, &mut nearest),
+    for &at in &list.spheres {
+        sphere_from_eye(simd, &scene.spheres[at as usize], direction, &mut nearest);
+    }
+    if F::CUBOIDS && !list.cuboids.is_empty() {
+        let ray = Ray { origin: Vec3::zero(simd), direction };
+        let slopes = Slopes::new(simd, direction);
+        for &at in &list.cuboids {
+            cuboid(simd, &scene.cuboids[at as usize], ray, slopes, &mut nearest);
+        }
+    }
+    if F::TRIANGLES {
+        for &at in &list.triangles {
+            triangle_from_eye(simd, &scene.triangles[at as usize], direction, &mut nearest);
         }
     }
     nearest
 }
 
 #[inline(always)]
-fn unshaded_by_list<S: Simd, E: Real>(
+fn unshaded_by_list<S: Simd, E: Real, F: Features>(
     simd: S,
     scene: &Prepared<E>,
-    items: &[Item],
+    list: &Picked,
     light: &Light<E>,
     point: Vec3<S, E>,
     mut lit: Mask<S, E>,
 ) -> Mask<S, E> {
-    let faced = facing(simd, light, point);
-    for &(kind, index) in items {
-        let index = index as usize;
-        lit &= !match kind {
-            Kind::Sphere => sphere_shades(simd, &light.spheres[index], faced),
-            Kind::Cuboid => cuboid_shades(simd, &scene.cuboids[index], light, point),
-            Kind::Triangle => triangle_shades(simd, &light.shades[index], point),
-        };
+    if !list.spheres.is_empty() {
+        let faced = facing(simd, light, point);
+        for &at in &list.spheres {
+            lit &= !sphere_shades(simd, &light.spheres[at as usize], faced);
+        }
+    }
+    if F::CUBOIDS {
+        for &at in &list.cuboids {
+            lit &= !cuboid_shades(simd, &scene.cuboids[at as usize], light, point);
+        }
+    }
+    if F::TRIANGLES {
+        for &at in &list.triangles {
+            lit &= !triangle_shades(simd, &light.shades[at as usize], point);
+        }
     }
     lit
 }
@@ -220,7 +230,7 @@ fn descend<E: Real>(
     tree: &Tree<E>,
     backwards: [bool; 3],
     mut meets: impl FnMut(&Node<E>) -> bool,
-    mut visit: impl FnMut(Kind, usize) -> bool,
+    mut visit: impl FnMut(Kind, core::ops::Range<usize>) -> bool,
 ) {
     let mut waiting = [0u32; WAITING];
     let mut spilled = Vec::new();
@@ -240,42 +250,25 @@ fn descend<E: Real>(
         if !meets(node) {
             continue;
         }
-        if node.count > 0 {
-            for &(kind, index) in &tree.items[node.first as usize..(node.first + node.count) as usize] {
-                if !visit(kind, index as usize) {
+        match node.content() {
+            Content::Leaf(kind, items) => {
+                if !visit(kind, items) {
                     return;
                 }
             }
-            continue;
-        }
-        let [first, second] = [node.first, node.first + 1];
-        let far_first =
-            second_is_nearer(&tree.nodes[first as usize], &tree.nodes[second as usize], backwards);
-        let (near, far) = if far_first { (second, first) } else { (first, second) };
-        if count + 2 > WAITING {
-            spilled.extend_from_slice(&waiting[..count]);
-            count = 0;
-        }
-        waiting[count] = far;
-        waiting[count + 1] = near;
-        count += 2;
-    }
-}
-
-/// Along the axis on which the two boxes lie farthest apart.
-#[inline(always)]
-fn second_is_nearer<E: Real>(first: &Node<E>, second: &Node<E>, backwards: [bool; 3]) -> bool {
-    let mut widest = E::narrow(0.0);
-    let mut nearer = false;
-    for (axis, backwards) in backwards.into_iter().enumerate() {
-        let apart = second.low[axis] + second.high[axis] - (first.low[axis] + first.high[axis]);
-        let size = if apart < E::narrow(0.0) { E::narrow(0.0) - apart } else { apart };
-        if size > widest {
-            widest = size;
-            nearer = (apart < E::narrow(0.0)) != backwards;
+            Content::Children(first, axis) => {
+                // The first child is the one that comes first along the axis.
+                let far_first = u32::from(backwards[axis]);
+                if count + 2 > WAITING {
+                    spilled.extend_from_slice(&waiting[..count]);
+                    count = 0;
+                }
+                waiting[count] = first + 1 - far_first;
+                waiting[count + 1] = first + far_first;
+                count += 2;
+            }
         }
     }
-    nearer
 }
 
 /// The tree's part of a packet of rays.
@@ -313,7 +306,7 @@ impl<S: Simd, E: Real> Descent<S, E> {
 }
 
 #[inline(always)]
-fn nearest_in_tree<S: Simd, E: Real, const EYE: bool>(
+fn nearest_in_tree<S: Simd, E: Real, F: Features, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
     tree: &Tree<E>,
@@ -329,18 +322,28 @@ fn nearest_in_tree<S: Simd, E: Real, const EYE: bool>(
         #[inline(always)]
         |node| descent.meets(simd, node, found.get().distance).any_true(),
         #[inline(always)]
-        |kind, index| {
+        |kind, items| {
             let mut nearest = found.get();
-            match kind {
-                Kind::Sphere if EYE => {
-                    sphere_from_eye(simd, &scene.spheres[index], ray.direction, &mut nearest);
+            if F::TRIANGLES && kind == Kind::Triangle {
+                for of in &scene.triangles[items] {
+                    if EYE {
+                        triangle_from_eye(simd, of, ray.direction, &mut nearest);
+                    } else {
+                        triangle(simd, of, ray, moment, &mut nearest);
+                    }
                 }
-                Kind::Sphere => sphere(simd, &scene.spheres[index], ray, &mut nearest),
-                Kind::Cuboid => cuboid(simd, &scene.cuboids[index], ray, slopes, &mut nearest),
-                Kind::Triangle if EYE => {
-                    triangle_from_eye(simd, &scene.triangles[index], ray.direction, &mut nearest);
+            } else if F::CUBOIDS && kind == Kind::Cuboid {
+                for of in &scene.cuboids[items] {
+                    cuboid(simd, of, ray, slopes, &mut nearest);
                 }
-                Kind::Triangle => triangle(simd, &scene.triangles[index], ray, moment, &mut nearest),
+            } else {
+                for of in &scene.spheres[items] {
+                    if EYE {
+                        sphere_from_eye(simd, of, ray.direction, &mut nearest);
+                    } else {
+                        sphere(simd, of, ray, &mut nearest);
+                    }
+                }
             }
             found.set(nearest);
             true
@@ -350,7 +353,7 @@ fn nearest_in_tree<S: Simd, E: Real, const EYE: bool>(
 }
 
 #[inline(always)]
-fn unshaded_in_tree<S: Simd, E: Real>(
+fn unshaded_in_tree<S: Simd, E: Real, F: Features>(
     simd: S,
     scene: &Prepared<E>,
     tree: &Tree<E>,
@@ -370,12 +373,21 @@ fn unshaded_in_tree<S: Simd, E: Real>(
         #[inline(always)]
         |node| descent.meets(simd, node, limit.get()).any_true(),
         #[inline(always)]
-        |kind, index| {
-            let dark = match kind {
-                Kind::Sphere => sphere_shades(simd, &light.spheres[index], faced),
-                Kind::Cuboid => cuboid_shades(simd, &scene.cuboids[index], light, point),
-                Kind::Triangle => triangle_shades(simd, &light.shades[index], point),
-            };
+        |kind, items| {
+            let mut dark = zero.simd_lt(zero);
+            if F::TRIANGLES && kind == Kind::Triangle {
+                for of in &light.shades[items] {
+                    dark |= triangle_shades(simd, of, point);
+                }
+            } else if F::CUBOIDS && kind == Kind::Cuboid {
+                for of in &scene.cuboids[items] {
+                    dark |= cuboid_shades(simd, of, light, point);
+                }
+            } else {
+                for of in &light.spheres[items] {
+                    dark |= sphere_shades(simd, of, faced);
+                }
+            }
             limit.set(dark.select(splat::<S, E>(simd, E::narrow(-1.0)), limit.get()));
             limit.get().simd_gt(zero).any_true()
         },

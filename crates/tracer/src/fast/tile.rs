@@ -8,11 +8,12 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
+use super::features::Features;
 use super::intersect::{Ray, Slopes, Surface, cuboid_surface, sphere_surface, triangle_surface};
-use super::lists::{Beam, Seen};
-use super::prepare::{Entry, Item, Kind, Light, OFFSET, Outlines, Prepared, Rays};
+use super::lists::{Beam, Picked, Seen};
+use super::prepare::{Entry, Kind, Light, OFFSET, Outlines, Prepared, Rays};
 use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
-use super::search::{Candidates, Features, nearest, unshaded};
+use super::search::{Candidates, Masks, nearest, unshaded};
 use crate::MAX_BOUNCES;
 use crate::parallel::CHANNELS;
 
@@ -73,23 +74,23 @@ pub(super) struct Scratch<E> {
     hits: Hits<E>,
     pixels: Columns<E>,
     obstacles: Obstacles,
-    sights: Vec<Item>,
+    sights: Picked,
 }
 
 /// What can stand in the way of each light.
 #[derive(Default)]
 struct Obstacles {
     of: Vec<InTheWay>,
-    /// The lists, one after another.
-    items: Vec<Item>,
     seen: Seen,
 }
 
-enum InTheWay {
-    Masked(u64),
-    /// From where to where the list goes.
-    Listed(usize, usize),
-    Anything,
+#[derive(Default)]
+struct InTheWay {
+    /// In a scene without a tree.
+    masks: Masks,
+    /// In one with a tree, if it is not too long.
+    list: Picked,
+    is_listed: bool,
 }
 
 impl<E: Real> Scratch<E> {
@@ -116,7 +117,7 @@ impl<E: Real> Scratch<E> {
             },
             pixels: columns(),
             obstacles: Obstacles::default(),
-            sights: Vec::new(),
+            sights: Picked::default(),
         }
     }
 }
@@ -179,25 +180,25 @@ pub(super) fn draw<S: Simd, E: Real, F: Features>(
     let Scratch { queues: [queue, next], hits, pixels, obstacles, sights } = scratch;
     next.count = 0;
     let candidates = match &scene.sights {
-        _ if scene.tree.is_none() => Candidates::Masked(tile.candidates),
-        Some(all) if all.gather(tile.place.0, tile.place.1, sights) => {
-            if sights.is_empty() {
+        Some(all) if F::TREE && all.gather(tile.place.0, tile.place.1, sights) => {
+            if sights.len() == 0 {
                 return fill(tile, band);
             }
-            Candidates::Listed(sights)
+            Candidates { masks: Masks::default(), list: Some(sights) }
         }
-        _ => Candidates::All,
+        _ => Candidates { masks: Masks::split(tile.candidates, scene), list: None },
     };
     first_generation::<S, E, F>(simd, scene, tile, candidates, band, hits, (&mut *queue, &mut *next));
     light_up::<S, E, F>(simd, scene, hits, obstacles);
     if F::MIRRORS && next.count > 0 {
         core::mem::swap(&mut hits.color, pixels);
         let (mut queue, mut next) = (queue, next);
+        let all = Candidates::all(scene);
         for bounce in 1..=MAX_BOUNCES {
             core::mem::swap(&mut queue, &mut next);
             next.count = 0;
             let after = (bounce < MAX_BOUNCES).then_some(&mut *next);
-            later_generation::<S, E, F>(simd, scene, Candidates::All, scene.background, hits, queue, after);
+            later_generation::<S, E, F>(simd, scene, all, scene.background, hits, queue, after);
             light_up::<S, E, F>(simd, scene, hits, obstacles);
             for ray in 0..queue.count {
                 let pixel = queue.pixel.0[ray].to_index();
@@ -424,39 +425,44 @@ fn trace<S: Simd, E: Real, F: Features, const EYE: bool>(
     let mut normal = zero;
     let mut diffuse = zero;
     let mut color = background;
-    let mut mirror = zero;
-    let mut mirrors = hit & !hit;
+    let mut mirror_bits = 0;
     let mut alone = u64::MAX;
     while remaining != 0 {
         let order = found.order[remaining.trailing_zeros() as usize];
         let entry = &scene.entries[order.to_index()];
         let same = hit & found.order.simd_eq(splat::<S, E>(simd, order));
+        let bits = same.to_bitmask();
         let surface = surface::<S, E, F, EYE>(simd, scene, entry, ray, found.distance);
         start = Vec3::select(same, surface.start, start);
         normal = Vec3::select(same, surface.normal, normal);
         diffuse = Vec3::select(same, Vec3::splat(simd, entry.diffuse), diffuse);
         color = Vec3::select(same, weigh::<S, E, EYE>(Vec3::splat(simd, entry.ambient), weight), color);
         if F::MIRRORS && entry.mirrors {
-            mirrors |= same;
-            mirror = Vec3::select(same, Vec3::splat(simd, entry.mirror), mirror);
+            mirror_bits |= bits;
         }
-        let bits = same.to_bitmask();
         alone &= if bits == hit.to_bitmask() { own_shadow::<E, EYE>(scene, entry) } else { u64::MAX };
         remaining &= !bits;
     }
-    region.include(hit, start);
-    start.store(&mut hits.start, at);
+    if F::SHADOWS && scene.needs.shadows {
+        region.include(hit, start);
+        start.store(&mut hits.start, at);
+    }
     normal.store(&mut hits.normal, at);
     weigh::<S, E, EYE>(diffuse, weight).store(&mut hits.diffuse, at);
     color.store(&mut hits.color, at);
     hits.packets.push((at, alone));
-    if !F::MIRRORS {
+    if !F::MIRRORS || mirror_bits == 0 {
         return;
     }
-    let bits = mirrors.to_bitmask();
     let Some(next) = next else { return };
-    if bits == 0 {
-        return;
+    let mut mirror = zero;
+    let mut mirrors = hit & !hit;
+    while mirror_bits != 0 {
+        let order = found.order[mirror_bits.trailing_zeros() as usize];
+        let same = hit & found.order.simd_eq(splat::<S, E>(simd, order));
+        mirrors |= same;
+        mirror = Vec3::select(same, Vec3::splat(simd, scene.entries[order.to_index()].mirror), mirror);
+        mirror_bits &= !same.to_bitmask();
     }
     // The normal faces the ray; where rounding says otherwise, the ray grazes.
     let towards = ray.direction.dot(normal).min(constant::<S, E>(simd, 0.0));
@@ -527,23 +533,22 @@ fn light_up<S: Simd, E: Real, F: Features>(
     simd.vectorize(
         #[inline(always)]
         || {
-            if hits.packets.is_empty() {
+            if hits.packets.is_empty() || scene.lights.is_empty() {
                 return;
             }
-            let Obstacles { of, items, seen } = obstacles;
-            of.clear();
-            items.clear();
-            for light in &scene.lights {
-                let from = items.len();
-                of.push(match &light.buffer {
-                    _ if scene.tree.is_none() => {
-                        InTheWay::Masked(in_the_way(simd, &light.outlines, beam(light, hits.low, hits.high)))
+            let Obstacles { of, seen } = obstacles;
+            of.resize_with(scene.lights.len(), InTheWay::default);
+            if F::SHADOWS && scene.needs.shadows {
+                for (light, of) in scene.lights.iter().zip(of.iter_mut()) {
+                    let beam = beam(light, hits.low, hits.high);
+                    if F::TREE && scene.tree.is_some() {
+                        let InTheWay { list, is_listed, .. } = of;
+                        *is_listed =
+                            light.buffer.as_ref().is_some_and(|buffer| buffer.gather(&beam, seen, list));
+                    } else {
+                        of.masks = Masks::split(in_the_way(simd, &light.outlines, beam), scene);
                     }
-                    Some(buffer) if buffer.gather(&beam(light, hits.low, hits.high), seen, items) => {
-                        InTheWay::Listed(from, items.len())
-                    }
-                    _ => InTheWay::Anything,
-                });
+                }
             }
             let zero = constant::<S, E>(simd, 0.0);
             for &(at, others) in &hits.packets {
@@ -556,12 +561,11 @@ fn light_up<S: Simd, E: Real, F: Features>(
                     if !lit.any_true() {
                         continue;
                     }
-                    let candidates = match *obstacles {
-                        InTheWay::Masked(bits) => Candidates::Masked(bits & others),
-                        InTheWay::Listed(from, to) => Candidates::Listed(&items[from..to]),
-                        InTheWay::Anything => Candidates::All,
-                    };
-                    if !candidates.are_none() {
+                    if F::SHADOWS && scene.needs.shadows {
+                        let candidates = Candidates {
+                            masks: obstacles.masks.and_spheres(others),
+                            list: obstacles.is_listed.then_some(&obstacles.list),
+                        };
                         lit = unshaded::<S, E, F>(simd, scene, light, start, lit, candidates);
                     }
                     sum = Vec3::splat(simd, light.color).scale_add(lit.select(cosine, zero), sum);

@@ -4,6 +4,8 @@
 //! error of [`Tree`]'s tests, so that the tree never hides what testing all objects would hit (Ize, "Robust BVH ray
 //! traversal", JCGT 2(2), 2013).
 
+use std::ops::Range;
+
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::builder::build_bvh2;
@@ -22,21 +24,46 @@ const LEAF: u32 = 4;
 pub(super) struct Node<E> {
     pub(super) low: [E; 3],
     pub(super) high: [E; 3],
-    /// The first child, next to which stands the second, or the first of the leaf's items.
-    pub(super) first: u32,
-    /// Items of a leaf; 0 for an inner node.
-    pub(super) count: u32,
+    /// The first child, next to which stands the second, or the first of the leaf's objects in the array of their kind.
+    first: u32,
+    /// Four times the number of a leaf's objects, and their kind; for an inner node the axis along which the first child
+    /// comes first.
+    content: u32,
+}
+
+/// What is in a node.
+pub(super) enum Content {
+    /// Objects of a kind, by their positions in its array.
+    Leaf(Kind, Range<usize>),
+    /// The first child, next to which stands the second, and the axis along which it comes first.
+    Children(u32, usize),
+}
+
+impl<E> Node<E> {
+    #[inline(always)]
+    pub(super) fn content(&self) -> Content {
+        let first = self.first as usize;
+        let (count, low) = (self.content >> 2, self.content & 3);
+        if count == 0 {
+            return Content::Children(self.first, low as usize);
+        }
+        let kind = match low {
+            0 => Kind::Sphere,
+            1 => Kind::Cuboid,
+            _ => Kind::Triangle,
+        };
+        Content::Leaf(kind, first..first + count as usize)
+    }
 }
 
 #[derive(Debug)]
 pub(super) struct Tree<E> {
     /// The root comes first.
     pub(super) nodes: Vec<Node<E>>,
-    /// Kind and position in the array of that kind, leaf by leaf.
-    pub(super) items: Vec<(Kind, u32)>,
 }
 
-/// A tree's shape: for each node its first child or item and its number of items; children come after their parents.
+/// A tree's shape: for each node its first child or solid and its number of solids, which are of one kind; children come
+/// after their parents.
 pub(super) struct Branches(Vec<(u32, u32)>);
 
 struct Bounds(Aabb);
@@ -47,9 +74,13 @@ impl Boundable for Bounds {
     }
 }
 
-/// All solids in one leaf.
-pub(super) fn stump(solids: &[Solid]) -> Branches {
-    Branches(vec![(0, solids.len() as u32)])
+/// All solids in one leaf a kind.
+pub(super) fn stump(solids: &[Solid]) -> (Vec<Solid>, Branches) {
+    let mut solids = solids.to_vec();
+    solids.sort_by_key(Solid::kind_rank);
+    let mut branches = vec![(0, 0)];
+    leaf(&mut branches, 0, &solids, 0);
+    (solids, Branches(branches))
 }
 
 /// Groups the solids: in the order of the leaves, and their shape. There is at least one.
@@ -63,7 +94,7 @@ pub(super) fn plant(solids: &[Solid]) -> (Vec<Solid>, Branches) {
     // Depth first, children side by side and after their parent.
     let mut branches = Vec::with_capacity(grown.nodes.len());
     branches.push((0, 0));
-    let mut order = Vec::with_capacity(solids.len());
+    let mut order: Vec<Solid> = Vec::with_capacity(solids.len());
     let mut pending = vec![(0usize, 0usize)];
     while let Some((node, at)) = pending.pop() {
         let node = &grown.nodes[node];
@@ -74,20 +105,33 @@ pub(super) fn plant(solids: &[Solid]) -> (Vec<Solid>, Branches) {
             branches.extend([(0, 0); 2]);
             pending.extend([(first + 1, children + 1), (first, children)]);
         } else {
-            branches[at] = (order.len() as u32, node.prim_count);
-            order.extend_from_slice(&grown.primitive_indices[first..first + node.prim_count as usize]);
+            let from = order.len();
+            let items = &grown.primitive_indices[first..first + node.prim_count as usize];
+            order.extend(items.iter().map(|&item| solids[item as usize]));
+            order[from..].sort_by_key(Solid::kind_rank);
+            leaf(&mut branches, at, &order[from..], from);
         }
     }
-    (map(&order, |&item| solids[item as usize]), Branches(branches))
+    (order, Branches(branches))
+}
+
+/// Makes a leaf of solids that are sorted by kind, and more where they are of several; `from` is the place of the first.
+fn leaf(branches: &mut Vec<(u32, u32)>, at: usize, solids: &[Solid], from: usize) {
+    let kind = solids[0].kind_rank();
+    let alike = solids.partition_point(|solid| solid.kind_rank() == kind);
+    if alike == solids.len() {
+        branches[at] = (from as u32, alike as u32);
+        return;
+    }
+    let children = branches.len();
+    branches[at] = (children as u32, 0);
+    branches.extend([(from as u32, alike as u32), (0, 0)]);
+    leaf(branches, children + 1, &solids[alike..], from + alike);
 }
 
 impl<E: Real> Tree<E> {
     /// `solids` are in the order of [`plant`].
     pub(super) fn new(branches: &Branches, solids: &[Solid], entries: &[Entry<E>]) -> Self {
-        let items = map(solids, |solid| {
-            let entry = &entries[solid.order as usize];
-            (entry.kind, entry.index)
-        });
         let branches = &branches.0;
         let mut bounds = vec![(DVec3::INFINITY, DVec3::NEG_INFINITY); branches.len()];
         for (at, &(first, count)) in branches.iter().enumerate().rev() {
@@ -101,13 +145,36 @@ impl<E: Real> Tree<E> {
         }
         // A ray's origin is rounded relative to the scene's size, which is 1, wherever the node lies.
         let slack = BOUNDS * E::ROUNDOFF;
-        let nodes = branches.iter().zip(&bounds).map(|(&(first, count), &(min, max))| Node {
-            low: (min - slack).to_array().map(E::narrow),
-            high: (max + slack).to_array().map(E::narrow),
-            first,
-            count,
-        });
-        Self { nodes: nodes.collect(), items }
+        // Children change places so that the first comes first along the axis on which they lie farthest apart.
+        let mut place: Vec<u32> = (0..branches.len() as u32).collect();
+        let mut axes = vec![0; branches.len()];
+        for (at, &(first, count)) in branches.iter().enumerate() {
+            if count == 0 {
+                let first = first as usize;
+                let middle = |(min, max): (DVec3, DVec3)| min + max;
+                let apart = middle(bounds[first + 1]) - middle(bounds[first]);
+                axes[at] = apart.abs().max_position() as u32;
+                if apart[axes[at] as usize] < 0.0 {
+                    place.swap(first, first + 1);
+                }
+            }
+        }
+        let node = |&from: &u32| {
+            let ((first, count), (min, max)) = (branches[from as usize], bounds[from as usize]);
+            let (first, content) = if count == 0 {
+                (first, axes[from as usize])
+            } else {
+                let entry = &entries[solids[first as usize].order as usize];
+                (entry.index, count << 2 | entry.kind as u32)
+            };
+            Node {
+                low: (min - slack).to_array().map(E::narrow),
+                high: (max + slack).to_array().map(E::narrow),
+                first,
+                content,
+            }
+        };
+        Self { nodes: place.iter().map(node).collect() }
     }
 }
 

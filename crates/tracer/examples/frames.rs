@@ -1,0 +1,49 @@
+//! Draws the first frame of a script a number of times on one thread, and prints the instructions that it was drawn
+//! with and a digest of the picture: what `rayfold-bench needs` counts.
+//!
+//! usage: frames SCRIPT TIMES auto|f32|f64
+
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program")]
+
+use std::hash::{DefaultHasher, Hasher};
+use std::process::ExitCode;
+
+use rayfold_scene::{Limits, Scene, parse};
+use rayfold_tracer::{Level, Precision, RenderError, RenderOptions, render};
+
+/// The exit code for a scene that needs what this build leaves out.
+const LEFT_OUT: u8 = 3;
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            let left_out = matches!(error.downcast_ref(), Some(RenderError::LeftOut { .. }));
+            ExitCode::from(if left_out { LEFT_OUT } else { 1 })
+        }
+    }
+}
+
+fn run() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [script, times, precision] = &arguments[..] else {
+        return Err("usage: frames SCRIPT TIMES auto|f32|f64".into());
+    };
+    let precision = match &precision[..] {
+        "f32" => Precision::F32,
+        "f64" => Precision::F64,
+        _ => Precision::Auto,
+    };
+    let parsed = parse(script, &std::fs::read(script)?, &Limits::default());
+    let scene: Scene = parsed.script.and_then(|script| script.frame(0)).ok_or("not a script")?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build()?;
+    let mut digest = DefaultHasher::new();
+    for _ in 0..times.parse()? {
+        let options = RenderOptions { precision, ..Default::default() };
+        let image = pool.install(|| render(&scene, &options))?;
+        digest.write(image.as_raw());
+    }
+    println!("{:?} {:016x}", Level::new(), digest.finish());
+    Ok(())
+}
