@@ -4,7 +4,10 @@
 //! window's corners) and where their rays start.
 
 use glam::DVec3;
+use rayfold_scene::model::unit;
 use rayfold_scene::{Camera, Screen};
+
+use crate::scale::below_inverse;
 
 /// A half-line; its direction is a unit vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,9 +33,10 @@ impl Rays {
     pub(crate) fn new(camera: &Camera, screen: Screen) -> Self {
         let Camera::Pinhole(pinhole) = camera else { return Self::Parallel };
         let (u, v, w) = pinhole.basis();
-        // Only the window's shape matters, so it is brought to the distance of 1: no product can overflow then.
-        let a = pinhole.lower_left() / pinhole.distance();
-        let b = pinhole.upper_right() / pinhole.distance();
+        // Only the window's shape matters, so it is scaled until no product can overflow.
+        let (a, b, distance) = (pinhole.lower_left(), pinhole.upper_right(), pinhole.distance());
+        let scale = below_inverse(a.abs().max(b.abs()).max_element().max(distance));
+        let (a, b, distance) = (a * scale, b * scale, (distance * scale).max(f64::MIN_POSITIVE));
         let axis = |from: f64, to: f64, samples: u32| {
             if samples == 1 {
                 (0.5 * from + 0.5 * to, 0.0)
@@ -42,7 +46,12 @@ impl Rays {
         };
         let (u0, du) = axis(a.x, b.x, screen.width());
         let (v0, dv) = axis(a.y, b.y, screen.height());
-        Self::Pinhole { eye: pinhole.eye(), corner: u0 * u + v0 * v - w, right: du * u, up: dv * v }
+        Self::Pinhole {
+            eye: pinhole.eye(),
+            corner: u0 * u + v0 * v - distance * w,
+            right: du * u,
+            up: dv * v,
+        }
     }
 
     /// The ray of column `i` from the left and row `j` from the bottom.
@@ -51,7 +60,7 @@ impl Rays {
         match *self {
             Self::Parallel => Ray { origin: DVec3::new(i, j, 0.0), direction: DVec3::NEG_Z },
             Self::Pinhole { eye, corner, right, up } => {
-                Ray { origin: eye, direction: (corner + i * right + j * up).normalize() }
+                Ray { origin: eye, direction: unit(corner + i * right + j * up) }
             }
         }
     }
@@ -73,16 +82,29 @@ mod tests {
     fn samples_sit_on_the_corners_of_the_window() {
         let screen = Screen::new(3, 2).unwrap();
         let rays = Rays::new(&pinhole(DVec2::new(-1.0, -2.0), DVec2::new(1.0, 2.0)), screen);
-        assert_eq!(rays.ray(0, 0).direction, DVec3::new(-1.0, -2.0, -1.0).normalize());
-        assert_eq!(rays.ray(2, 1).direction, DVec3::new(1.0, 2.0, -1.0).normalize());
-        assert_eq!(rays.ray(1, 1).direction, DVec3::new(0.0, 2.0, -1.0).normalize());
+        assert_eq!(rays.ray(0, 0).direction, unit(DVec3::new(-1.0, -2.0, -1.0)));
+        assert_eq!(rays.ray(2, 1).direction, unit(DVec3::new(1.0, 2.0, -1.0)));
+        assert_eq!(rays.ray(1, 1).direction, unit(DVec3::new(0.0, 2.0, -1.0)));
     }
 
     #[test]
     fn a_single_sample_is_the_middle() {
         let rays =
             Rays::new(&pinhole(DVec2::new(1.0, 3.0), DVec2::new(2.0, 5.0)), Screen::new(1, 1).unwrap());
-        assert_eq!(rays.ray(0, 0).direction, DVec3::new(1.5, 4.0, -1.0).normalize());
+        assert_eq!(rays.ray(0, 0).direction, unit(DVec3::new(1.5, 4.0, -1.0)));
+    }
+
+    #[test]
+    fn the_widest_and_the_narrowest_views_have_directions() {
+        let screen = Screen::new(3, 3).unwrap();
+        for (distance, half, expected) in [(1e-300, 1e300, DVec2::ONE), (1e300, 1e-300, DVec2::ZERO)] {
+            let half = DVec2::splat(half);
+            let camera = Pinhole::new(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, distance, -half, half).unwrap();
+            let rays = Rays::new(&Camera::Pinhole(camera), screen);
+            assert_eq!(rays.ray(1, 1).direction, DVec3::NEG_Z);
+            let corner = rays.ray(2, 2).direction;
+            assert!((corner.truncate() - expected.normalize_or_zero()).length() < 1e-15, "{corner}");
+        }
     }
 
     #[test]

@@ -20,6 +20,7 @@ mod camera;
 mod fast;
 mod parallel;
 pub mod reference;
+mod scale;
 
 pub use fast::probe;
 

@@ -10,6 +10,7 @@ use rayfold_scene::{Camera, Light, Object, Scene, Screen};
 
 use crate::RenderError;
 use crate::parallel::map;
+use crate::scale::below_inverse;
 
 /// The shape of an object.
 #[derive(Clone, Copy, Debug)]
@@ -55,19 +56,7 @@ pub(super) struct Geometry {
     pub(super) center: DVec3,
 }
 
-/// Sizes below this, in a scene of size 1, have products that vanish.
-const VANISHING: f64 = 1e-100;
-
 impl Geometry {
-    /// Whether the scene's sizes are so near to each other that their products are numbers.
-    pub(super) fn is_even(&self) -> bool {
-        self.solids.iter().all(|solid| {
-            let (min, max) = solid.bounds();
-            let size = (max - min).max_element();
-            size == 0.0 || size > VANISHING
-        })
-    }
-
     /// # Errors
     /// When the scene is so large that its size is not a number.
     pub(super) fn new(scene: &Scene) -> Result<Self, RenderError> {
@@ -84,7 +73,7 @@ impl Geometry {
         if !reach.is_finite() {
             return Err(RenderError::TooVast);
         }
-        let scale = power_of_two_below_inverse(reach);
+        let scale = below_inverse(reach);
         let view = view(scene, scale);
         let place = |point: DVec3| (point - center) * scale;
         let shapes = map(&scene.objects, |object| shape(object, place, scale));
@@ -157,16 +146,6 @@ fn reach(object: &Object, center: DVec3) -> f64 {
         Object::Cuboid(cuboid) => from(cuboid.min()).max(from(cuboid.max())),
         Object::Triangle(triangle) => triangle.vertices().iter().map(|v| from(*v)).fold(0.0, f64::max),
     }
-}
-
-/// The largest power of two whose product with `x` is at most 1; 1 for zero. Neither it nor its inverse overflows.
-fn power_of_two_below_inverse(x: f64) -> f64 {
-    if x == 0.0 {
-        return 1.0;
-    }
-    // From the bits, not by a logarithm: it must double exactly when x does.
-    let exponent = ((x.to_bits() >> 52) & 0x7ff) as i32 - 1022;
-    2f64.powi(-exponent.clamp(-1000, 1000))
 }
 
 fn shape(object: &Object, place: impl Fn(DVec3) -> DVec3, scale: f64) -> Option<Shape> {

@@ -227,7 +227,8 @@ fn affine<S: Simd, E: Real>(simd: S, (slope, start): ([E; 3], E), point: Vec3<S,
 }
 
 /// By the sides of its edges in Plücker coordinates, each with a bound on its error; the distance is that of the
-/// plane. A ray within the rounding error of the plane misses.
+/// plane, by the operations of a box's slab, so that one in the plane of a face is met where the face is. A ray within
+/// the rounding error of the plane misses.
 #[inline(always)]
 pub(super) fn triangle<S: Simd, E: Real>(
     simd: S,
@@ -246,7 +247,8 @@ pub(super) fn triangle<S: Simd, E: Real>(
     if inside.any_true() {
         let normal = Vec3::splat(simd, triangle.normal);
         let slope = normal.dot(ray.direction);
-        let distance = (splat::<S, E>(simd, triangle.height) - normal.dot(ray.origin)) / slope;
+        let above = splat::<S, E>(simd, triangle.height) - normal.dot(ray.origin);
+        let distance = above * (constant::<S, E>(simd, 1.0) / slope);
         let steep = slope.abs().simd_gt(constant::<S, E>(simd, GRAZING * E::ROUNDOFF));
         nearest.offer(simd, inside & steep & distance.simd_gt(zero), distance, triangle.order);
     }
@@ -265,7 +267,7 @@ pub(super) fn triangle_from_eye<S: Simd, E: Real>(
     let inside = a.min(b).min(affine(simd, c, direction)).simd_ge(zero);
     if inside.any_true() {
         let slope = Vec3::splat(simd, triangle.normal).dot(direction);
-        let distance = splat::<S, E>(simd, triangle.height) / slope;
+        let distance = splat::<S, E>(simd, triangle.height) * (constant::<S, E>(simd, 1.0) / slope);
         let steep = slope.abs().simd_gt(constant::<S, E>(simd, GRAZING * E::ROUNDOFF));
         nearest.offer(simd, inside & steep & distance.simd_gt(zero), distance, triangle.order);
     }

@@ -82,22 +82,13 @@ const MANY: usize = 512;
 /// # Errors
 /// Those of [`crate::render`].
 pub(crate) fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    let geometry = match Geometry::new(scene) {
-        Ok(geometry) if geometry.is_even() && has_kernels(options) => geometry,
+    let geometry = if has_kernels(options) { Geometry::new(scene).ok() } else { None };
+    let precision = |geometry| Some((geometry, precision::resolve(options.precision, geometry, scene)?));
+    match geometry.as_ref().and_then(precision) {
+        Some((geometry, Precision::F64)) => draw::<f64>(scene, geometry, options),
+        Some((geometry, _)) => draw::<f32>(scene, geometry, options),
         // Numbers that the kernels cannot hold are left to the tracer that takes them one by one.
-        _ => return crate::reference::render(scene, options),
-    };
-    match resolve(options.precision, &geometry, scene) {
-        Precision::F64 => draw::<f64>(scene, &geometry, options),
-        Precision::F32 | Precision::Auto => draw::<f32>(scene, &geometry, options),
-    }
-}
-
-/// The precision that is meant.
-fn resolve(precision: Precision, geometry: &Geometry, scene: &Scene) -> Precision {
-    match precision {
-        Precision::Auto => precision::choose(geometry, (scene.screen.width(), scene.screen.height())),
-        forced => forced,
+        None => crate::reference::render(scene, options),
     }
 }
 
@@ -114,10 +105,9 @@ fn has_kernels(_: &RenderOptions) -> bool {
 
 /// The precision that [`Precision::Auto`] stands for in a scene.
 pub(crate) fn precision(scene: &Scene) -> Precision {
-    match Geometry::new(scene) {
-        Ok(geometry) if geometry.is_even() => resolve(Precision::Auto, &geometry, scene),
-        _ => Precision::F64,
-    }
+    let geometry = Geometry::new(scene).ok();
+    let resolved = geometry.and_then(|geometry| precision::resolve(Precision::Auto, &geometry, scene));
+    resolved.unwrap_or(Precision::F64)
 }
 
 fn draw<E: Kernels>(

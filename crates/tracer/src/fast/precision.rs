@@ -1,12 +1,16 @@
-//! Whether single precision is enough for a scene.
+//! Which numbers a scene is traced with.
 //!
-//! Bounds on the rounding errors of the `f32` kernels are set against the size of a pixel: what moves an outline or a
-//! shadow by less than a small part of a pixel cannot be seen. Triangles and boxes need no bound of their own: their
-//! errors are relative to the distance of what is seen, as those of the directions are.
+//! Bounds on the rounding errors of the `f32` kernels are set against the size of a pixel and of a level: what moves an
+//! outline or a shadow by less than a small part of a pixel, or a colour by less than a part of a level, cannot be seen.
+//! Triangles and boxes need no bound of their own: their errors are relative to the distance of what is seen, as those
+//! of the directions are, and planes are met in their order. What the kernels' numbers cannot hold at all is known
+//! here too.
+
+use rayfold_scene::{Light, Scene};
 
 use super::geometry::{Geometry, Shape, Solid, View};
 use super::real::Real;
-use crate::Precision;
+use crate::{MAX_BOUNCES, Precision};
 
 /// Rounding errors that add up in a ray's direction, in roundoffs.
 const DIRECTION: f64 = 3.0;
@@ -23,42 +27,137 @@ const HARDLY_VISIBLE: f64 = 0.2;
 /// The error of a normal, as a sine, that stays below a quarter of a level.
 const SHADE: f64 = 1e-3;
 
-/// A sphere this much smaller than the scene has a square that single precision cannot hold.
-const SMALLEST: f64 = 1e-15;
+/// The brightness of a light on a surface at which the rounding of a cosine becomes a level.
+const BRIGHTEST: f64 = 1e3;
 
-pub(super) fn choose(geometry: &Geometry, size: (u32, u32)) -> Precision {
+/// The size of a pixel, as an angle, for an image of one.
+const ONE_PIXEL: f64 = 1e-3;
+
+/// What a kind of number can hold.
+struct Range {
+    /// A solid this much smaller than the scene has products that vanish.
+    least: f64,
+    /// Slopes of the window's corners that have squares, and colours that are sums of products.
+    most: f64,
+    /// Positions in the script are whole numbers.
+    count: usize,
+}
+
+const SINGLE: Range = Range { least: 1e-15, most: 1e15, count: 1 << f32::MANTISSA_DIGITS };
+const DOUBLE: Range = Range { least: 1e-100, most: 1e100, count: 1 << 32 };
+
+/// The numbers that are meant by a setting: never [`Precision::Auto`], and none if no kernel can hold the scene.
+pub(super) fn resolve(precision: Precision, geometry: &Geometry, scene: &Scene) -> Option<Precision> {
+    let colors = Colors::of(scene);
+    if !DOUBLE.holds(geometry, scene, &colors) {
+        return None;
+    }
+    let size = (scene.screen.width(), scene.screen.height());
+    let single = match precision {
+        Precision::F64 => false,
+        Precision::F32 => SINGLE.holds(geometry, scene, &colors),
+        Precision::Auto => SINGLE.holds(geometry, scene, &colors) && is_enough(geometry, size, &colors),
+    };
+    Some(if single { Precision::F32 } else { Precision::F64 })
+}
+
+impl Range {
+    fn holds(&self, geometry: &Geometry, scene: &Scene, colors: &Colors) -> bool {
+        let widest = match geometry.view {
+            View::Parallel { .. } => 1.0,
+            View::Pinhole { x, y, .. } => {
+                let (x, y) = widest((x, y), (scene.screen.width(), scene.screen.height()));
+                x.max(y)
+            }
+        };
+        let is_held = |solid: &Solid| {
+            let (min, max) = solid.bounds();
+            let size = (max - min).max_element();
+            size == 0.0 || size > self.least
+        };
+        // Written so that what is not a number is not held.
+        widest < self.most
+            && colors.largest < self.most
+            && scene.objects.len() < self.count
+            && geometry.solids.iter().all(is_held)
+    }
+}
+
+/// How bright a scene can become.
+struct Colors {
+    /// At least every sum of colours on the way to a pixel's.
+    largest: f64,
+    /// Light that a surface can scatter: what an error of a cosine is multiplied by.
+    scattered: f64,
+    /// Whether terms of different signs can cancel.
+    signed: bool,
+}
+
+impl Colors {
+    fn of(scene: &Scene) -> Self {
+        let arriving: f64 =
+            scene.lights.iter().map(|Light::Directional(light)| light.color().abs().max_element()).sum();
+        let (mut ambient, mut diffuse, mut mirror, mut least) = (0f64, 0f64, 0f64, 0f64);
+        for object in scene.objects.iter() {
+            let material = object.material();
+            ambient = ambient.max(material.ambient().abs().max_element());
+            diffuse = diffuse.max(material.diffuse().abs().max_element());
+            mirror = mirror.max(material.mirror().abs().max_element());
+            let signs = material.ambient().min(material.diffuse()).min(material.mirror());
+            least = least.min(signs.min_element());
+        }
+        for Light::Directional(light) in scene.lights.iter() {
+            least = least.min(light.color().min_element());
+        }
+        let scattered = arriving * diffuse;
+        let seen = |weight: f64, _| weight * mirror + ambient.max(1.0) + scattered;
+        let largest = (0..=MAX_BOUNCES).fold(1.0, seen).max(mirror.powi(MAX_BOUNCES as i32));
+        Self { largest, scattered, signed: least < 0.0 }
+    }
+}
+
+/// The largest slopes across and along the window.
+fn widest((x, y): ((f64, f64), (f64, f64)), size: (u32, u32)) -> (f64, f64) {
+    let of = |(start, step): (f64, f64), samples: u32| {
+        let end = start + step * f64::from(samples - 1);
+        start.abs().max(end.abs())
+    };
+    (of(x, size.0), of(y, size.1))
+}
+
+/// Whether the errors of single precision cannot be seen.
+fn is_enough(geometry: &Geometry, size: (u32, u32), colors: &Colors) -> bool {
     let roundoff = <f32 as Real>::ROUNDOFF;
+    // Where colours only add up, those that are not clipped in the end are sums of small ones.
+    if colors.scattered > BRIGHTEST || colors.signed && colors.largest > BRIGHTEST {
+        return false;
+    }
     // Pixels per unit: an angle from the eye, a length in parallel projection.
     let pixel = match geometry.view {
         View::Parallel { pixel, .. } => pixel,
         View::Pinhole { x, y, .. } => {
-            let widest = |(start, step): (f64, f64), samples: u32| {
-                let end = start + step * f64::from(samples - 1);
-                start.abs().max(end.abs())
-            };
-            let (across, along) = (widest(x, size.0), widest(y, size.1));
+            let (across, along) = widest((x, y), size);
             let farthest = 1.0 + across * across + along * along;
             let steps = [x.1, y.1].map(f64::abs).into_iter().filter(|step| *step > 0.0);
             // Pixels at the window's corners are the smallest from the eye.
-            steps.fold(f64::INFINITY, f64::min) / farthest
+            steps.reduce(f64::min).unwrap_or(ONE_PIXEL) / farthest
         }
     };
     let parallel = matches!(geometry.view, View::Parallel { .. });
     if !parallel && DIRECTION * roundoff > INVISIBLE * pixel {
-        return Precision::F64;
+        return false;
     }
+    let shade = SHADE / colors.scattered.max(1.0);
     let is_fine = |solid: &Solid| match solid.shape {
         Shape::Sphere { center, radius } => {
             let away = center.length();
             let error = POINT * roundoff * (away + radius);
             let nearest = if parallel { 1.0 } else { (away - radius).abs() };
             let seen = parallel || radius > 0.5 * pixel * away;
-            radius > SMALLEST
-                && error <= HARDLY_VISIBLE * pixel * nearest
-                && !(seen && error > SHADE * radius)
+            error <= HARDLY_VISIBLE * pixel * nearest && !(seen && error > shade * radius)
         }
         // Seen in parallel, what is far away is as large as what is near.
         _ => !parallel || POINT * roundoff * solid.magnitude() <= INVISIBLE * pixel,
     };
-    if geometry.solids.iter().all(is_fine) { Precision::F32 } else { Precision::F64 }
+    geometry.solids.iter().all(is_fine)
 }

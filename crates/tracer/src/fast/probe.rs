@@ -10,10 +10,10 @@ use rayfold_scene::Scene;
 use super::features::Everything;
 use super::geometry::Geometry;
 use super::intersect::Ray;
+use super::precision::resolve;
 use super::prepare::Prepared;
-use super::real::{Lanes, Real, Vec3, splat};
-use super::resolve;
-use super::search::{Candidates, nearest, unshaded};
+use super::real::{Lanes, Real, Vec3};
+use super::search::{Candidates, nearest};
 use super::tile::surface;
 use crate::{Precision, RenderError, RenderOptions};
 
@@ -41,36 +41,21 @@ pub fn nearest_hits(
     options: &RenderOptions,
 ) -> Result<Vec<Option<Found>>, RenderError> {
     let geometry = Geometry::new(scene)?;
-    match options.precision {
-        Precision::F64 => {
-            probe::<f64, Option<Found>>(scene, &geometry, rays, options, |batch, level, out| {
-                on!(level, simd => batch.nearest(simd, out));
-            })
-        }
-        _ => probe::<f32, Option<Found>>(scene, &geometry, rays, options, |batch, level, out| {
+    match resolve(options.precision, &geometry, scene) {
+        Some(Precision::F64) => probe::<f64>(scene, &geometry, rays, options, |batch, level, out| {
             on!(level, simd => batch.nearest(simd, out));
         }),
+        Some(_) => probe::<f32>(scene, &geometry, rays, options, |batch, level, out| {
+            on!(level, simd => batch.nearest(simd, out));
+        }),
+        None => Ok(rays.iter().map(|&(origin, direction)| one_by_one(scene, origin, direction)).collect()),
     }
 }
 
-/// Whether the first light reaches each point, for `(point, anything)`.
-///
-/// # Errors
-/// Those of [`crate::render`].
-pub fn lit(
-    scene: &Scene,
-    points: &[(DVec3, DVec3)],
-    options: &RenderOptions,
-) -> Result<Vec<bool>, RenderError> {
-    let geometry = Geometry::new(scene)?;
-    match resolve(options.precision, &geometry, scene) {
-        Precision::F64 => probe::<f64, bool>(scene, &geometry, points, options, |batch, level, out| {
-            on!(level, simd => batch.lit(simd, out));
-        }),
-        _ => probe::<f32, bool>(scene, &geometry, points, options, |batch, level, out| {
-            on!(level, simd => batch.lit(simd, out));
-        }),
-    }
+/// As pictures are traced whose numbers no kernel can hold.
+fn one_by_one(scene: &Scene, origin: DVec3, direction: DVec3) -> Option<Found> {
+    let hit = crate::reference::nearest(&scene.objects, origin, direction)?;
+    Some(Found { object: hit.object, distance: hit.distance, normal: hit.surface.normal })
 }
 
 struct Batch<'a, E> {
@@ -79,13 +64,13 @@ struct Batch<'a, E> {
     rays: &'a [(DVec3, DVec3)],
 }
 
-fn probe<E: Real, T>(
+fn probe<E: Real>(
     scene: &Scene,
     geometry: &Geometry,
     rays: &[(DVec3, DVec3)],
     options: &RenderOptions,
-    run: impl Fn(&Batch<E>, Level, &mut Vec<T>),
-) -> Result<Vec<T>, RenderError> {
+    run: impl Fn(&Batch<E>, Level, &mut Vec<Option<Found>>),
+) -> Result<Vec<Option<Found>>, RenderError> {
     let prepared = Prepared::<E>::new(scene, geometry, options.tree, super::SIDE)?;
     let mut out = Vec::with_capacity(rays.len());
     run(&Batch { scene: &prepared, geometry, rays }, options.level.unwrap_or_else(Level::new), &mut out);
@@ -155,29 +140,6 @@ impl<E: Real> Batch<'_, E> {
                         normal,
                     }));
                 }
-            },
-        );
-    }
-
-    #[inline(always)]
-    fn lit<S: Simd>(&self, simd: S, out: &mut Vec<bool>) {
-        let zero = splat::<S, E>(simd, E::narrow(0.0));
-        self.packets(
-            simd,
-            #[inline(always)]
-            |ray, _, count| {
-                let all = zero.simd_eq(zero);
-                let light = &self.scene.lights[0];
-                let lit = unshaded::<S, E, Everything>(
-                    simd,
-                    self.scene,
-                    light,
-                    ray.origin,
-                    all,
-                    Candidates::all(self.scene),
-                )
-                .to_bitmask();
-                out.extend((0..count).map(|lane| lit >> lane & 1 != 0));
             },
         );
     }

@@ -3,9 +3,11 @@
 //! Bounds on rounding errors are multiples of the unit roundoff and of the largest number that took part.
 
 use glam::{DVec3, Vec3Swizzles};
+use rayfold_scene::model::unit;
 use rayfold_scene::{Cuboid, Object, Sphere, Triangle};
 
 use crate::camera::Ray;
+use crate::scale::below_inverse;
 
 /// The largest relative error of one rounding.
 const ROUNDOFF: f64 = f64::EPSILON / 2.0;
@@ -66,8 +68,7 @@ fn ordinary(object: &Object, ray: Ray) -> Option<(Object, Ray, f64)> {
     if extent == 0.0 || (2f64.powi(-ORDINARY)..=2f64.powi(ORDINARY)).contains(&extent) {
         return Some((*object, ray, 1.0));
     }
-    // One step below the exponent's range, so that the scale of the smallest number is finite.
-    let scale = 2f64.powi(-(extent.log2().floor() as i32).clamp(-1022, 1022));
+    let scale = below_inverse(extent);
     let material = *object.material();
     let object = match object {
         Object::Sphere(s) => {
@@ -119,13 +120,10 @@ fn of_sphere(sphere: &Sphere, ray: Ray, distance: f64) -> Surface {
 
 /// Woop, Benthin, Wald, "Watertight ray/triangle intersection", JCGT 2(1), 2013.
 fn to_triangle(triangle: &Triangle, ray: Ray) -> Option<f64> {
-    if triangle_normal(triangle) == DVec3::ZERO {
-        return None;
-    }
     let (edges, depths) = sheared(triangle, ray);
     let outside = edges.iter().any(|&e| e < 0.0) && edges.iter().any(|&e| e > 0.0);
     let sum = edges.iter().sum::<f64>();
-    if outside || sum == 0.0 {
+    if outside || sum == 0.0 || triangle_normal(triangle) == DVec3::ZERO {
         return None;
     }
     let weighted: f64 = edges.iter().zip(depths).map(|(e, z)| e * z).sum();
@@ -163,16 +161,18 @@ fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
 
 /// Unit normal; zero where the area is nothing but rounding error.
 pub(crate) fn triangle_normal(triangle: &Triangle) -> DVec3 {
-    let [a, b, c] = *triangle.vertices();
-    let (p, q) = (b - a, c - a);
+    let largest = triangle.vertices().iter().fold(DVec3::ZERO, |m, v| m.max(v.abs())).max_element();
+    let scale = below_inverse(largest);
+    let [a, b, c] = triangle.vertices().map(|v| v * scale);
+    let level = |v: DVec3| v * below_inverse(v.abs().max_element());
+    let (p, q) = (level(b - a), level(c - a));
     let normal = DVec3::new(
         difference_of_products(p.y, q.z, p.z, q.y),
         difference_of_products(p.z, q.x, p.x, q.z),
         difference_of_products(p.x, q.y, p.y, q.x),
     );
-    let largest = a.abs().max(b.abs()).max(c.abs()).max_element();
-    let longest = p.length().max(q.length());
-    if normal.length() <= 8.0 * ROUNDOFF * largest * longest { DVec3::ZERO } else { normal.normalize() }
+    let noise = 8.0 * ROUNDOFF * p.length() * q.length();
+    if normal.length() <= noise { DVec3::ZERO } else { unit(normal) }
 }
 
 fn of_triangle(triangle: &Triangle, ray: Ray, distance: f64) -> Surface {
@@ -348,6 +348,16 @@ mod tests {
                 assert!((s.point.z - (r.origin.z - t)).abs() <= 1e-14 * scale);
                 assert!((s.normal.length() - 1.0).abs() < 1e-14 && s.normal.z > 0.0);
             }
+        }
+    }
+
+    #[test]
+    fn a_triangle_far_from_the_origin_has_its_area() {
+        for offset in [0.0, 1e6, 1e12, -1e15] {
+            let place = |x: f64, y: f64| [x + offset, y, 3.0 * offset];
+            let t = triangle(place(0.0, 0.0), place(1.0, 0.0), place(0.0, 1.0));
+            let origin = DVec3::new(0.25 + offset, 0.25, 3.0 * offset + 7.0);
+            assert_eq!(distance(&t, Ray { origin, direction: DVec3::NEG_Z }), Some(7.0), "at {offset:e}");
         }
     }
 

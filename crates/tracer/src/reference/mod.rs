@@ -91,16 +91,22 @@ fn color_along(scene: &Scene, ray: Ray, bounces: u32) -> DVec3 {
                 intersect::distance(object, Ray { origin: start, direction: towards }).is_some()
             });
         if lit {
-            color += light.color() * material.diffuse() * cosine;
+            color = held(color + light.color() * material.diffuse() * cosine);
         }
     }
     if bounces < MAX_BOUNCES && material.mirror() != DVec3::ZERO {
         // The normal faces the ray; where rounding says otherwise, the ray grazes.
         let towards_surface = ray.direction.dot(normal).min(0.0);
         let direction = (ray.direction - 2.0 * towards_surface * normal).normalize();
-        color += material.mirror() * color_along(scene, Ray { origin: start, direction }, bounces + 1);
+        let mirrored = color_along(scene, Ray { origin: start, direction }, bounces + 1);
+        color = held(color + material.mirror() * mirrored);
     }
     color
+}
+
+/// The largest number instead of infinity, from which nothing could be taken away.
+fn held(color: DVec3) -> DVec3 {
+    color.clamp(DVec3::MIN, DVec3::MAX)
 }
 
 /// Display values to the levels of a channel.
@@ -168,6 +174,18 @@ mod tests {
     fn levels_are_rounded_and_clamped() {
         assert_eq!(levels(DVec3::new(-1.0, 0.499 / 255.0, 0.501 / 255.0)), [0, 0, 1]);
         assert_eq!(levels(DVec3::new(2.0, f64::INFINITY, f64::NEG_INFINITY)), [255, 255, 0]);
+    }
+
+    #[test]
+    fn colours_beyond_all_numbers_cancel_none() {
+        let bright = Material::new(DVec3::splat(-1e308), DVec3::splat(1e308), DVec3::new(1e308, 0.0, 0.0));
+        let mut scene = one_pixel(vec![sphere(1.0, -5.0, bright.unwrap())], None);
+        let light = |color: f64| {
+            let light = DirectionalLight::new(DVec3::splat(color), DVec3::NEG_Z);
+            Light::Directional(light.unwrap())
+        };
+        scene.lights = vec![light(1e308), light(-1e308), light(1e308)].into();
+        assert_eq!(levels(color(&scene, 0, 0)), [255; 3]);
     }
 
     #[test]
