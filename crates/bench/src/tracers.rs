@@ -106,10 +106,22 @@ pub fn all() -> Vec<Tracer> {
     all
 }
 
-/// The truth first, then the ways between which the user can choose.
-pub fn for_pictures() -> Vec<Tracer> {
-    let packets = |(precision, name)| packets(name, RenderOptions { precision, ..Default::default() });
-    std::iter::once(reference()).chain(PRECISIONS.map(packets)).collect()
+/// The truth first, then the ways to compare with it, each following light through so many mirrors.
+pub(crate) fn for_pictures(bounces: u32) -> Vec<Tracer> {
+    let options = RenderOptions { bounces: Some(bounces), ..Default::default() };
+    let mut all = vec![reference_with(options), packets_by_the_textbook(options)];
+    all.extend(PRECISIONS.map(|(precision, name)| packets(name, RenderOptions { precision, ..options })));
+    all
+}
+
+/// The packets with formulas that know nothing of rounding.
+fn packets_by_the_textbook(options: RenderOptions<'static>) -> Tracer {
+    Tracer::new(
+        "f32 naive",
+        Arithmetic::Single,
+        |_, _| anyhow::bail!("only whole pictures are drawn by the textbook"),
+        move |scene| Ok(rayfold_tracer::render_naive(scene, &options)?),
+    )
 }
 
 const PRECISIONS: [(Precision, &str); 3] =
@@ -163,11 +175,15 @@ fn packet_nearest(scene: &Scene, rays: &[Ray], options: &RenderOptions) -> Hits 
 
 /// The plain `f64` tracer.
 pub fn reference() -> Tracer {
+    reference_with(RenderOptions::default())
+}
+
+fn reference_with(options: RenderOptions<'static>) -> Tracer {
     Tracer::new(
         "reference",
         Arithmetic::Double,
         |scene, rays| Ok(rays.iter().map(|ray| reference_nearest(scene, *ray)).collect()),
-        |scene| Ok(reference::render(scene, &RenderOptions::default())?),
+        move |scene| Ok(reference::render(scene, &options)?),
     )
 }
 

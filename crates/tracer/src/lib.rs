@@ -18,11 +18,15 @@
 
 mod camera;
 mod fast;
+#[cfg(feature = "accuracy")]
+mod nans;
 mod parallel;
 pub mod reference;
 mod scale;
 
 pub use fast::probe;
+#[cfg(feature = "accuracy")]
+pub use nans::take as take_nans;
 
 use std::sync::atomic::AtomicBool;
 
@@ -33,7 +37,7 @@ use rayfold_scene::Scene;
 /// Raised whenever any scene's pixels change, so that a picture can be known to be out of date.
 pub const PIXEL_VERSION: u32 = 1;
 
-/// How often light is mirrored before the mirror term is dropped.
+/// How often light is mirrored before the mirror term is dropped, in the language.
 pub const MAX_BOUNCES: u32 = 5;
 
 /// The numbers that a picture is computed with.
@@ -42,7 +46,7 @@ pub enum Precision {
     /// `f32` where bounds on its rounding errors say that they cannot be seen, otherwise `f64`.
     #[default]
     Auto,
-    /// Single precision, about twice as fast.
+    /// Single precision, about twice as fast; double where it cannot hold the scene's numbers at all.
     F32,
     /// Double precision.
     F64,
@@ -63,6 +67,15 @@ pub struct RenderOptions<'a> {
     pub tile: Option<(u32, u32)>,
     /// Whether to look for objects down a tree; always done for more than 64 objects.
     pub tree: Option<bool>,
+    /// How often light is mirrored before the mirror term is dropped: [`MAX_BOUNCES`], which is the language's, when not
+    /// set.
+    pub bounces: Option<u32>,
+}
+
+impl RenderOptions<'_> {
+    pub(crate) fn bounces(&self) -> u32 {
+        self.bounces.unwrap_or(MAX_BOUNCES)
+    }
 }
 
 /// Why there is no image.
@@ -101,4 +114,14 @@ pub fn precision(scene: &Scene) -> Precision {
 /// When the rendering was cancelled or the image cannot be held in memory.
 pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     fast::render(scene, options)
+}
+
+/// As [`render`] in single precision, by textbook formulas without any regard for rounding: what robustness is measured
+/// against. The machinery around them is the same.
+///
+/// # Errors
+/// Those of [`render`].
+#[cfg(feature = "accuracy")]
+pub fn render_naive(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
+    fast::render_naive(scene, options)
 }

@@ -4,20 +4,47 @@ use anyhow::{Context, Result};
 use glam::DVec3;
 use image::RgbImage;
 use rayfold_scene::Scene;
-use rayfold_tracer::reference;
+use rayfold_tracer::{MAX_BOUNCES, reference};
 use rayon::prelude::*;
 
 use super::flip::flip;
 use super::rays;
 use crate::cpu_time;
 use crate::oracle;
-use crate::tracers::Tracer;
+use crate::tracers::{self, Tracer};
 
-/// A way on a scene.
+/// The deepest recursion that is measured: what the error of stopping early is taken against.
+pub(crate) const DEEPEST: u32 = 16;
+
+/// A scene, and how to measure it.
+pub(crate) struct Subject {
+    pub(crate) name: String,
+    pub(crate) scene: Scene,
+    /// How often each image is drawn.
+    pub(crate) rounds: usize,
+    /// Pixels that the oracle draws as well.
+    pub(crate) samples: usize,
+    /// Whether every object is looked at for every ray of the truth; the f64 packets draw it where that takes too long.
+    pub(crate) plain: bool,
+}
+
+/// A way on a scene, at a depth.
 pub(crate) struct Measurement {
     pub(crate) tracer: String,
+    pub(crate) bounces: u32,
+    pub(crate) rays: u64,
     /// Of one image, on one thread: the median of the rounds.
     pub(crate) seconds: f64,
+    /// Against the truth of the same depth.
+    pub(crate) error: Error,
+    /// Root mean square against the truth of the greatest depth, in levels.
+    pub(crate) unfinished: f64,
+    /// Whether no other way and depth is both as fast and as close to the truth of the greatest depth.
+    pub(crate) on_front: bool,
+}
+
+/// The difference of two images.
+pub(crate) struct Error {
     /// In levels, over all channels.
     pub(crate) rmse: f64,
     /// In levels.
@@ -25,112 +52,161 @@ pub(crate) struct Measurement {
     /// Pixels off by more than 2 levels in a channel.
     pub(crate) off: usize,
     pub(crate) flip: f64,
-    /// Whether no other way is both as fast and as close.
-    pub(crate) on_front: bool,
+    /// Channels that were not a number before they became a level.
+    pub(crate) nans: u64,
 }
 
 /// All ways on a scene.
 pub(crate) struct Comparison {
     pub(crate) scene: String,
     pub(crate) objects: usize,
-    pub(crate) pixels: usize,
-    /// Camera, shadow and mirror rays of one image.
-    pub(crate) rays: u64,
+    pub(crate) size: (u32, u32),
+    /// Way by way, each from the least depth to the greatest; only the language's where nothing mirrors.
     pub(crate) measurements: Vec<Measurement>,
     pub(crate) truth: Truth,
 }
 
+impl Comparison {
+    pub(crate) fn pixels(&self) -> usize {
+        self.size.0 as usize * self.size.1 as usize
+    }
+
+    /// The measurements of the language's depth.
+    pub(crate) fn pictures(&self) -> impl Iterator<Item = &Measurement> {
+        self.measurements.iter().filter(|m| m.bounces == MAX_BOUNCES)
+    }
+}
+
 /// The error of the image that the others are compared with.
 pub(crate) struct Truth {
+    pub(crate) tracer: String,
     /// Pixels that the oracle drew as well.
     pub(crate) samples: usize,
-    /// Largest difference from the oracle in a channel, in levels before rounding; pixels that see another object apart.
+    /// Largest difference from the oracle in a channel, in levels; pixels that see another object apart.
     pub(crate) largest: f64,
-    /// Pixels that see or shade another object than the oracle: off by more than half a level.
+    /// Pixels that see or shade another object than the oracle: off by more than half a level (two, where the truth is an
+    /// image of whole levels).
     pub(crate) off: usize,
 }
 
-/// Draws the scene with every way in turn, `rounds` times. The first way draws the truth.
-pub(crate) fn compare(
-    name: &str,
-    scene: &Scene,
-    tracers: &[&Tracer],
-    rounds: usize,
-    samples: usize,
-) -> Result<Comparison> {
-    let (truth, others) = tracers.split_first().context("no way to trace")?;
-    let mut seconds = vec![Vec::new(); tracers.len()];
-    let mut images = Vec::new();
-    for round in 0..rounds {
-        for (tracer, seconds) in tracers.iter().zip(&mut seconds) {
-            let (time, image) = cpu_time::of(|| tracer.render(scene))?;
-            seconds.push(time);
-            if round == 0 {
-                images.push(image?);
+/// An image that waits to be judged.
+struct Drawn {
+    tracer: String,
+    depth: usize,
+    image: RgbImage,
+    nans: u64,
+    seconds: Vec<f64>,
+}
+
+/// Draws the scene with every way at every depth in turn.
+pub(crate) fn compare(subject: &Subject) -> Result<Comparison> {
+    let scene = &subject.scene;
+    let mirrors = scene.objects.iter().any(|object| object.material().mirror() != DVec3::ZERO);
+    let depths: Vec<u32> = if mirrors { (1..=DEEPEST).collect() } else { vec![MAX_BOUNCES] };
+    let ways: Vec<Vec<Tracer>> = depths.iter().map(|&bounces| tracers::for_pictures(bounces)).collect();
+    let truth_of = |ways: &[Tracer]| if subject.plain { 0 } else { ways.len() - 1 };
+    let mut drawn: Vec<Drawn> = Vec::new();
+    for way in 0..ways[0].len() {
+        for (depth, ways) in ways.iter().enumerate() {
+            let tracer = &ways[way];
+            if way == 0 && !subject.plain {
+                continue;
+            }
+            rayfold_tracer::take_nans();
+            let (seconds, image) = cpu_time::of(|| tracer.render(scene))?;
+            let (tracer, nans) = (tracer.name.clone(), rayfold_tracer::take_nans());
+            drawn.push(Drawn { tracer, depth, image: image?, nans, seconds: vec![seconds] });
+        }
+    }
+    for _ in 1..subject.rounds {
+        for one in &mut drawn {
+            // The plain tracer takes long, and its time is no figure of interest.
+            let tracer = ways[one.depth].iter().skip(1).find(|tracer| tracer.name == one.tracer);
+            if let Some(tracer) = tracer {
+                let (seconds, image) = cpu_time::of(|| tracer.render(scene))?;
+                image?;
+                one.seconds.push(seconds);
             }
         }
     }
-    let mut measurements: Vec<Measurement> = std::iter::once(truth)
-        .chain(others)
-        .zip(seconds)
-        .zip(&images)
-        .map(|((tracer, seconds), image)| measure(tracer, cpu_time::median(seconds), image, &images[0]))
+    let truth = &ways[0][truth_of(&ways[0])];
+    let truths: Vec<&RgbImage> =
+        drawn.iter().filter(|one| one.tracer == truth.name).map(|one| &one.image).collect();
+    let last = truths.last().context("no truth")?;
+    let counter = &ways[0][if subject.plain { 0 } else { ways[0].len() - 1 }];
+    let counts = rays::count(scene, counter, *depths.last().context("no depth")?)?;
+    let mut measurements: Vec<Measurement> = drawn
+        .par_iter()
+        .map(|one| Measurement {
+            tracer: one.tracer.clone(),
+            bounces: depths[one.depth],
+            rays: counts[depths[one.depth] as usize],
+            seconds: cpu_time::median(one.seconds.clone()),
+            error: Error { nans: one.nans, ..error(&one.image, truths[one.depth]) },
+            unfinished: rmse(&one.image, last),
+            on_front: false,
+        })
         .collect();
-    let costs: Vec<_> = measurements.iter().map(|m| (m.seconds, m.rmse)).collect();
+    let costs: Vec<_> = measurements.iter().map(|m| (m.seconds, m.unfinished)).collect();
     for m in &mut measurements {
         m.on_front = !costs.iter().any(|&(seconds, rmse)| {
-            seconds <= m.seconds && rmse <= m.rmse && (seconds < m.seconds || rmse < m.rmse)
+            seconds <= m.seconds && rmse <= m.unfinished && (seconds < m.seconds || rmse < m.unfinished)
         });
     }
+    let picture = depths.iter().position(|&depth| depth == MAX_BOUNCES).context("the language's depth")?;
     Ok(Comparison {
-        scene: name.into(),
+        scene: subject.name.clone(),
         objects: scene.objects.len(),
-        pixels: images[0].pixels().len(),
-        rays: rays::count(scene, truth)?,
+        size: truths[0].dimensions(),
         measurements,
-        truth: against_oracle(scene, samples),
+        truth: against_oracle(subject, truth, truths[picture]),
     })
 }
 
-fn measure(tracer: &Tracer, seconds: f64, image: &RgbImage, truth: &RgbImage) -> Measurement {
-    let mut squares = 0.0;
+fn error(image: &RgbImage, truth: &RgbImage) -> Error {
     let (mut largest, mut off) = (0, 0);
     for (a, b) in image.pixels().zip(truth.pixels()) {
-        let differences = [0, 1, 2].map(|c| a.0[c].abs_diff(b.0[c]));
-        squares += differences.iter().map(|&d| f64::from(d).powi(2)).sum::<f64>();
-        let worst = differences.into_iter().max().unwrap_or(0);
+        let worst = (0..3).map(|c| a.0[c].abs_diff(b.0[c])).max().unwrap_or(0);
         largest = largest.max(worst);
         off += usize::from(worst > 2);
     }
-    Measurement {
-        tracer: tracer.name.clone(),
-        seconds,
-        rmse: (squares / (3 * image.pixels().len()) as f64).sqrt(),
-        largest,
-        off,
-        flip: flip(image, truth),
-        on_front: false,
-    }
+    let flip = if largest == 0 { 0.0 } else { flip(image, truth) };
+    Error { rmse: rmse(image, truth), largest, off, flip, nans: 0 }
 }
 
-/// The plain tracer's colours against the oracle's, at pixels spread evenly over the image.
-fn against_oracle(scene: &Scene, samples: usize) -> Truth {
-    let (width, height) = (scene.screen.width(), scene.screen.height());
+fn rmse(image: &RgbImage, truth: &RgbImage) -> f64 {
+    let squares = |(a, b): (&image::Rgb<u8>, &image::Rgb<u8>)| -> f64 {
+        (0..3).map(|c| f64::from(a.0[c].abs_diff(b.0[c])).powi(2)).sum()
+    };
+    let sum: f64 = image.pixels().zip(truth.pixels()).map(squares).sum();
+    (sum / (3 * image.pixels().len()) as f64).sqrt()
+}
+
+/// The truth's colours against the oracle's, at pixels spread evenly over the image.
+fn against_oracle(subject: &Subject, tracer: &Tracer, image: &RgbImage) -> Truth {
+    let scene = &subject.scene;
+    let (width, height) = image.dimensions();
     let pixels = u64::from(width) * u64::from(height);
-    let step = (pixels as f64 / samples as f64).max(1.0);
-    let count = samples.min(pixels as usize);
+    let count = subject.samples.min(pixels as usize);
+    let step = pixels as f64 / count as f64;
     let displayed = |color: DVec3| 255.0 * color.clamp(DVec3::ZERO, DVec3::ONE);
     let errors: Vec<f64> = (0..count)
         .into_par_iter()
         .map(|k| {
-            let pixel = (k as f64 * step) as u64;
+            let pixel = ((k as f64 + 0.5) * step) as u64;
             let (i, j) = ((pixel % u64::from(width)) as u32, (pixel / u64::from(width)) as u32);
-            let (exact, computed) = (oracle::color(scene, i, j), reference::color(scene, i, j));
-            (displayed(exact) - displayed(computed)).abs().max_element()
+            let drawn = if subject.plain {
+                displayed(reference::color(scene, i, j))
+            } else {
+                DVec3::from_array(image.get_pixel(i, height - 1 - j).0.map(f64::from))
+            };
+            (displayed(oracle::color(scene, i, j)) - drawn).abs().max_element()
         })
         .collect();
-    let near = |e: &&f64| **e <= 0.5;
+    let other = if subject.plain { 0.5 } else { 2.0 };
+    let near = |e: &&f64| **e <= other;
     Truth {
+        tracer: tracer.name.clone(),
         samples: count,
         largest: errors.iter().filter(near).copied().fold(0.0, f64::max),
         off: errors.len() - errors.iter().filter(near).count(),

@@ -7,25 +7,33 @@ mod rays;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use anyhow::{Context, Result};
 use rayfold_tracer::MAX_BOUNCES;
 
-use crate::hard_cases::{CASES, SEED, Size};
+use crate::cpu_time::{self, median};
+use crate::hard_cases::{CASES, SEED, Size, one_of_each};
 use crate::plot::{Labels, Series, log_log};
 use crate::scenes::{EXAMPLES, example, rock, table};
 use crate::tracers;
-use images::{Comparison, compare};
+use images::{Comparison, DEEPEST, Measurement, Subject, compare};
 
 /// What to measure.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that receives accuracy.md and its plots
+    /// The folder that receives accuracy.md, or hard-cases.md, and plots
     #[arg(long, default_value = "docs/reports")]
     output: PathBuf,
-    /// Take the hard cases at the quick sizes of the tests, and each image once
+    /// Small images, each drawn once; hard cases at the sizes of the tests
     #[arg(long)]
     quick: bool,
+    /// The hard cases at full size, and not the images: half an hour
+    #[arg(long)]
+    hard_cases: bool,
+    /// Of the hard cases only this one
+    #[arg(long, requires = "hard_cases")]
+    case: Option<String>,
 }
 
 /// Measures and writes the report.
@@ -34,13 +42,21 @@ pub struct Args {
 /// When a scene cannot be rendered or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     std::fs::create_dir_all(&args.output)?;
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let comparisons = one.install(|| comparisons(args.quick))?;
-    let mut report = introduction(args.quick);
-    report += &image_tables(&comparisons)?;
-    plot_images(&args.output, &comparisons)?;
-    report += &hard_cases(if args.quick { Size::Quick } else { Size::Full })?;
-    let path = args.output.join("accuracy.md");
+    let (name, report) = if args.hard_cases {
+        ("hard-cases.md", hard_cases(if args.quick { Size::Quick } else { Size::Full }, args)?)
+    } else {
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+        let subjects = subjects(args.quick)?;
+        let mut comparisons = Vec::new();
+        for subject in &subjects {
+            eprintln!("scene {}", subject.name);
+            comparisons.push(one.install(|| compare(subject))?);
+        }
+        let cost = one.install(|| cost_of_robustness(&subjects, args.quick))?;
+        let plots = plots(&args.output, &comparisons)?;
+        ("accuracy.md", introduction(args.quick) + &cost + &plots + &tables(&comparisons)?)
+    };
+    let path = args.output.join(name);
     std::fs::write(&path, report).with_context(|| path.display().to_string())
 }
 
@@ -48,104 +64,174 @@ fn introduction(quick: bool) -> String {
     let command = if quick { " --quick" } else { "" };
     format!(
         "# Accuracy\n\n\
-         Written by `cargo run --release -p rayfold-bench -- accuracy{command}`; all figures are of one run.\n\n\
+         Written by `cargo run --release -p rayfold-bench -- accuracy{command}`; all figures are of one run. The hard \
+         cases at full size are in [hard-cases.md](hard-cases.md).\n\n\
          Every way to trace draws the same scenes on one thread, in turn, and its processor time is taken (the machine \
-         may be busy with other work; the median of the rounds is shown). The truth is the plain `f64` tracer \
-         (`reference`), whose own error is measured against an oracle that computes with 640 bits. `f32 naive` is a \
-         tracer of textbook formulas with an absolute epsilon, written for this report, scalar and without any tree: \
-         it shows what the hard cases find, its speed is not that of a packet tracer without robustness. The number \
-         of bounces is fixed by the language ({MAX_BOUNCES}), so depth is no setting.\n\n\
+         may be busy with other work; the median of the rounds is shown). `f32 naive` is the same packet machinery, tiles \
+         and trees with textbook formulas: quadratic roots, edges and slabs without error bounds, rays that start 1e-4 off \
+         their surface. `auto` is what users get: `f32 robust`, or `f64` where bounds on the errors of `f32` say so.\n\n\
+         The truth is the plain `f64` tracer (`reference`) at the same depth, whose own error is measured against an oracle \
+         that computes with 640 bits. *Depth* is how often light is followed through mirrors; {MAX_BOUNCES} is the \
+         language's. *Unfinished* is the root mean square of the difference from the truth at depth {DEEPEST}, rounding and \
+         stopping early together. *Front*: no other way and depth is both as fast and as close to that truth.\n\n\
          RMSE and the largest error are in levels (0 to 255) over the three channels; FLIP is the mean of LDR-FLIP \
-         (Andersson et al. 2020) at 67 pixels a degree. Images are of 8 bits, in which no NaN can hide: a NaN becomes \
-         level 0 and counts as an error. *Front*: no other way is both as fast and as close to the truth. Rays are \
-         those that the language asks for: from the camera, to each light that a surface faces, from mirrors.\n\n"
+         (Andersson et al. 2020) at 67 pixels a degree; NaN counts channels that were not a number before they became \
+         a level. Rays are those that the language asks for: from the camera, to each light that a surface faces, from \
+         mirrors. One sample a pixel: that is what scenes have as yet.\n\n"
     )
 }
 
-fn comparisons(quick: bool) -> Result<Vec<Comparison>> {
-    let tracers = tracers::for_pictures();
-    let naive = naive::tracer();
-    let mut ways: Vec<_> = tracers.iter().collect();
-    ways.push(&naive);
-    let (rounds, samples) = if quick { (1, 500) } else { (7, 4000) };
+fn subjects(quick: bool) -> Result<Vec<Subject>> {
+    let (rounds, samples) = if quick { (1, 200) } else { (5, 2000) };
+    let subject = |name: &str, scene| Subject { name: name.into(), scene, rounds, samples, plain: true };
     let mut all = Vec::new();
     for name in EXAMPLES {
-        eprintln!("scene {name}");
-        all.push(compare(name, &example(name)?, &ways, rounds, samples)?);
+        all.push(subject(name, example(name)?));
     }
-    eprintln!("scene table");
-    all.push(compare("table (22 spheres, mirrors)", &table(640, 480)?, &ways, rounds, samples)?);
-    eprintln!("scene rock");
-    let mesh = rock(if quick { 1280 } else { 20_480 }, 256, 256)?;
-    all.push(compare("rock (mesh)", &mesh, &ways, 1, samples / 50)?);
+    all.push(subject("table", if quick { table(160, 120)? } else { table(480, 360)? }));
+    for (name, scene) in one_of_each(if quick { 48 } else { 128 })? {
+        all.push(Subject { samples: samples / 20, ..subject(name, scene) });
+    }
+    let (plain, big) = if quick { (1280, 20_480) } else { (20_480, 327_680) };
+    all.push(Subject { samples: samples / 50, ..subject("rock", rock(plain, 128, 128)?) });
+    all.push(Subject { samples: 4, plain: false, ..subject("big mesh", rock(big, 512, 512)?) });
     Ok(all)
 }
 
-fn image_tables(comparisons: &[Comparison]) -> Result<String> {
-    let mut text = String::from("## Images\n\n![Error over time](accuracy-images.svg)\n");
-    for c in comparisons {
-        let truth = &c.truth;
-        write!(
-            text,
-            "\n### {}\n\n{} objects, {} pixels, {} rays. The truth's own error at {} pixels: largest {:.1e} levels; \
-             {} see something else than the oracle.\n\n\
-             | way | CPU s | Mrays/s | RMSE | largest | off by > 2 | FLIP | front |\n\
-             | --- | --- | --- | --- | --- | --- | --- | --- |\n",
-            c.scene, c.objects, c.pixels, c.rays, truth.samples, truth.largest, truth.off
-        )?;
-        for m in &c.measurements {
-            writeln!(
-                text,
-                "| {} | {:.4} | {:.2} | {:.4} | {} | {} ({:.4} %) | {:.5} | {} |",
-                m.tracer,
-                m.seconds,
-                c.rays as f64 / m.seconds / 1e6,
-                m.rmse,
-                m.largest,
-                m.off,
-                100.0 * m.off as f64 / c.pixels as f64,
-                m.flip,
-                if m.on_front { "yes" } else { "" }
-            )?;
+/// Robust formulas against naive ones, in pairs.
+fn cost_of_robustness(subjects: &[Subject], quick: bool) -> Result<String> {
+    let pairs = if quick { 3 } else { 31 };
+    let mut text = format!(
+        "## What robustness costs\n\nCPU time of `f32 robust` over that of `f32 naive`, both by packets, drawn in turn {pairs} \
+         times: the ratio of the fastest, and the median of the ratios.\n\n\
+         | scene | naive, ms | robust, ms | fastest | median |\n| --- | --- | --- | --- | --- |\n"
+    );
+    let ways = tracers::for_pictures(MAX_BOUNCES);
+    let find = |name: &str| ways.iter().find(|way| way.name == name).context("a way to trace");
+    let (naive, robust) = (find("f32 naive")?, find("f32 robust")?);
+    let named = |subject: &&Subject| EXAMPLES.contains(&subject.name.as_str());
+    let others = |subject: &&Subject| ["table", "rock", "big mesh"].contains(&subject.name.as_str());
+    for subject in subjects.iter().filter(|subject| named(subject) || others(subject)) {
+        let mut times = [Vec::new(), Vec::new()];
+        for round in 0..pairs {
+            // Each goes first every other time.
+            for way in [round % 2, 1 - round % 2] {
+                let (seconds, image) = cpu_time::of(|| [naive, robust][way].render(&subject.scene))?;
+                image?;
+                times[way].push(seconds);
+            }
         }
+        let ratios = times[1].iter().zip(&times[0]).map(|(robust, naive)| robust / naive).collect();
+        let [naive, robust] = times.map(|times| times.into_iter().fold(f64::INFINITY, f64::min));
+        writeln!(
+            text,
+            "| {} | {:.2} | {:.2} | {:.3} | {:.3} |",
+            subject.name,
+            1e3 * naive,
+            1e3 * robust,
+            robust / naive,
+            median(ratios)
+        )?;
     }
     text.push('\n');
     Ok(text)
 }
 
-/// Error over time, a colour a way, a point a scene. Images without any error are drawn at the bottom.
-fn plot_images(folder: &Path, comparisons: &[Comparison]) -> Result<()> {
-    const NONE: f64 = 1e-4;
-    let ways = comparisons.first().map_or(0, |c| c.measurements.len());
+fn tables(comparisons: &[Comparison]) -> Result<String> {
+    let mut text = String::from("## Images\n");
+    for c in comparisons {
+        let truth = &c.truth;
+        write!(
+            text,
+            "\n### {}\n\n{} objects, {} x {} pixels. The truth is drawn by `{}`; its own error at {} pixels: largest \
+             {:.1e} levels, {} see something else than the oracle.\n\n\
+             | way | depth | CPU ms | rays | Mrays/s | RMSE | largest | off by > 2 | FLIP | NaN | unfinished | front |\n\
+             | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+            c.scene, c.objects, c.size.0, c.size.1, truth.tracer, truth.samples, truth.largest, truth.off
+        )?;
+        for m in &c.measurements {
+            let e = &m.error;
+            writeln!(
+                text,
+                "| {} | {} | {:.2} | {} | {:.2} | {:.4} | {} | {} ({:.4} %) | {:.5} | {} | {:.4} | {} |",
+                m.tracer,
+                m.bounces,
+                1e3 * m.seconds,
+                m.rays,
+                m.rays as f64 / m.seconds / 1e6,
+                e.rmse,
+                e.largest,
+                e.off,
+                100.0 * e.off as f64 / c.pixels() as f64,
+                e.flip,
+                e.nans,
+                m.unfinished,
+                if m.on_front { "yes" } else { "" }
+            )?;
+        }
+    }
+    Ok(text)
+}
+
+/// Images without any error are drawn at the bottom.
+const NONE: f64 = 1e-4;
+
+/// Error over time: all scenes at the language's depth, and each scene of mirrors over all depths.
+fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
+    let mut text = String::from("## Error over time\n\n![Error over time](accuracy-images.svg)\n\n");
+    let ways = comparisons.first().map_or(0, |c| c.pictures().count());
+    let of_way = |way: usize| comparisons.iter().filter_map(move |c| c.pictures().nth(way));
     let series: Vec<Series> = (0..ways)
-        .map(|way| Series {
-            name: comparisons[0].measurements[way].tracer.clone(),
-            points: comparisons
-                .iter()
-                .map(|c| (c.measurements[way].seconds, c.measurements[way].rmse.max(NONE)))
-                .collect(),
-            joined: false,
+        .filter_map(|way| {
+            let points = of_way(way).map(|m| (m.seconds, m.error.rmse.max(NONE))).collect();
+            Some(Series { name: of_way(way).next()?.tracer.clone(), points, joined: false })
         })
+        .filter(|series| series.name != "reference")
         .collect();
     let labels = Labels {
-        title: "Error over time, one point a scene",
+        title: "Error over time at the language's depth, a point a scene",
         x: "CPU seconds an image",
         y: "RMSE in levels (1e-4: none)",
     };
-    log_log(&folder.join("accuracy-images.svg"), &labels, &series)
+    log_log(&folder.join("accuracy-images.svg"), &labels, &series)?;
+    for c in comparisons.iter().filter(|c| c.measurements.len() > ways) {
+        let mut series: Vec<Series> = Vec::new();
+        for m in c.measurements.iter().filter(|m| m.tracer != "reference") {
+            let point = |m: &Measurement| (m.seconds, m.unfinished.max(NONE));
+            match series.last_mut() {
+                Some(last) if last.name == m.tracer => last.points.push(point(m)),
+                _ => series.push(Series { name: m.tracer.clone(), points: vec![point(m)], joined: true }),
+            }
+        }
+        let file = format!("accuracy-{}.svg", c.scene.replace(' ', "-"));
+        let title = format!("{}: error over time, depth 1 to {DEEPEST}", c.scene);
+        let labels = Labels {
+            title: &title,
+            x: "CPU seconds an image",
+            y: "RMSE in levels against depth 16 (1e-4: none)",
+        };
+        log_log(&folder.join(&file), &labels, &series)?;
+        writeln!(text, "![{title}]({file})\n")?;
+    }
+    Ok(text)
 }
 
-/// The hard cases as a table, and the error over the distance as a plot.
-fn hard_cases(size: Size) -> Result<String> {
+/// The hard cases as a table.
+fn hard_cases(size: Size, args: &Args) -> Result<String> {
     let mut tracers = tracers::all();
     tracers.push(naive::tracer());
+    let quick = if size == Size::Quick { " --quick" } else { "" };
     let mut text = format!(
-        "## Hard cases\n\nSeed {SEED}. A figure is the worst or the count found. The bounds are those of \
-         `tests/hard_cases.rs`, which holds every way but the naive one to them.\n\n\
+        "# Hard cases\n\nWritten by `cargo run --release -p rayfold-bench -- accuracy --hard-cases{quick}`; all figures are \
+         of one run. Seed {SEED}. A figure is the worst or the count found. The bounds are those of \
+         `tests/hard_cases.rs`, which holds every way but the naive one to them at quick sizes. `f32 naive, scalar` is a \
+         tracer of textbook formulas with an absolute epsilon, written for this table.\n\n\
          | case | what | way | figure | bound | of | |\n| --- | --- | --- | --- | --- | --- | --- |\n"
     );
-    for case in CASES {
-        eprintln!("hard case {}: {}", case.number, case.title);
+    let chosen = |number: &str| args.case.as_ref().is_none_or(|case| case == number);
+    let mut times = String::from("\nSeconds by the clock that each case took, all ways together:");
+    for case in CASES.iter().filter(|case| chosen(case.number)) {
+        let began = Instant::now();
         for figure in case.figures(&tracers, size)? {
             let bound = figure.bound.map_or("none".into(), |bound| format!("{bound:.1e}"));
             let verdict = if figure.passes() { "ok" } else { "**fails**" };
@@ -155,6 +241,8 @@ fn hard_cases(size: Size) -> Result<String> {
                 case.number, case.title, figure.what, figure.tracer, figure.measured, figure.samples
             )?;
         }
+        eprintln!("hard case {}: {}, {:.1} s", case.number, case.title, began.elapsed().as_secs_f64());
+        write!(times, " {}: {:.0};", case.number, began.elapsed().as_secs_f64())?;
     }
-    Ok(text)
+    Ok(text + times.trim_end_matches(';') + ".\n")
 }

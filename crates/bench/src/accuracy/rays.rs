@@ -1,18 +1,20 @@
 //! How many rays a scene takes.
 
 use anyhow::Result;
+use glam::DVec3;
 use rayfold_scene::{Light, Scene, model::unit};
-use rayfold_tracer::MAX_BOUNCES;
 
 use crate::scenes::pixel_ray;
 use crate::tracers::{Ray, Tracer};
 
-/// Rays from the camera, to lights and from mirrors: what the language asks for, whatever a tracer saves.
-pub(crate) fn count(scene: &Scene, tracer: &Tracer) -> Result<u64> {
+/// Rays from the camera, to lights and from mirrors, followed through 0, 1, 2 and so on up to `bounces` mirrors: what
+/// the language asks for, whatever a tracer saves.
+pub(crate) fn count(scene: &Scene, tracer: &Tracer, bounces: u32) -> Result<Vec<u64>> {
     let (width, height) = (scene.screen.width(), scene.screen.height());
     let mut rays: Vec<Ray> = (0..width * height).map(|k| pixel_ray(scene, k % width, k / width)).collect();
+    let mut counts = Vec::new();
     let mut total = 0;
-    for bounce in 0..=MAX_BOUNCES {
+    for _ in 0..=bounces {
         total += rays.len() as u64;
         let mut mirrored = Vec::new();
         for (ray, hit) in rays.iter().zip(tracer.nearest(scene, &rays)?) {
@@ -23,13 +25,14 @@ pub(crate) fn count(scene: &Scene, tracer: &Tracer) -> Result<u64> {
                 normal.dot(-unit(light.direction())) > 0.0
             };
             total += scene.lights.iter().filter(lit).count() as u64;
-            if scene.objects[hit.object].material().mirror() != glam::DVec3::ZERO && bounce < MAX_BOUNCES {
+            if scene.objects[hit.object].material().mirror() != DVec3::ZERO {
                 let direction = ray.direction - 2.0 * ray.direction.dot(normal) * normal;
                 let origin = ray.origin + hit.t * (1.0 - 1e-9) * ray.direction;
                 mirrored.push(Ray { origin, direction: direction.normalize() });
             }
         }
+        counts.push(total);
         rays = mirrored;
     }
-    Ok(total)
+    Ok(counts)
 }

@@ -9,6 +9,7 @@ mod bounces;
 mod boxes;
 mod extremes;
 mod images;
+mod nasty;
 mod spheres;
 mod ties;
 mod triangles;
@@ -21,6 +22,8 @@ use rayfold_scene::{Camera, Object, Scene, Screen};
 
 use crate::oracle;
 use crate::tracers::{Arithmetic, Hit, Ray, Tracer};
+
+pub(crate) use nasty::one_of_each;
 
 /// Where all random numbers of the cases come from.
 pub const SEED: u64 = 20_240_607;
@@ -140,6 +143,7 @@ pub const CASES: &[Case] = &[
     Case { number: "22", title: "grazing light on a coarse mesh", run: images::grazing_light },
     Case { number: "23", title: "mirror spheres face to face", run: bounces::face_to_face },
     Case { number: "24", title: "identical objects", run: ties::identical },
+    Case { number: "25", title: "random scenes", run: nasty::scenes },
 ];
 
 /// A random number generator of a case's own.

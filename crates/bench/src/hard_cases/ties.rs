@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 use glam::DVec3;
-use rayfold_scene::{Cuboid, Material, Object, Sphere, Triangle};
+use rayfold_scene::{Cuboid, Material, Object, Screen, Sphere, Triangle};
 
-use super::{Figures, Size, aimed, direction, objects_only, random};
+use super::{Figures, Size, aimed, direction, objects_only, objects_seen, random};
 use crate::tracers::Tracer;
 
 /// Each object of a scene several times over, in mixed order: every hit is that of the first copy.
@@ -43,7 +43,55 @@ pub(super) fn identical(tracers: &[Tracer], size: Size, figures: &mut Figures) -
             anyhow::ensure!(4 * hits.iter().flatten().count() > rays.len(), "too few rays meet anything");
         }
     }
-    faces(tracers, size, figures)
+    faces(tracers, size, figures)?;
+    pictures(tracers, size, figures)
+}
+
+/// Later copies are bright and first ones are dark, whatever the number of threads.
+fn pictures(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    let mut rng = random(241);
+    let side = size.pick(70, 500);
+    let mut scenes = Vec::new();
+    for copies in [3, 6, 40] {
+        let spots: Vec<DVec3> = (0..9).map(|_| 3.0 * direction(&mut rng)).collect();
+        let mut order: Vec<usize> = (0..9 * copies).map(|k| k % 9).collect();
+        rng.shuffle(&mut order);
+        let objects: Result<Vec<_>> = order
+            .iter()
+            .enumerate()
+            .map(|(at, &kind)| {
+                let late = order[..at].contains(&kind);
+                let shown = DVec3::splat(if late { 1.0 } else { 0.25 });
+                let surface = Material::new(shown, DVec3::ZERO, DVec3::ZERO)?;
+                let spot = spots[kind];
+                Ok(match kind % 3 {
+                    0 => Object::Sphere(Sphere::new(0.8, spot, surface)?),
+                    1 => Object::Cuboid(Cuboid::new([spot - 0.7, spot + 0.7], surface)?),
+                    _ => {
+                        let vertices = [spot + DVec3::X, spot - DVec3::X, spot + DVec3::new(0.2, 1.0, 0.4)];
+                        Object::Triangle(Triangle::new(vertices, surface)?)
+                    }
+                })
+            })
+            .collect();
+        let mut scene = objects_seen(objects?, DVec3::new(0.5, 1.0, 8.0), DVec3::ZERO, 1.2)?;
+        scene.screen = Screen::new(side, side)?;
+        scenes.push(scene);
+    }
+    for threads in [1, 2, 5] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+        for tracer in tracers {
+            let (mut late, mut seen) = (0, 0);
+            for scene in &scenes {
+                let image = pool.install(|| tracer.render(scene))?;
+                late += image.pixels().filter(|pixel| pixel.0[0] > 64).count();
+                seen += image.pixels().filter(|pixel| pixel.0[0] > 0).count();
+            }
+            anyhow::ensure!(seen > 0, "the pictures are empty");
+            figures.add(tracer, format!("pixels of a later copy, {threads} threads"), seen, late as f64, 0.0);
+        }
+    }
+    Ok(())
 }
 
 /// Faces of two boxes and two triangles in one plane that is square to the rays: computed distances are equal.

@@ -3,13 +3,14 @@
 use anyhow::Result;
 use glam::DVec3;
 use rayfold_scene::{Limits, Material, Object, Triangle};
+use rayon::prelude::*;
 
 use super::{
     Figures, Size, aimed, direction, objects_only, objects_seen, random, truths, unless_single, worse,
 };
 use crate::oracle::edge_clearance;
 use crate::scenes::{icosphere, single};
-use crate::tracers::{Ray, Tracer};
+use crate::tracers::{Arithmetic, Ray, Tracer};
 
 fn triangle(vertices: [DVec3; 3]) -> Result<Object> {
     Ok(Object::Triangle(Triangle::new(vertices, Material::default())?))
@@ -34,26 +35,53 @@ fn escapes(
     seed: u64,
     what: &str,
     figures: &mut Figures,
-    target: impl Fn(&[DVec3; 3], &mut fastrand::Rng) -> DVec3,
+    target: impl Fn(&[DVec3; 3], &mut fastrand::Rng) -> DVec3 + Sync,
 ) -> Result<()> {
     let (faces, objects) = shell(count, &mut random(seed))?;
     let centre = faces.iter().flatten().sum::<DVec3>() / (3 * faces.len()) as f64;
     let scene = objects_seen(objects, single(centre), faces[0][0], 1.0)?;
-    for tracer in tracers {
-        let mut rng = random(seed);
-        let (mut left, mut escaped) = (rays, 0);
-        while left > 0 {
-            let batch: Vec<Ray> = (0..left.min(BATCH))
-                .map(|_| {
-                    aimed(centre + direction(&mut rng), target(&faces[rng.usize(0..faces.len())], &mut rng))
-                })
-                .collect();
-            escaped += tracer.nearest(&scene, &batch)?.iter().filter(|hit| hit.is_none()).count();
-            left -= batch.len();
-        }
+    let escaped = in_batches(tracers, rays, seed, |tracer, rng, rays| {
+        let batch: Vec<Ray> = (0..rays)
+            .map(|_| aimed(centre + direction(rng), target(&faces[rng.usize(0..faces.len())], rng)))
+            .collect();
+        Ok(tracer.nearest(&scene, &batch)?.iter().filter(|hit| hit.is_none()).count())
+    })?;
+    for (tracer, (rays, escaped)) in tracers.iter().zip(escaped) {
         figures.add(tracer, format!("cracks in {} faces, {what}", faces.len()), rays, escaped as f64, 0.0);
     }
     Ok(())
+}
+
+/// Rays that every way goes through.
+const BY_ALL: usize = 1_000_000;
+
+/// How many rays each way went through, of `total`, and how many `wrong` counts; batch by batch on all cores. A batch
+/// has random numbers of its own, the same for every way.
+///
+/// The way that pictures are made goes through all rays; those that differ from it in numbers, width or tiles alone
+/// stop after [`BY_ALL`].
+fn in_batches(
+    tracers: &[Tracer],
+    total: usize,
+    seed: u64,
+    wrong: impl Fn(&Tracer, &mut fastrand::Rng, usize) -> Result<usize> + Sync,
+) -> Result<Vec<(usize, usize)>> {
+    let chosen = tracers.iter().position(|tracer| tracer.arithmetic == Arithmetic::Chosen);
+    tracers
+        .iter()
+        .enumerate()
+        .map(|(k, tracer)| {
+            let total = if Some(k) == chosen { total } else { total.min(BY_ALL) };
+            let wrong = (0..total.div_ceil(BATCH))
+                .into_par_iter()
+                .map(|batch| {
+                    let mut rng = random(seed * 1_000_000 + batch as u64);
+                    wrong(tracer, &mut rng, BATCH.min(total - batch * BATCH))
+                })
+                .sum::<Result<usize>>()?;
+            Ok((total, wrong))
+        })
+        .collect()
 }
 
 /// From inside a closed surface towards its edges.
@@ -223,32 +251,24 @@ pub(super) fn tree_or_not(tracers: &[Tracer], size: Size, figures: &mut Figures)
         .collect::<Result<_>>()?;
     let scene = objects_only(objects.clone())?;
     let parts = objects.chunks(EACH).map(|part| objects_only(part.to_vec())).collect::<Result<Vec<_>>>()?;
-    let total = size.pick(4000, 1_000_000);
-    let mut different = vec![0; tracers.len()];
-    let mut left = total;
-    while left > 0 {
-        let rays: Vec<Ray> = (0..left.min(BATCH))
-            .map(|_| aimed(8.0 * direction(&mut rng), 4.0 * direction(&mut rng)))
-            .collect();
-        for (tracer, different) in tracers.iter().zip(&mut different) {
-            let mut nearest: Vec<Option<(usize, f64)>> = vec![None; rays.len()];
-            for (k, part) in parts.iter().enumerate() {
-                for (best, hit) in nearest.iter_mut().zip(tracer.nearest(part, &rays)?) {
-                    let hit = hit.map(|hit| (k * EACH + hit.object, hit.t));
-                    *best = match (*best, hit) {
-                        (Some(best), Some(hit)) => Some(if hit.1 < best.1 { hit } else { best }),
-                        (best, hit) => best.or(hit),
-                    };
-                }
+    let different = in_batches(tracers, size.pick(4000, 100_000_000), 17, |tracer, rng, rays| {
+        let rays: Vec<Ray> = (0..rays).map(|_| aimed(8.0 * direction(rng), 4.0 * direction(rng))).collect();
+        let mut nearest: Vec<Option<(usize, f64)>> = vec![None; rays.len()];
+        for (k, part) in parts.iter().enumerate() {
+            for (best, hit) in nearest.iter_mut().zip(tracer.nearest(part, &rays)?) {
+                let hit = hit.map(|hit| (k * EACH + hit.object, hit.t));
+                *best = match (*best, hit) {
+                    (Some(best), Some(hit)) => Some(if hit.1 < best.1 { hit } else { best }),
+                    (best, hit) => best.or(hit),
+                };
             }
-            let down_the_tree = tracer.nearest(&scene, &rays)?;
-            let pairs = down_the_tree.iter().zip(&nearest);
-            *different += pairs.filter(|(a, b)| a.map(|a| a.object) != b.map(|b| b.0)).count();
         }
-        left -= rays.len();
-    }
-    for (tracer, different) in tracers.iter().zip(different) {
-        figures.add(tracer, "another object than without a tree", total, different as f64, 0.0);
+        let down_the_tree = tracer.nearest(&scene, &rays)?;
+        let pairs = down_the_tree.iter().zip(&nearest);
+        Ok(pairs.filter(|(a, b)| a.map(|a| a.object) != b.map(|b| b.0)).count())
+    })?;
+    for (tracer, (rays, different)) in tracers.iter().zip(different) {
+        figures.add(tracer, "another object than without a tree", rays, different as f64, 0.0);
     }
     Ok(())
 }

@@ -75,13 +75,18 @@ fn nearest_on(objects: &[Object], line: &Line, start: &Real) -> Option<Hit> {
 
 /// The colour of a pixel, unclamped; `i` counts from the left, `j` from the bottom.
 pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
-    color_along(scene, &pixel(&scene.camera, scene.screen, i, j), &Real::zero(), 0)
+    color_at(scene, f64::from(i), f64::from(j))
+}
+
+/// The colour beside a pixel, where the ray of a fractional index goes.
+pub fn color_at(scene: &Scene, x: f64, y: f64) -> DVec3 {
+    color_along(scene, &pixel(&scene.camera, scene.screen, x, y), &Real::zero(), 0)
         .map_or(scene.background(), |color| color.to_dvec3())
 }
 
 /// Which object a pixel shows, and its normal there.
 pub fn first_hit(scene: &Scene, i: u32, j: u32) -> Option<(usize, DVec3)> {
-    let line = pixel(&scene.camera, scene.screen, i, j);
+    let line = pixel(&scene.camera, scene.screen, f64::from(i), f64::from(j));
     nearest_on(&scene.objects, &line, &Real::zero()).map(|hit| (hit.object, hit.normal.to_dvec3()))
 }
 
@@ -155,25 +160,23 @@ fn largest(scene: &Scene) -> f64 {
 }
 
 /// The ray of a pixel, in the words of the language.
-fn pixel(camera: &Camera, screen: Screen, i: u32, j: u32) -> Line {
+fn pixel(camera: &Camera, screen: Screen, x: f64, y: f64) -> Line {
     let Camera::Pinhole(pinhole) = camera else {
-        return Line {
-            origin: DVec3::new(f64::from(i), f64::from(j), 0.0).into(),
-            direction: DVec3::NEG_Z.into(),
-        };
+        return Line { origin: DVec3::new(x, y, 0.0).into(), direction: DVec3::NEG_Z.into() };
     };
     let w = Vector::from(pinhole.gaze()).opposite().unit();
     let u = Vector::from(pinhole.up()).cross(&w).unit();
     let v = w.cross(&u);
-    let along = |from: f64, to: f64, index: u32, count: u32| {
+    let along = |from: f64, to: f64, index: f64, count: u32| {
         let (from, to) = (Real::from(from), Real::from(to));
-        let (index, last) = if count == 1 { (1, 2) } else { (index, count - 1) };
-        let part = Real::from(f64::from(index)).over(&Real::from(f64::from(last)));
+        // A single sample is the middle; beside it is as near as in an image of a thousand.
+        let (index, last) = if count == 1 { (index + 500.0, 1000.0) } else { (index, f64::from(count - 1)) };
+        let part = Real::from(index).over(&Real::from(last));
         &from + &(&(&to - &from) * &part)
     };
     let (a, b) = (pinhole.lower_left(), pinhole.upper_right());
-    let across = along(a.x, b.x, i, screen.width());
-    let upward = along(a.y, b.y, j, screen.height());
+    let across = along(a.x, b.x, x, screen.width());
+    let upward = along(a.y, b.y, y, screen.height());
     let nowhere = Vector::from(DVec3::ZERO);
     let direction = nowhere.plus(&across, &u).plus(&upward, &v).plus(&-&Real::from(pinhole.distance()), &w);
     Line { origin: pinhole.eye().into(), direction: direction.unit() }

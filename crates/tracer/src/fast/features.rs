@@ -3,6 +3,7 @@
 //! The one place that knows the crate's cargo features: a constant here takes what is left out of a build out of every
 //! kernel, and a scene that needs it is refused.
 
+use super::intersect::Formulas;
 use crate::RenderError;
 
 /// What a scene has.
@@ -45,7 +46,7 @@ impl Needs {
 }
 
 /// What a kernel can draw; what it cannot is not compiled into its loops.
-pub(super) trait Features: 'static {
+pub(super) trait Features: Formulas + 'static {
     const CUBOIDS: bool;
     const TRIANGLES: bool;
     const MIRRORS: bool;
@@ -58,6 +59,8 @@ macro_rules! kernels {
         $(
             $(#[$doc])*
             pub(super) struct $name;
+
+            impl Formulas for $name {}
 
             impl Features for $name {
                 const CUBOIDS: bool = $cuboids && BUILT.cuboids;

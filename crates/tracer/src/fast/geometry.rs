@@ -10,14 +10,26 @@ use rayfold_scene::{Camera, Light, Object, Scene, Screen};
 
 use crate::RenderError;
 use crate::parallel::map;
+use crate::reference::power;
 use crate::scale::below_inverse;
 
 /// The shape of an object.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Shape {
-    Sphere { center: DVec3, radius: f64 },
-    Cuboid { min: DVec3, max: DVec3 },
-    Triangle { vertices: [DVec3; 3], normal: DVec3 },
+    /// `power` is that of the eye: |center|² - radius², as exact as a number can be.
+    Sphere {
+        center: DVec3,
+        radius: f64,
+        power: f64,
+    },
+    Cuboid {
+        min: DVec3,
+        max: DVec3,
+    },
+    Triangle {
+        vertices: [DVec3; 3],
+        normal: DVec3,
+    },
 }
 
 /// An object and its position in the script.
@@ -76,7 +88,7 @@ impl Geometry {
         let scale = below_inverse(reach);
         let view = view(scene, scale);
         let place = |point: DVec3| (point - center) * scale;
-        let shapes = map(&scene.objects, |object| shape(object, place, scale));
+        let shapes = map(&scene.objects, |object| shape(object, place, center, scale));
         let solids = shapes.into_iter().enumerate();
         let solids = solids.filter_map(|(order, shape)| Some(Solid { shape: shape?, order: order as u32 }));
         let suns = scene
@@ -110,7 +122,7 @@ impl Solid {
     /// The least box around it.
     pub(super) fn bounds(&self) -> (DVec3, DVec3) {
         match self.shape {
-            Shape::Sphere { center, radius } => (center - radius, center + radius),
+            Shape::Sphere { center, radius, .. } => (center - radius, center + radius),
             Shape::Cuboid { min, max } => (min, max),
             Shape::Triangle { vertices: [a, b, c], .. } => (a.min(b).min(c), a.max(b).max(c)),
         }
@@ -125,7 +137,7 @@ impl Solid {
     /// How far the solid reaches along `direction`: the largest `direction · point`.
     pub(super) fn support(&self, direction: DVec3) -> f64 {
         match self.shape {
-            Shape::Sphere { center, radius } => direction.dot(center) + radius * direction.length(),
+            Shape::Sphere { center, radius, .. } => direction.dot(center) + radius * direction.length(),
             Shape::Cuboid { min, max } => (direction * min).max(direction * max).element_sum(),
             Shape::Triangle { vertices, .. } => {
                 vertices.iter().map(|v| direction.dot(*v)).fold(f64::NEG_INFINITY, f64::max)
@@ -148,11 +160,13 @@ fn reach(object: &Object, center: DVec3) -> f64 {
     }
 }
 
-fn shape(object: &Object, place: impl Fn(DVec3) -> DVec3, scale: f64) -> Option<Shape> {
+fn shape(object: &Object, place: impl Fn(DVec3) -> DVec3, eye: DVec3, scale: f64) -> Option<Shape> {
     Some(match object {
-        Object::Sphere(sphere) => {
-            Shape::Sphere { center: place(sphere.center()), radius: sphere.radius() * scale }
-        }
+        Object::Sphere(sphere) => Shape::Sphere {
+            center: place(sphere.center()),
+            radius: sphere.radius() * scale,
+            power: power(eye, sphere, scale),
+        },
         Object::Cuboid(cuboid) => Shape::Cuboid { min: place(cuboid.min()), max: place(cuboid.max()) },
         Object::Triangle(triangle) => {
             let vertices = triangle.vertices().map(&place);

@@ -55,7 +55,7 @@ impl<S: Simd, E: Real> Nearest<S, E> {
     }
 
     #[inline(always)]
-    fn offer(&mut self, simd: S, hit: Mask<S, E>, distance: Lanes<S, E>, order: E) {
+    pub(super) fn offer(&mut self, simd: S, hit: Mask<S, E>, distance: Lanes<S, E>, order: E) {
         let order = splat::<S, E>(simd, order);
         let first = distance.simd_eq(self.distance) & order.simd_lt(self.order);
         let take = hit & (distance.simd_lt(self.distance) | first);
@@ -92,57 +92,208 @@ impl<S: Simd, E: Real> Moment<S, E> {
     }
 }
 
-/// Haines, Günther, Akenine-Möller, "Precision improvements for ray/sphere intersection", Ray Tracing Gems ch. 7.
+/// The formulas of each kind: where rays meet it first, and its surface there.
 ///
-/// The subtraction that is left costs no more than the origin's own rounding.
-#[inline(always)]
-pub(super) fn sphere<S: Simd, E: Real>(
-    simd: S,
-    sphere: &Sphere<E>,
-    ray: Ray<S, E>,
-    nearest: &mut Nearest<S, E>,
-) {
-    let zero = constant::<S, E>(simd, 0.0);
-    let to_center = Vec3::splat(simd, sphere.center).sub(ray.origin);
-    let middle = to_center.dot(ray.direction);
-    let closest = ray.direction.scale_sub(middle, to_center);
-    let rest = splat::<S, E>(simd, sphere.square) - closest.dot(closest);
-    let meets = rest.simd_ge(zero);
-    if meets.any_true() {
-        let half_chord = rest.sqrt();
-        let near = middle - half_chord;
-        let distance = near.simd_gt(zero).select(near, middle + half_chord);
-        nearest.offer(simd, meets & distance.simd_gt(zero), distance, sphere.order);
-    }
-}
-
-/// As [`sphere`], with the second root from the eye's power, so that a sphere next to the eye is as exact as one far
-/// away.
-#[inline(always)]
-pub(super) fn sphere_from_eye<S: Simd, E: Real>(
-    simd: S,
-    sphere: &Sphere<E>,
-    direction: Vec3<S, E>,
-    nearest: &mut Nearest<S, E>,
-) {
-    let zero = constant::<S, E>(simd, 0.0);
-    let center = Vec3::splat(simd, sphere.center);
-    let middle = center.dot(direction);
-    let closest = direction.scale_sub(middle, center);
-    let rest = splat::<S, E>(simd, sphere.square) - closest.dot(closest);
-    let meets = rest.simd_ge(zero);
-    let ahead = middle.simd_gt(zero);
-    let power = splat::<S, E>(simd, sphere.power);
-    if sphere.power > E::narrow(0.0) {
-        let hit = meets & ahead;
-        if hit.any_true() {
-            nearest.offer(simd, hit, power / (middle + rest.sqrt()), sphere.order);
+/// These are robust; whoever has others to compare with puts them in their place.
+pub(super) trait Formulas {
+    /// Haines, Günther, Akenine-Möller, "Precision improvements for ray/sphere intersection", Ray Tracing Gems ch. 7.
+    ///
+    /// The subtraction that is left costs no more than the origin's own rounding.
+    #[inline(always)]
+    fn sphere<S: Simd, E: Real>(simd: S, sphere: &Sphere<E>, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+        let zero = constant::<S, E>(simd, 0.0);
+        let to_center = Vec3::splat(simd, sphere.center).sub(ray.origin);
+        let middle = to_center.dot(ray.direction);
+        let closest = ray.direction.scale_sub(middle, to_center);
+        let rest = splat::<S, E>(simd, sphere.square) - closest.dot(closest);
+        let meets = rest.simd_ge(zero);
+        if meets.any_true() {
+            let half_chord = rest.sqrt();
+            let near = middle - half_chord;
+            let distance = near.simd_gt(zero).select(near, middle + half_chord);
+            nearest.offer(simd, meets & distance.simd_gt(zero), distance, sphere.order);
         }
-    } else {
-        let half_chord = rest.sqrt();
-        let far = ahead.select(middle + half_chord, middle - half_chord);
-        let distance = ahead.select(far, power / far);
-        nearest.offer(simd, meets & distance.simd_gt(zero), distance, sphere.order);
+    }
+
+    /// As [`Formulas::sphere`], with the second root from the eye's power, so that a sphere next to the eye is as exact as one far
+    /// away.
+    #[inline(always)]
+    fn sphere_from_eye<S: Simd, E: Real>(
+        simd: S,
+        sphere: &Sphere<E>,
+        direction: Vec3<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
+        let zero = constant::<S, E>(simd, 0.0);
+        let center = Vec3::splat(simd, sphere.center);
+        let middle = center.dot(direction);
+        let closest = direction.scale_sub(middle, center);
+        let rest = splat::<S, E>(simd, sphere.square) - closest.dot(closest);
+        let meets = rest.simd_ge(zero);
+        let ahead = middle.simd_gt(zero);
+        let power = splat::<S, E>(simd, sphere.power);
+        if sphere.power > E::narrow(0.0) {
+            let hit = meets & ahead;
+            if hit.any_true() {
+                nearest.offer(simd, hit, power / (middle + rest.sqrt()), sphere.order);
+            }
+        } else {
+            let half_chord = rest.sqrt();
+            let far = ahead.select(middle + half_chord, middle - half_chord);
+            let distance = ahead.select(far, power / far);
+            nearest.offer(simd, meets & distance.simd_gt(zero), distance, sphere.order);
+        }
+    }
+
+    #[inline(always)]
+    fn cuboid<S: Simd, E: Real>(
+        simd: S,
+        cuboid: &Cuboid<E>,
+        ray: Ray<S, E>,
+        slopes: Slopes<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
+        let zero = constant::<S, E>(simd, 0.0);
+        let (near, leave) = slabs(simd, cuboid, ray, slopes);
+        let enter = near.x.max(near.y).max(near.z);
+        let hit = enter.simd_le(leave * constant::<S, E>(simd, 1.0 + LATE * E::ROUNDOFF));
+        if hit.any_true() {
+            let distance = enter.simd_gt(zero).select(enter, leave);
+            nearest.offer(simd, hit & distance.simd_gt(zero), distance, cuboid.order);
+        }
+    }
+
+    /// By the sides of its edges in Plücker coordinates, each with a bound on its error; the distance is that of the
+    /// plane, by the operations of a box's slab, so that one in the plane of a face is met where the face is. A ray within
+    /// the rounding error of the plane misses.
+    #[inline(always)]
+    fn triangle<S: Simd, E: Real>(
+        simd: S,
+        triangle: &Triangle<E>,
+        ray: Ray<S, E>,
+        moment: Moment<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
+        let zero = constant::<S, E>(simd, 0.0);
+        let (a_left, a_right) = side(simd, &triangle.edges[0], ray, moment);
+        let (b_left, b_right) = side(simd, &triangle.edges[1], ray, moment);
+        let (c_left, c_right) = side(simd, &triangle.edges[2], ray, moment);
+        let left = a_left.min(b_left).min(c_left).simd_ge(zero);
+        let right = a_right.max(b_right).max(c_right).simd_le(zero);
+        let inside = left | right;
+        if inside.any_true() {
+            let normal = Vec3::splat(simd, triangle.normal);
+            let slope = normal.dot(ray.direction);
+            let above = splat::<S, E>(simd, triangle.height) - normal.dot(ray.origin);
+            let distance = above * (constant::<S, E>(simd, 1.0) / slope);
+            let steep = slope.abs().simd_gt(constant::<S, E>(simd, GRAZING * E::ROUNDOFF));
+            nearest.offer(simd, inside & steep & distance.simd_gt(zero), distance, triangle.order);
+        }
+    }
+
+    #[inline(always)]
+    fn triangle_from_eye<S: Simd, E: Real>(
+        simd: S,
+        triangle: &Triangle<E>,
+        direction: Vec3<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
+        let zero = constant::<S, E>(simd, 0.0);
+        let [a, b, c] = triangle.from_eye;
+        let (a, b) = (affine(simd, a, direction), affine(simd, b, direction));
+        let inside = a.min(b).min(affine(simd, c, direction)).simd_ge(zero);
+        if inside.any_true() {
+            let slope = Vec3::splat(simd, triangle.normal).dot(direction);
+            let distance = splat::<S, E>(simd, triangle.height) * (constant::<S, E>(simd, 1.0) / slope);
+            let steep = slope.abs().simd_gt(constant::<S, E>(simd, GRAZING * E::ROUNDOFF));
+            nearest.offer(simd, inside & steep & distance.simd_gt(zero), distance, triangle.order);
+        }
+    }
+
+    #[inline(always)]
+    fn sphere_surface<S: Simd, E: Real, const EYE: bool>(
+        simd: S,
+        sphere: &Sphere<E>,
+        ray: Ray<S, E>,
+        distance: Lanes<S, E>,
+    ) -> Surface<S, E> {
+        let center = Vec3::splat(simd, sphere.center);
+        let to_center = if EYE { center } else { center.sub(ray.origin) };
+        let outward = ray.direction.scale_sub(distance, to_center).normalize(simd);
+        let outside =
+            Surface { start: outward.scale_add(splat::<S, E>(simd, sphere.outer), center), normal: outward };
+        if EYE && sphere.power > E::narrow(0.0) {
+            return outside;
+        }
+        let inside = if EYE {
+            let zero = constant::<S, E>(simd, 0.0);
+            zero.simd_eq(zero)
+        } else {
+            to_center.dot(to_center).simd_lt(splat::<S, E>(simd, sphere.square))
+        };
+        if !EYE && !inside.any_true() {
+            return outside;
+        }
+        let away = inside.select(splat::<S, E>(simd, sphere.inner), splat::<S, E>(simd, sphere.outer));
+        let side = inside.select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0));
+        Surface { start: outward.scale_add(away, center), normal: outward.scale(side) }
+    }
+
+    #[inline(always)]
+    fn triangle_surface<S: Simd, E: Real>(
+        simd: S,
+        triangle: &Triangle<E>,
+        ray: Ray<S, E>,
+        distance: Lanes<S, E>,
+        roundoffs: f64,
+    ) -> Surface<S, E> {
+        let normal = Vec3::splat(simd, triangle.normal);
+        let zero = constant::<S, E>(simd, 0.0);
+        let point = ray.direction.scale_add(distance, ray.origin);
+        let height = splat::<S, E>(simd, triangle.height);
+        let above = normal.dot(point) - height;
+        let side = normal
+            .dot(ray.direction)
+            .simd_gt(zero)
+            .select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0));
+        let offset =
+            offset(simd, point, roundoffs) + height.abs() * constant::<S, E>(simd, roundoffs * E::ROUNDOFF);
+        Surface { start: normal.scale_add(side * offset - above, point), normal: normal.scale(side) }
+    }
+
+    #[inline(always)]
+    fn cuboid_surface<S: Simd, E: Real>(
+        simd: S,
+        cuboid: &Cuboid<E>,
+        ray: Ray<S, E>,
+        slopes: Slopes<S, E>,
+        distance: Lanes<S, E>,
+        roundoffs: f64,
+    ) -> Surface<S, E> {
+        let zero = constant::<S, E>(simd, 0.0);
+        let (min, max) = (Vec3::splat(simd, cuboid.min), Vec3::splat(simd, cuboid.max));
+        let (near, leave) = slabs(simd, cuboid, ray, slopes);
+        let enter = near.x.max(near.y).max(near.z);
+        let entering = enter.simd_gt(zero);
+        let d = ray.direction;
+        let out = min.sub(ray.origin).mul(slopes.inverse);
+        let other = max.sub(ray.origin).mul(slopes.inverse);
+        let out_x = d.x.simd_ne(zero) & out.x.max(other.x).simd_eq(leave);
+        let out_y = d.y.simd_ne(zero) & out.y.max(other.y).simd_eq(leave);
+        let is_x = (entering & near.x.simd_eq(enter)) | (!entering & out_x);
+        let is_y = !is_x & ((entering & near.y.simd_eq(enter)) | (!entering & out_y));
+        let is_z = !is_x & !is_y;
+        let point = d.scale_add(distance, ray.origin);
+        let point = Vec3::<S, E>::new(
+            point.x.max(min.x).min(max.x),
+            point.y.max(min.y).min(max.y),
+            point.z.max(min.z).min(max.z),
+        );
+        let (x, nx) = face::<S, E>(simd, is_x, d.x.simd_gt(zero), entering, (min.x, max.x), point.x);
+        let (y, ny) = face::<S, E>(simd, is_y, d.y.simd_gt(zero), entering, (min.y, max.y), point.y);
+        let (z, nz) = face::<S, E>(simd, is_z, d.z.simd_gt(zero), entering, (min.z, max.z), point.z);
+        let (point, normal) = (Vec3::<S, E>::new(x, y, z), Vec3::<S, E>::new(nx, ny, nz));
+        Surface { start: normal.scale_add(offset(simd, point, roundoffs), point), normal }
     }
 }
 
@@ -188,24 +339,6 @@ fn along<S: Simd, E: Real>(
 /// 2(2), 2013).
 const LATE: f64 = 8.0;
 
-#[inline(always)]
-pub(super) fn cuboid<S: Simd, E: Real>(
-    simd: S,
-    cuboid: &Cuboid<E>,
-    ray: Ray<S, E>,
-    slopes: Slopes<S, E>,
-    nearest: &mut Nearest<S, E>,
-) {
-    let zero = constant::<S, E>(simd, 0.0);
-    let (near, leave) = slabs(simd, cuboid, ray, slopes);
-    let enter = near.x.max(near.y).max(near.z);
-    let hit = enter.simd_le(leave * constant::<S, E>(simd, 1.0 + LATE * E::ROUNDOFF));
-    if hit.any_true() {
-        let distance = enter.simd_gt(zero).select(enter, leave);
-        nearest.offer(simd, hit & distance.simd_gt(zero), distance, cuboid.order);
-    }
-}
-
 /// The least and the most that the ray's side of an edge can be.
 #[inline(always)]
 fn side<S: Simd, E: Real>(
@@ -224,53 +357,6 @@ fn side<S: Simd, E: Real>(
 #[inline(always)]
 fn affine<S: Simd, E: Real>(simd: S, (slope, start): ([E; 3], E), point: Vec3<S, E>) -> Lanes<S, E> {
     Vec3::splat(simd, slope).dot_add(point, splat::<S, E>(simd, start))
-}
-
-/// By the sides of its edges in Plücker coordinates, each with a bound on its error; the distance is that of the
-/// plane, by the operations of a box's slab, so that one in the plane of a face is met where the face is. A ray within
-/// the rounding error of the plane misses.
-#[inline(always)]
-pub(super) fn triangle<S: Simd, E: Real>(
-    simd: S,
-    triangle: &Triangle<E>,
-    ray: Ray<S, E>,
-    moment: Moment<S, E>,
-    nearest: &mut Nearest<S, E>,
-) {
-    let zero = constant::<S, E>(simd, 0.0);
-    let (a_left, a_right) = side(simd, &triangle.edges[0], ray, moment);
-    let (b_left, b_right) = side(simd, &triangle.edges[1], ray, moment);
-    let (c_left, c_right) = side(simd, &triangle.edges[2], ray, moment);
-    let left = a_left.min(b_left).min(c_left).simd_ge(zero);
-    let right = a_right.max(b_right).max(c_right).simd_le(zero);
-    let inside = left | right;
-    if inside.any_true() {
-        let normal = Vec3::splat(simd, triangle.normal);
-        let slope = normal.dot(ray.direction);
-        let above = splat::<S, E>(simd, triangle.height) - normal.dot(ray.origin);
-        let distance = above * (constant::<S, E>(simd, 1.0) / slope);
-        let steep = slope.abs().simd_gt(constant::<S, E>(simd, GRAZING * E::ROUNDOFF));
-        nearest.offer(simd, inside & steep & distance.simd_gt(zero), distance, triangle.order);
-    }
-}
-
-#[inline(always)]
-pub(super) fn triangle_from_eye<S: Simd, E: Real>(
-    simd: S,
-    triangle: &Triangle<E>,
-    direction: Vec3<S, E>,
-    nearest: &mut Nearest<S, E>,
-) {
-    let zero = constant::<S, E>(simd, 0.0);
-    let [a, b, c] = triangle.from_eye;
-    let (a, b) = (affine(simd, a, direction), affine(simd, b, direction));
-    let inside = a.min(b).min(affine(simd, c, direction)).simd_ge(zero);
-    if inside.any_true() {
-        let slope = Vec3::splat(simd, triangle.normal).dot(direction);
-        let distance = splat::<S, E>(simd, triangle.height) * (constant::<S, E>(simd, 1.0) / slope);
-        let steep = slope.abs().simd_gt(constant::<S, E>(simd, GRAZING * E::ROUNDOFF));
-        nearest.offer(simd, inside & steep & distance.simd_gt(zero), distance, triangle.order);
-    }
 }
 
 /// A point in a light's own axes.
@@ -360,94 +446,8 @@ pub(super) struct Surface<S: Simd, E: Real> {
 }
 
 #[inline(always)]
-pub(super) fn sphere_surface<S: Simd, E: Real, const EYE: bool>(
-    simd: S,
-    sphere: &Sphere<E>,
-    ray: Ray<S, E>,
-    distance: Lanes<S, E>,
-) -> Surface<S, E> {
-    let center = Vec3::splat(simd, sphere.center);
-    let to_center = if EYE { center } else { center.sub(ray.origin) };
-    let outward = ray.direction.scale_sub(distance, to_center).normalize(simd);
-    let outside =
-        Surface { start: outward.scale_add(splat::<S, E>(simd, sphere.outer), center), normal: outward };
-    if EYE && sphere.power > E::narrow(0.0) {
-        return outside;
-    }
-    let inside = if EYE {
-        let zero = constant::<S, E>(simd, 0.0);
-        zero.simd_eq(zero)
-    } else {
-        to_center.dot(to_center).simd_lt(splat::<S, E>(simd, sphere.square))
-    };
-    if !EYE && !inside.any_true() {
-        return outside;
-    }
-    let away = inside.select(splat::<S, E>(simd, sphere.inner), splat::<S, E>(simd, sphere.outer));
-    let side = inside.select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0));
-    Surface { start: outward.scale_add(away, center), normal: outward.scale(side) }
-}
-
-#[inline(always)]
 fn offset<S: Simd, E: Real>(simd: S, point: Vec3<S, E>, offset: f64) -> Lanes<S, E> {
     (point.x.abs() + point.y.abs() + point.z.abs()) * constant::<S, E>(simd, offset * E::ROUNDOFF)
-}
-
-#[inline(always)]
-pub(super) fn triangle_surface<S: Simd, E: Real>(
-    simd: S,
-    triangle: &Triangle<E>,
-    ray: Ray<S, E>,
-    distance: Lanes<S, E>,
-    roundoffs: f64,
-) -> Surface<S, E> {
-    let normal = Vec3::splat(simd, triangle.normal);
-    let zero = constant::<S, E>(simd, 0.0);
-    let point = ray.direction.scale_add(distance, ray.origin);
-    let height = splat::<S, E>(simd, triangle.height);
-    let above = normal.dot(point) - height;
-    let side = normal
-        .dot(ray.direction)
-        .simd_gt(zero)
-        .select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0));
-    let offset =
-        offset(simd, point, roundoffs) + height.abs() * constant::<S, E>(simd, roundoffs * E::ROUNDOFF);
-    Surface { start: normal.scale_add(side * offset - above, point), normal: normal.scale(side) }
-}
-
-#[inline(always)]
-pub(super) fn cuboid_surface<S: Simd, E: Real>(
-    simd: S,
-    cuboid: &Cuboid<E>,
-    ray: Ray<S, E>,
-    slopes: Slopes<S, E>,
-    distance: Lanes<S, E>,
-    roundoffs: f64,
-) -> Surface<S, E> {
-    let zero = constant::<S, E>(simd, 0.0);
-    let (min, max) = (Vec3::splat(simd, cuboid.min), Vec3::splat(simd, cuboid.max));
-    let (near, leave) = slabs(simd, cuboid, ray, slopes);
-    let enter = near.x.max(near.y).max(near.z);
-    let entering = enter.simd_gt(zero);
-    let d = ray.direction;
-    let out = min.sub(ray.origin).mul(slopes.inverse);
-    let other = max.sub(ray.origin).mul(slopes.inverse);
-    let out_x = d.x.simd_ne(zero) & out.x.max(other.x).simd_eq(leave);
-    let out_y = d.y.simd_ne(zero) & out.y.max(other.y).simd_eq(leave);
-    let is_x = (entering & near.x.simd_eq(enter)) | (!entering & out_x);
-    let is_y = !is_x & ((entering & near.y.simd_eq(enter)) | (!entering & out_y));
-    let is_z = !is_x & !is_y;
-    let point = d.scale_add(distance, ray.origin);
-    let point = Vec3::<S, E>::new(
-        point.x.max(min.x).min(max.x),
-        point.y.max(min.y).min(max.y),
-        point.z.max(min.z).min(max.z),
-    );
-    let (x, nx) = face::<S, E>(simd, is_x, d.x.simd_gt(zero), entering, (min.x, max.x), point.x);
-    let (y, ny) = face::<S, E>(simd, is_y, d.y.simd_gt(zero), entering, (min.y, max.y), point.y);
-    let (z, nz) = face::<S, E>(simd, is_z, d.z.simd_gt(zero), entering, (min.z, max.z), point.z);
-    let (point, normal) = (Vec3::<S, E>::new(x, y, z), Vec3::<S, E>::new(nx, ny, nz));
-    Surface { start: normal.scale_add(offset(simd, point, roundoffs), point), normal }
 }
 
 /// A coordinate, brought onto the face where the ray meets it there, and the normal's.

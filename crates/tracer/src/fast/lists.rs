@@ -203,7 +203,7 @@ fn across(solid: &Solid, axis: DVec3, back: DVec3, slack: f64) -> Span {
             };
             span(&[0, 1, 2, 3, 4, 5, 6, 7].map(corner))
         }
-        Shape::Sphere { center, radius } => {
+        Shape::Sphere { center, radius, .. } => {
             let (x, depth) = (center.dot(axis), -center.dot(back));
             let radius = radius + 2.0 * slack;
             (depth > radius).then(|| {

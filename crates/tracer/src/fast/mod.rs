@@ -48,6 +48,8 @@ mod features;
 mod geometry;
 mod intersect;
 mod lists;
+#[cfg(feature = "accuracy")]
+mod naive;
 mod precision;
 mod prepare;
 pub mod probe;
@@ -83,10 +85,10 @@ const MANY: usize = 512;
 /// Those of [`crate::render`].
 pub(crate) fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     let geometry = if has_kernels(options) { Geometry::new(scene).ok() } else { None };
-    let precision = |geometry| Some((geometry, precision::resolve(options.precision, geometry, scene)?));
+    let precision = |geometry| Some((geometry, precision::resolve(options, geometry, scene)?));
     match geometry.as_ref().and_then(precision) {
-        Some((geometry, Precision::F64)) => draw::<f64>(scene, geometry, options),
-        Some((geometry, _)) => draw::<f32>(scene, geometry, options),
+        Some((geometry, Precision::F64)) => draw(scene, geometry, options, f64::draw),
+        Some((geometry, _)) => draw(scene, geometry, options, f32::draw),
         // Numbers that the kernels cannot hold are left to the tracer that takes them one by one.
         None => crate::reference::render(scene, options),
     }
@@ -106,14 +108,26 @@ fn has_kernels(_: &RenderOptions) -> bool {
 /// The precision that [`Precision::Auto`] stands for in a scene.
 pub(crate) fn precision(scene: &Scene) -> Precision {
     let geometry = Geometry::new(scene).ok();
-    let resolved = geometry.and_then(|geometry| precision::resolve(Precision::Auto, &geometry, scene));
+    let resolved =
+        geometry.and_then(|geometry| precision::resolve(&RenderOptions::default(), &geometry, scene));
     resolved.unwrap_or(Precision::F64)
 }
 
-fn draw<E: Kernels>(
+/// Draws a scene by the textbook.
+///
+/// # Errors
+/// Those of [`crate::render`].
+#[cfg(feature = "accuracy")]
+pub(crate) fn render_naive(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
+    draw(scene, &Geometry::new(scene)?, options, naive::draw)
+}
+
+/// Draws a scene, bands of tiles side by side, each by `kernel`.
+fn draw<E: Real>(
     scene: &Scene,
     geometry: &Geometry,
     options: &RenderOptions,
+    kernel: impl Fn(&Job<E>, Level, Band) + Sync,
 ) -> Result<RgbImage, RenderError> {
     let size = (scene.screen.width(), scene.screen.height());
     let many = geometry.solids.len() > MANY;
@@ -128,7 +142,8 @@ fn draw<E: Kernels>(
     let level = options.level.unwrap_or_else(Level::new);
     bands(scene.screen, side.1, options, |row, bytes| {
         let band = Band { bytes, size, background };
-        E::draw(&Job { prepared: &prepared, window: &window, side, row }, level, band);
+        let bounces = options.bounces();
+        kernel(&Job { prepared: &prepared, window: &window, side, row, bounces }, level, band);
     })
 }
 
@@ -140,6 +155,8 @@ struct Job<'a, E> {
     side: (u32, u32),
     /// The first row of pixels.
     row: u32,
+    /// Mirrorings that are followed.
+    bounces: u32,
 }
 
 impl<E: Real> Job<'_, E> {
@@ -157,6 +174,7 @@ impl<E: Real> Job<'_, E> {
                 height,
                 candidates: self.window.candidates(place.0, place.1),
                 place,
+                bounces: self.bounces,
             };
             tile::draw::<S, E, F>(simd, self.prepared, tile, &mut scratch, &mut band);
         }

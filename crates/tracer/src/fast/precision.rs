@@ -3,14 +3,15 @@
 //! Bounds on the rounding errors of the `f32` kernels are set against the size of a pixel and of a level: what moves an
 //! outline or a shadow by less than a small part of a pixel, or a colour by less than a part of a level, cannot be seen.
 //! Triangles and boxes need no bound of their own: their errors are relative to the distance of what is seen, as those
-//! of the directions are, and planes are met in their order. What the kernels' numbers cannot hold at all is known
-//! here too.
+//! of the directions are. Planes along the axes are met in their order, whatever the rounding, if they are not so near
+//! to each other that they become one. What the kernels' numbers cannot hold at all is known here too.
 
+use glam::DVec3;
 use rayfold_scene::{Light, Scene};
 
 use super::geometry::{Geometry, Shape, Solid, View};
 use super::real::Real;
-use crate::{MAX_BOUNCES, Precision};
+use crate::{Precision, RenderOptions};
 
 /// Rounding errors that add up in a ray's direction, in roundoffs.
 const DIRECTION: f64 = 3.0;
@@ -33,6 +34,12 @@ const BRIGHTEST: f64 = 1e3;
 /// The size of a pixel, as an angle, for an image of one.
 const ONE_PIXEL: f64 = 1e-3;
 
+/// Planes nearer than this to each other, in roundoffs of their coordinates, may be met at one distance.
+const ONE_PLANE: f64 = 6.0;
+
+/// Planes nearer than this to each other, relative to their coordinates, are meant to be one.
+const MEANT: f64 = 1e-13;
+
 /// What a kind of number can hold.
 struct Range {
     /// A solid this much smaller than the scene has products that vanish.
@@ -47,16 +54,15 @@ const SINGLE: Range = Range { least: 1e-15, most: 1e15, count: 1 << f32::MANTISS
 const DOUBLE: Range = Range { least: 1e-100, most: 1e100, count: 1 << 32 };
 
 /// The numbers that are meant by a setting: never [`Precision::Auto`], and none if no kernel can hold the scene.
-pub(super) fn resolve(precision: Precision, geometry: &Geometry, scene: &Scene) -> Option<Precision> {
-    let colors = Colors::of(scene);
+pub(super) fn resolve(options: &RenderOptions, geometry: &Geometry, scene: &Scene) -> Option<Precision> {
+    let colors = Colors::of(scene, options.bounces());
     if !DOUBLE.holds(geometry, scene, &colors) {
         return None;
     }
-    let size = (scene.screen.width(), scene.screen.height());
-    let single = match precision {
+    let single = match options.precision {
         Precision::F64 => false,
         Precision::F32 => SINGLE.holds(geometry, scene, &colors),
-        Precision::Auto => SINGLE.holds(geometry, scene, &colors) && is_enough(geometry, size, &colors),
+        Precision::Auto => SINGLE.holds(geometry, scene, &colors) && is_enough(geometry, scene, &colors),
     };
     Some(if single { Precision::F32 } else { Precision::F64 })
 }
@@ -94,7 +100,7 @@ struct Colors {
 }
 
 impl Colors {
-    fn of(scene: &Scene) -> Self {
+    fn of(scene: &Scene, bounces: u32) -> Self {
         let arriving: f64 =
             scene.lights.iter().map(|Light::Directional(light)| light.color().abs().max_element()).sum();
         let (mut ambient, mut diffuse, mut mirror, mut least) = (0f64, 0f64, 0f64, 0f64);
@@ -111,7 +117,7 @@ impl Colors {
         }
         let scattered = arriving * diffuse;
         let seen = |weight: f64, _| weight * mirror + ambient.max(1.0) + scattered;
-        let largest = (0..=MAX_BOUNCES).fold(1.0, seen).max(mirror.powi(MAX_BOUNCES as i32));
+        let largest = (0..=bounces).fold(1.0, seen).max(mirror.powi(bounces as i32));
         Self { largest, scattered, signed: least < 0.0 }
     }
 }
@@ -126,7 +132,7 @@ fn widest((x, y): ((f64, f64), (f64, f64)), size: (u32, u32)) -> (f64, f64) {
 }
 
 /// Whether the errors of single precision cannot be seen.
-fn is_enough(geometry: &Geometry, size: (u32, u32), colors: &Colors) -> bool {
+fn is_enough(geometry: &Geometry, scene: &Scene, colors: &Colors) -> bool {
     let roundoff = <f32 as Real>::ROUNDOFF;
     // Where colours only add up, those that are not clipped in the end are sums of small ones.
     if colors.scattered > BRIGHTEST || colors.signed && colors.largest > BRIGHTEST {
@@ -136,6 +142,7 @@ fn is_enough(geometry: &Geometry, size: (u32, u32), colors: &Colors) -> bool {
     let pixel = match geometry.view {
         View::Parallel { pixel, .. } => pixel,
         View::Pinhole { x, y, .. } => {
+            let size = (scene.screen.width(), scene.screen.height());
             let (across, along) = widest((x, y), size);
             let farthest = 1.0 + across * across + along * along;
             let steps = [x.1, y.1].map(f64::abs).into_iter().filter(|step| *step > 0.0);
@@ -149,7 +156,7 @@ fn is_enough(geometry: &Geometry, size: (u32, u32), colors: &Colors) -> bool {
     }
     let shade = SHADE / colors.scattered.max(1.0);
     let is_fine = |solid: &Solid| match solid.shape {
-        Shape::Sphere { center, radius } => {
+        Shape::Sphere { center, radius, .. } => {
             let away = center.length();
             let error = POINT * roundoff * (away + radius);
             let nearest = if parallel { 1.0 } else { (away - radius).abs() };
@@ -159,5 +166,52 @@ fn is_enough(geometry: &Geometry, size: (u32, u32), colors: &Colors) -> bool {
         // Seen in parallel, what is far away is as large as what is near.
         _ => !parallel || POINT * roundoff * solid.magnitude() <= INVISIBLE * pixel,
     };
-    geometry.solids.iter().all(is_fine)
+    let mirrored = scene.objects.iter().any(|object| object.material().mirror() != DVec3::ZERO);
+    geometry.solids.iter().all(is_fine) && !(0..3).any(|axis| planes_blur(geometry, axis, mirrored))
+}
+
+/// Whether faces that lie one behind the other along an axis, all but in one plane, become one in single precision.
+fn planes_blur(geometry: &Geometry, axis: usize, mirrored: bool) -> bool {
+    let mut faces: Vec<(f64, DVec3, DVec3)> = Vec::new();
+    for solid in &geometry.solids {
+        let (min, max) = solid.bounds();
+        match solid.shape {
+            Shape::Sphere { .. } => continue,
+            Shape::Cuboid { .. } if min[axis] != max[axis] => faces.push((max[axis], min, max)),
+            Shape::Triangle { .. } if min[axis] != max[axis] => continue,
+            Shape::Cuboid { .. } | Shape::Triangle { .. } => {}
+        }
+        faces.push((min[axis], min, max));
+    }
+    faces.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let across = [(axis + 1) % 3, (axis + 2) % 3];
+    // The box of the faces that are taken for one plane, and of those before it that are too near.
+    let (mut here, mut near) = (None, None);
+    let mut at = f64::NEG_INFINITY;
+    for (coordinate, min, max) in faces {
+        let apart = coordinate - at;
+        // A mirrored ray starts anywhere in the scene.
+        let largest = if mirrored { 1.0 } else { coordinate.abs() };
+        if apart > MEANT * coordinate.abs() {
+            near =
+                if apart <= ONE_PLANE * <f32 as Real>::ROUNDOFF * largest { join(near, here) } else { None };
+            here = None;
+        }
+        at = coordinate;
+        here = join(here, Some((min, max)));
+        let overlap =
+            |(low, high): (DVec3, DVec3)| across.iter().all(|&k| min[k] <= high[k] && low[k] <= max[k]);
+        if near.is_some_and(overlap) {
+            return true;
+        }
+    }
+    false
+}
+
+/// The box of two boxes.
+fn join(a: Option<(DVec3, DVec3)>, b: Option<(DVec3, DVec3)>) -> Option<(DVec3, DVec3)> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some((a.0.min(b.0), a.1.max(b.1))),
+        _ => a.or(b),
+    }
 }

@@ -281,14 +281,13 @@ fn cuboid<E: Real>(solid: &Solid) -> Cuboid<E> {
 }
 
 fn sphere<E: Real>(solid: &Solid) -> Sphere<E> {
-    let Shape::Sphere { center, radius } = solid.shape else { unreachable!("{SORTED}") };
-    let away = center.length();
+    let Shape::Sphere { center, radius, power } = solid.shape else { unreachable!("{SORTED}") };
     let offset = OFFSET * E::ROUNDOFF * (center.abs().max_element() + radius);
     Sphere {
         center: point(center),
         square: E::narrow(radius * radius),
         order: order(solid),
-        power: E::narrow((away - radius) * (away + radius)),
+        power: E::narrow(power),
         outer: E::narrow(radius + offset),
         inner: E::narrow(radius - offset),
     }
@@ -361,7 +360,7 @@ fn light<E: Real>(sun: &Sun, sorted: &Sorted, search: Search) -> Light<E> {
     // The axes as the kernels have them, so that both sides of a test see the same map.
     let rounded = DMat3::from_cols_array_2d(&axes.map(|axis| axis.map(Real::widen))).transpose();
     let circle = |solid: &&Solid| {
-        let Shape::Sphere { center, radius } = solid.shape else { unreachable!("{SORTED}") };
+        let Shape::Sphere { center, radius, .. } = solid.shape else { unreachable!("{SORTED}") };
         let [x, y, z] = point(rounded * center);
         [x, y, z, E::narrow(radius * radius)]
     };

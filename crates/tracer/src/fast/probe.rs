@@ -41,7 +41,7 @@ pub fn nearest_hits(
     options: &RenderOptions,
 ) -> Result<Vec<Option<Found>>, RenderError> {
     let geometry = Geometry::new(scene)?;
-    match resolve(options.precision, &geometry, scene) {
+    match resolve(options, &geometry, scene) {
         Some(Precision::F64) => probe::<f64>(scene, &geometry, rays, options, |batch, level, out| {
             on!(level, simd => batch.nearest(simd, out));
         }),

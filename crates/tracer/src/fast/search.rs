@@ -6,10 +6,7 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use super::features::Features;
-use super::intersect::{
-    Moment, Nearest, Ray, Slopes, cuboid, cuboid_shades, facing, sphere, sphere_from_eye, sphere_shades,
-    triangle, triangle_from_eye, triangle_shades,
-};
+use super::intersect::{Moment, Nearest, Ray, Slopes, cuboid_shades, facing, sphere_shades, triangle_shades};
 use super::lists::Picked;
 use super::prepare::{Kind, Light, Prepared};
 use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
@@ -104,24 +101,24 @@ pub(super) fn nearest<S: Simd, E: Real, F: Features, const EYE: bool>(
     let mut nearest = Nearest::none(simd);
     for at in Positions(masks.spheres) {
         if EYE {
-            sphere_from_eye(simd, &scene.spheres[at], ray.direction, &mut nearest);
+            F::sphere_from_eye(simd, &scene.spheres[at], ray.direction, &mut nearest);
         } else {
-            sphere(simd, &scene.spheres[at], ray, &mut nearest);
+            F::sphere(simd, &scene.spheres[at], ray, &mut nearest);
         }
     }
     if F::CUBOIDS && masks.cuboids != 0 {
         let slopes = Slopes::new(simd, ray.direction);
         for at in Positions(masks.cuboids) {
-            cuboid(simd, &scene.cuboids[at], ray, slopes, &mut nearest);
+            F::cuboid(simd, &scene.cuboids[at], ray, slopes, &mut nearest);
         }
     }
     if F::TRIANGLES && masks.triangles != 0 {
         let moment = Moment::new(ray);
         for at in Positions(masks.triangles) {
             if EYE {
-                triangle_from_eye(simd, &scene.triangles[at], ray.direction, &mut nearest);
+                F::triangle_from_eye(simd, &scene.triangles[at], ray.direction, &mut nearest);
             } else {
-                triangle(simd, &scene.triangles[at], ray, moment, &mut nearest);
+                F::triangle(simd, &scene.triangles[at], ray, moment, &mut nearest);
             }
         }
     }
@@ -176,18 +173,18 @@ fn nearest_of_list<S: Simd, E: Real, F: Features>(
 ) -> Nearest<S, E> {
     let mut nearest = Nearest::none(simd);
     for &at in &list.spheres {
-        sphere_from_eye(simd, &scene.spheres[at as usize], direction, &mut nearest);
+        F::sphere_from_eye(simd, &scene.spheres[at as usize], direction, &mut nearest);
     }
     if F::CUBOIDS && !list.cuboids.is_empty() {
         let ray = Ray { origin: Vec3::zero(simd), direction };
         let slopes = Slopes::new(simd, direction);
         for &at in &list.cuboids {
-            cuboid(simd, &scene.cuboids[at as usize], ray, slopes, &mut nearest);
+            F::cuboid(simd, &scene.cuboids[at as usize], ray, slopes, &mut nearest);
         }
     }
     if F::TRIANGLES {
         for &at in &list.triangles {
-            triangle_from_eye(simd, &scene.triangles[at as usize], direction, &mut nearest);
+            F::triangle_from_eye(simd, &scene.triangles[at as usize], direction, &mut nearest);
         }
     }
     nearest

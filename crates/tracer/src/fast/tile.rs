@@ -9,12 +9,11 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use super::features::Features;
-use super::intersect::{Ray, Slopes, Surface, cuboid_surface, sphere_surface, triangle_surface};
+use super::intersect::{Ray, Slopes, Surface};
 use super::lists::{Beam, Picked, Seen};
 use super::prepare::{Entry, Kind, Light, OFFSET, Outlines, Prepared, Rays};
 use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
 use super::search::{Candidates, Masks, nearest, unshaded};
-use crate::MAX_BOUNCES;
 use crate::parallel::CHANNELS;
 
 /// Pixels of a tile at most.
@@ -133,6 +132,8 @@ pub(super) struct Tile {
     pub(super) candidates: u64,
     /// Columns and rows of tiles before it.
     pub(super) place: (usize, usize),
+    /// Mirrorings that are followed.
+    pub(super) bounces: u32,
 }
 
 /// Where a tile's pixels go: the bytes of its rows, from the image's left edge.
@@ -194,10 +195,10 @@ pub(super) fn draw<S: Simd, E: Real, F: Features>(
         core::mem::swap(&mut hits.color, pixels);
         let (mut queue, mut next) = (queue, next);
         let all = Candidates::all(scene);
-        for bounce in 1..=MAX_BOUNCES {
+        for bounce in 1..=tile.bounces {
             core::mem::swap(&mut queue, &mut next);
             next.count = 0;
-            let after = (bounce < MAX_BOUNCES).then_some(&mut *next);
+            let after = (bounce < tile.bounces).then_some(&mut *next);
             later_generation::<S, E, F>(simd, scene, all, scene.background, hits, queue, after);
             light_up::<S, E, F>(simd, scene, hits, obstacles);
             for ray in 0..queue.count {
@@ -514,12 +515,12 @@ pub(super) fn surface<S: Simd, E: Real, F: Features, const EYE: bool>(
     let at = entry.index as usize;
     if F::CUBOIDS && entry.kind == Kind::Cuboid {
         let slopes = Slopes::new(simd, ray.direction);
-        return cuboid_surface(simd, &scene.cuboids[at], ray, slopes, distance, OFFSET);
+        return F::cuboid_surface(simd, &scene.cuboids[at], ray, slopes, distance, OFFSET);
     }
     if F::TRIANGLES && entry.kind == Kind::Triangle {
-        return triangle_surface(simd, &scene.triangles[at], ray, distance, OFFSET);
+        return F::triangle_surface(simd, &scene.triangles[at], ray, distance, OFFSET);
     }
-    sphere_surface::<S, E, EYE>(simd, &scene.spheres[at], ray, distance)
+    F::sphere_surface::<S, E, EYE>(simd, &scene.spheres[at], ray, distance)
 }
 
 /// Adds the light that reaches the hits.
@@ -644,6 +645,10 @@ fn develop<S: Simd, E: Real>(simd: S, tile: Tile, colors: &Columns<E>, band: &mu
         for left in (0..tile.width as usize).step_by(width) {
             let mut packed = [0; 16];
             let Vec3 { x, y, z } = Vec3::<S, E>::load(simd, colors, at);
+            #[cfg(feature = "accuracy")]
+            for channel in [x, y, z] {
+                crate::nans::add(channel.simd_ne(channel).to_bitmask().count_ones());
+            }
             E::pack::<S>(
                 [level::<S, E>(simd, x), level::<S, E>(simd, y), level::<S, E>(simd, z)],
                 &mut packed,

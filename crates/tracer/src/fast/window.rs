@@ -155,7 +155,7 @@ fn mask(solids: &[&Solid], is_candidate: impl Fn(&Solid) -> bool) -> u64 {
 
 fn caps(solids: &[&Solid], slack: impl Fn(&Solid) -> f64) -> Vec<Cap> {
     let cap = |(bit, solid): (usize, &&Solid)| {
-        let Shape::Sphere { center, radius } = solid.shape else { return None };
+        let Shape::Sphere { center, radius, .. } = solid.shape else { return None };
         let (away, radius) = (center.length(), radius + 2.0 * slack(solid));
         let sine = radius / away;
         let cosine = (1.0 - sine * sine).sqrt();

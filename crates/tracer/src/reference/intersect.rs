@@ -2,7 +2,7 @@
 //!
 //! Bounds on rounding errors are multiples of the unit roundoff and of the largest number that took part.
 
-use glam::{DVec3, Vec3Swizzles};
+use glam::{DVec2, DVec3, Vec3Swizzles};
 use rayfold_scene::model::unit;
 use rayfold_scene::{Cuboid, Object, Sphere, Triangle};
 
@@ -26,6 +26,7 @@ pub struct Surface {
 /// Distance to the nearest hit in front of the origin.
 pub(super) fn distance(object: &Object, ray: Ray) -> Option<f64> {
     let (object, ray, scale) = ordinary(object, ray)?;
+    // What is not a number hits nothing.
     let distance = match &object {
         Object::Sphere(sphere) => to_sphere(sphere, ray),
         Object::Triangle(triangle) => to_triangle(triangle, ray),
@@ -94,7 +95,7 @@ fn to_sphere(sphere: &Sphere, ray: Ray) -> Option<f64> {
     let half_chord = ((radius - closest) * (radius + closest)).sqrt();
     // The two solutions are `far` and `power / far`; neither subtracts numbers of the same sign.
     let far = middle + half_chord.copysign(middle);
-    let power = power_of_point(sphere, ray);
+    let power = power(ray.origin, sphere, 1.0);
     if power > 0.0 {
         (middle > 0.0).then(|| power / far)
     } else if middle > 0.0 {
@@ -104,35 +105,54 @@ fn to_sphere(sphere: &Sphere, ray: Ray) -> Option<f64> {
     }
 }
 
-/// `|o-c|² - r²`: positive outside the sphere, negative inside.
-fn power_of_point(sphere: &Sphere, ray: Ray) -> f64 {
-    let from_center = (ray.origin - sphere.center()).length();
-    (from_center - sphere.radius()) * (from_center + sphere.radius())
+/// `|point - center|² - radius²` of a sphere in units of 1 / scale, a power of two: positive outside, negative inside,
+/// right to a part in 10^30 of the squares, so that it is known on which side a point of the surface lies.
+///
+/// By sums and products with their errors (Dekker, "A floating-point technique for extending the available precision",
+/// 1971).
+pub(crate) fn power(point: DVec3, sphere: &Sphere, scale: f64) -> f64 {
+    let product = |a: f64| (a * a, a.mul_add(a, -(a * a)));
+    let sum = |a: f64, b: f64| {
+        let s = a + b;
+        let part = s - a;
+        (s, (a - (s - part)) + (b - part))
+    };
+    let (mut power, mut rest) = product(sphere.radius() * scale);
+    (power, rest) = (-power, -rest);
+    for axis in 0..3 {
+        let (apart, error) = sum(point[axis] * scale, -sphere.center()[axis] * scale);
+        let (square, less) = product(apart);
+        let (total, lost) = sum(power, square);
+        power = total;
+        rest += lost + less + 2.0 * apart * error;
+    }
+    power + rest
 }
 
 fn of_sphere(sphere: &Sphere, ray: Ray, distance: f64) -> Surface {
     let outward = (ray.origin - sphere.center() + distance * ray.direction).normalize();
-    let normal = if power_of_point(sphere, ray) > 0.0 { outward } else { -outward };
+    let normal = if power(ray.origin, sphere, 1.0) > 0.0 { outward } else { -outward };
     let largest = sphere.center().abs().max_element() + sphere.radius();
     let point = sphere.center() + sphere.radius() * outward;
     Surface { point, normal, offset: 16.0 * ROUNDOFF * largest }
 }
 
-/// Woop, Benthin, Wald, "Watertight ray/triangle intersection", JCGT 2(1), 2013.
+/// Woop, Benthin, Wald, "Watertight ray/triangle intersection", JCGT 2(1), 2013, says whether; the distance is that of
+/// the plane, so that a triangle in the plane of a box's face is met where the face is.
 fn to_triangle(triangle: &Triangle, ray: Ray) -> Option<f64> {
-    let (edges, depths) = sheared(triangle, ray);
+    let edges = sheared(triangle, ray);
     let outside = edges.iter().any(|&e| e < 0.0) && edges.iter().any(|&e| e > 0.0);
-    let sum = edges.iter().sum::<f64>();
-    if outside || sum == 0.0 || triangle_normal(triangle) == DVec3::ZERO {
+    if outside || edges == [0.0; 3] {
         return None;
     }
-    let weighted: f64 = edges.iter().zip(depths).map(|(e, z)| e * z).sum();
-    Some(weighted / sum)
+    let normal = triangle_normal(triangle);
+    let [a, b, c] = triangle.vertices().map(|vertex| vertex - ray.origin);
+    let nearest = [b, c].into_iter().fold(a, |n, v| if v.length() < n.length() { v } else { n });
+    Some(nearest.dot(normal) / ray.direction.dot(normal))
 }
 
-/// In coordinates where the ray runs from the origin along z: the signed areas opposite the vertices, and the
-/// vertices' depths.
-fn sheared(triangle: &Triangle, ray: Ray) -> ([f64; 3], [f64; 3]) {
+/// In coordinates where the ray runs from the origin along z: the signed areas opposite the vertices.
+fn sheared(triangle: &Triangle, ray: Ray) -> [f64; 3] {
     let d = ray.direction;
     let to_ray = |v: DVec3| {
         if d.z.abs() >= d.x.abs() && d.z.abs() >= d.y.abs() {
@@ -146,10 +166,10 @@ fn sheared(triangle: &Triangle, ray: Ray) -> ([f64; 3], [f64; 3]) {
     let d = to_ray(d);
     let [a, b, c] = triangle.vertices().map(|vertex| {
         let v = to_ray(vertex - ray.origin);
-        DVec3::new(v.x - d.x / d.z * v.z, v.y - d.y / d.z * v.z, v.z / d.z)
+        DVec2::new(v.x - d.x / d.z * v.z, v.y - d.y / d.z * v.z)
     });
-    let area = |p: DVec3, q: DVec3| difference_of_products(p.x, q.y, p.y, q.x);
-    ([area(b, c), area(c, a), area(a, b)], [a.z, b.z, c.z])
+    let area = |p: DVec2, q: DVec2| difference_of_products(p.x, q.y, p.y, q.x);
+    [area(b, c), area(c, a), area(a, b)]
 }
 
 /// `a·b - c·d` with the products' rounding errors put back: its sign is right, and swapping the products negates it
@@ -268,6 +288,21 @@ mod tests {
         assert_eq!(distance(&unit, ray([0.0, 0.0, 1.0], [0.0, 0.0, -1.0])), Some(2.0));
         assert_eq!(distance(&unit, ray([0.0, 0.0, 1.0], [0.0, 0.0, 1.0])), None);
         assert_eq!(distance(&unit, ray([0.0, 0.0, 1.0], [1.0, 0.0, 0.0])), None);
+    }
+
+    #[test]
+    fn the_side_of_a_point_on_the_surface_is_known() {
+        // 0.6² + 0.8² = 1 - 1.7e-17 for the numbers that are nearest to these decimals, ...
+        let Object::Sphere(unit) = sphere(1.0, [0.0; 3]) else { panic!("a sphere") };
+        let just_inside = power(DVec3::new(0.6, 0.8, 0.0), &unit, 1.0);
+        // ... by integers, as 2^-106 is what their squares are multiples of.
+        let square = |x: f64| ((x * 2f64.powi(53)) as i128).pow(2);
+        let exact = square(0.6) + square(0.8) - square(1.0);
+        assert_eq!(just_inside, exact as f64 * 2f64.powi(-106));
+        assert_eq!(
+            power(DVec3::new(3.0, 4.0, 0.0), &Sphere::new(5.0, DVec3::ZERO, *unit.material()).unwrap(), 1.0),
+            0.0
+        );
     }
 
     #[test]

@@ -17,12 +17,14 @@
 
 mod intersect;
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 use image::RgbImage;
-use rayfold_scene::{Light, Object, Scene, model::unit};
+use rayfold_scene::{Camera, Cuboid, Light, Object, Pinhole, Scene, Sphere, Triangle, model::unit};
 
 pub use intersect::Surface;
-pub(crate) use intersect::triangle_normal;
+pub(crate) use intersect::{power, triangle_normal};
 
 use crate::camera::{Ray, Rays};
 use crate::parallel::{CHANNELS, bands};
@@ -44,18 +46,20 @@ pub struct Hit {
 /// # Errors
 /// Those of [`crate::render`].
 pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
+    let scene = &*recentred(scene);
     let rays = Rays::new(&scene.camera, scene.screen);
     bands(scene.screen, 1, options, |row, band| {
         let j = scene.screen.height() - 1 - row;
         for (pixel, i) in band.chunks_exact_mut(CHANNELS).zip(0u32..) {
-            pixel.copy_from_slice(&levels(color_along(scene, rays.ray(i, j), 0)));
+            pixel.copy_from_slice(&levels(color_along(scene, rays.ray(i, j), options.bounces())));
         }
     })
 }
 
 /// The colour of a pixel, unclamped; `i` counts from the left, `j` from the bottom.
 pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
-    color_along(scene, Rays::new(&scene.camera, scene.screen).ray(i, j), 0)
+    let scene = &*recentred(scene);
+    color_along(scene, Rays::new(&scene.camera, scene.screen).ray(i, j), MAX_BOUNCES)
 }
 
 /// The nearest hit of a ray; of hits at the same distance, that of the object which comes first.
@@ -75,6 +79,34 @@ pub fn nearest(objects: &[Object], origin: DVec3, direction: DVec3) -> Option<Hi
     Some(Hit { object, distance, surface: intersect::surface(&objects[object], ray, distance) })
 }
 
+/// The scene with the eye at the origin: what is seen then has coordinates as small as it is near, wherever all of it
+/// lies. As it is, where it cannot be moved.
+fn recentred(scene: &Scene) -> Cow<'_, Scene> {
+    moved_to_eye(scene).map_or(Cow::Borrowed(scene), Cow::Owned)
+}
+
+fn moved_to_eye(scene: &Scene) -> Option<Scene> {
+    let Camera::Pinhole(p) = scene.camera else { return None };
+    let place = |point: DVec3| point - p.eye();
+    let mut moved = scene.clone();
+    let objects = scene.objects.iter().map(|object| match object {
+        Object::Sphere(s) => {
+            Sphere::new(s.radius(), place(s.center()), *s.material()).ok().map(Object::Sphere)
+        }
+        Object::Cuboid(c) => Cuboid::new(c.corners().map(place), *c.material()).ok().map(Object::Cuboid),
+        // Rounding would give it an area.
+        Object::Triangle(t) if t.is_degenerate() => Some(*object),
+        Object::Triangle(t) => {
+            Triangle::new(t.vertices().map(place), *t.material()).ok().map(Object::Triangle)
+        }
+    });
+    moved.objects = objects.collect::<Option<Vec<_>>>()?.into();
+    let eye = Pinhole::new(DVec3::ZERO, p.gaze(), p.up(), p.distance(), p.lower_left(), p.upper_right());
+    moved.camera = Camera::Pinhole(eye.ok()?);
+    Some(moved)
+}
+
+/// `bounces` more mirrorings are followed.
 fn color_along(scene: &Scene, ray: Ray, bounces: u32) -> DVec3 {
     let Some(hit) = nearest(&scene.objects, ray.origin, ray.direction) else {
         return scene.background();
@@ -94,11 +126,11 @@ fn color_along(scene: &Scene, ray: Ray, bounces: u32) -> DVec3 {
             color = held(color + light.color() * material.diffuse() * cosine);
         }
     }
-    if bounces < MAX_BOUNCES && material.mirror() != DVec3::ZERO {
+    if bounces > 0 && material.mirror() != DVec3::ZERO {
         // The normal faces the ray; where rounding says otherwise, the ray grazes.
         let towards_surface = ray.direction.dot(normal).min(0.0);
         let direction = (ray.direction - 2.0 * towards_surface * normal).normalize();
-        let mirrored = color_along(scene, Ray { origin: start, direction }, bounces + 1);
+        let mirrored = color_along(scene, Ray { origin: start, direction }, bounces - 1);
         color = held(color + material.mirror() * mirrored);
     }
     color
@@ -111,6 +143,8 @@ fn held(color: DVec3) -> DVec3 {
 
 /// Display values to the levels of a channel.
 pub(crate) fn levels(color: DVec3) -> [u8; CHANNELS] {
+    #[cfg(feature = "accuracy")]
+    crate::nans::add(color.is_nan_mask().bitmask().count_ones());
     color.to_array().map(|channel| (255.0 * channel.clamp(0.0, 1.0)).round() as u8)
 }
 
@@ -118,7 +152,7 @@ pub(crate) fn levels(color: DVec3) -> [u8; CHANNELS] {
 mod tests {
     use std::sync::atomic::AtomicBool;
 
-    use rayfold_scene::{Camera, DirectionalLight, Material, Screen, Sphere};
+    use rayfold_scene::{DirectionalLight, Material, Screen};
 
     use super::*;
 

@@ -1,0 +1,445 @@
+//! Scenes drawn at random from what breaks ray tracers, each way judged pixel by pixel by the oracle.
+//!
+//! A pixel is wrong when its colour is off by more than 2 levels from every colour that the oracle sees within a
+//! sixteenth of a pixel: what an outline, a shadow's edge or a chain of mirrors makes of a rounding error is not held
+//! against anybody.
+
+use anyhow::Result;
+use fastrand::Rng;
+use glam::{DVec2, DVec3};
+use image::RgbImage;
+use rayfold_scene::{Camera, Cuboid, Material, Object, Pinhole, Scene, Screen, Sphere, Triangle};
+use rayon::prelude::*;
+
+use super::{Figures, Size, direction, unless_single};
+use crate::oracle;
+use crate::scenes::{light, moved};
+use crate::tracers::{Tracer, reference};
+
+/// How far from the pixel, in pixels, an error may show what is not there.
+const BESIDE: f64 = 1.0 / 16.0;
+
+/// Levels that colours may be off.
+const LEVELS: f64 = 2.0;
+
+/// What a scene is made of.
+type Kind = (&'static str, fn(&mut Rng) -> Result<Scene>);
+
+/// The share of pixels that may be wrong: rays that meet corners or the edges of needles exactly, where the last bit of
+/// any arithmetic decides what comes first.
+const FEW: f64 = 5e-4;
+
+const KINDS: &[Kind] = &[
+    ("objects of all scales", of_all_scales),
+    ("faces in one plane", coplanar),
+    ("faces almost in one plane", almost_coplanar),
+    ("an eye within objects", from_within),
+    ("mirrors face to face", mirrors),
+    ("needles", needles),
+    ("equal objects", equal),
+    ("far from the origin", far_off),
+    ("in other units", in_other_units),
+    ("views of all angles", of_all_angles),
+    ("images of odd shapes", odd_screens),
+    ("whole numbers", whole_numbers),
+    ("parallel rays", parallel),
+    ("bright lights", bright),
+];
+
+/// The random scene of a seed, and what it is.
+fn scene(seed: u64) -> Result<(&'static str, Scene)> {
+    let (name, make) = KINDS[(seed % KINDS.len() as u64) as usize];
+    Ok((name, make(&mut Rng::with_seed(seed))?))
+}
+
+/// A scene of each kind, large enough to look at.
+pub(crate) fn one_of_each(side: u32) -> Result<Vec<(&'static str, Scene)>> {
+    let first = super::SEED / KINDS.len() as u64 * KINDS.len() as u64;
+    (first..first + KINDS.len() as u64)
+        .map(|seed| {
+            let (name, mut scene) = scene(seed)?;
+            if scene.screen.width().min(scene.screen.height()) > 20 {
+                scene.screen = Screen::new(side, side)?;
+            }
+            Ok((name, scene))
+        })
+        .collect()
+}
+
+/// The seed of the first scene: [`super::SEED`], unless `RAYFOLD_SEED` says another.
+fn first_seed() -> u64 {
+    std::env::var("RAYFOLD_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(super::SEED)
+}
+
+/// Every way on every kind of scene.
+pub(super) fn scenes(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    let rounds = size.pick(2, 60);
+    let first = first_seed() / KINDS.len() as u64 * KINDS.len() as u64;
+    for kind in 0..KINDS.len() as u64 {
+        let mut wrong = vec![Vec::new(); tracers.len()];
+        let mut pixels = 0;
+        let name = KINDS[kind as usize].0;
+        for round in 0..rounds {
+            let seed = first + round * KINDS.len() as u64 + kind;
+            let (_, scene) = scene(seed)?;
+            pixels += scene.screen.pixels() as usize;
+            let drawn = tracers.iter().map(|tracer| tracer.render(&scene)).collect::<Result<Vec<_>>>()?;
+            for (wrong, count) in wrong.iter_mut().zip(judge(&scene, &drawn, size.pick(30, 100), seed)?) {
+                if count > 0 {
+                    wrong.push((seed, count));
+                }
+            }
+        }
+        for (tracer, wrong) in tracers.iter().zip(wrong) {
+            let count: usize = wrong.iter().map(|(_, count)| count).sum();
+            let bound = FEW * pixels as f64;
+            let seeds: Vec<String> = wrong.iter().take(4).map(|(seed, _)| seed.to_string()).collect();
+            let seeds = if seeds.is_empty() { String::new() } else { format!(", seeds {}", seeds.join(" ")) };
+            figures.add(
+                tracer,
+                format!("{name}: wrong pixels{seeds}"),
+                pixels,
+                count as f64,
+                unless_single(tracer, bound),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// How many pixels of each image are wrong: of those that differ from the plain tracer's or among each other, and of
+/// `samples` others.
+fn judge(scene: &Scene, images: &[RgbImage], samples: usize, seed: u64) -> Result<Vec<usize>> {
+    let plain = reference().render(scene)?;
+    let (width, height) = plain.dimensions();
+    let mut rng = Rng::with_seed(!seed);
+    let mut doubtful: Vec<(u32, u32)> = plain
+        .enumerate_pixels()
+        .filter(|(x, y, pixel)| images.iter().any(|image| apart(image.get_pixel(*x, *y), pixel) > 2))
+        .map(|(x, y, _)| (x, y))
+        .collect();
+    doubtful.extend((0..samples).map(|_| (rng.u32(0..width), rng.u32(0..height))));
+    doubtful.sort_unstable();
+    doubtful.dedup();
+    let verdicts: Vec<Vec<bool>> = doubtful
+        .into_par_iter()
+        .map(|(x, y)| {
+            let (i, j) = (f64::from(x), f64::from(height - 1 - y));
+            let exact = shown(scene, i, j);
+            let off = |image: &RgbImage, from: DVec3, to: DVec3| {
+                let color = DVec3::from_array(image.get_pixel(x, y).0.map(f64::from));
+                (from - color).max(color - to).max_element() > LEVELS
+            };
+            if images.iter().all(|image| !off(image, exact, exact)) {
+                return vec![false; images.len()];
+            }
+            let (mut from, mut to) = (exact, exact);
+            for turn in 0..8 {
+                let aside = DVec2::from_angle(f64::from(turn) * std::f64::consts::TAU / 8.0) * BESIDE;
+                let beside = shown(scene, i + aside.x, j + aside.y);
+                (from, to) = (from.min(beside), to.max(beside));
+            }
+            images.iter().map(|image| off(image, from, to)).collect()
+        })
+        .collect();
+    let count = |image: usize| verdicts.iter().filter(|verdict| verdict[image]).count();
+    Ok((0..images.len()).map(count).collect())
+}
+
+/// The oracle's colour as levels before rounding.
+fn shown(scene: &Scene, x: f64, y: f64) -> DVec3 {
+    255.0 * oracle::color_at(scene, x, y).clamp(DVec3::ZERO, DVec3::ONE)
+}
+
+fn apart(a: &image::Rgb<u8>, b: &image::Rgb<u8>) -> u8 {
+    a.0.iter().zip(b.0).map(|(a, b)| a.abs_diff(b)).max().unwrap_or(0)
+}
+
+fn within(rng: &mut Rng, from: f64, to: f64) -> f64 {
+    from + (to - from) * rng.f64()
+}
+
+/// Each power of ten between as likely as any other.
+fn power(rng: &mut Rng, from: f64, to: f64) -> f64 {
+    10f64.powf(within(rng, from, to))
+}
+
+fn point(rng: &mut Rng, size: f64) -> DVec3 {
+    DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, rng.f64() - 0.5) * 2.0 * size
+}
+
+fn color(rng: &mut Rng) -> DVec3 {
+    DVec3::new(rng.f64(), rng.f64(), rng.f64())
+}
+
+fn matte(rng: &mut Rng) -> Result<Material> {
+    Ok(Material::new(0.3 * color(rng), 0.6 * color(rng), DVec3::ZERO)?)
+}
+
+fn shiny(rng: &mut Rng) -> Result<Material> {
+    Ok(Material::new(0.2 * color(rng), 0.5 * color(rng), 0.6 * color(rng))?)
+}
+
+fn sphere(rng: &mut Rng, radius: f64, center: DVec3) -> Result<Object> {
+    let surface = if rng.bool() { shiny(rng)? } else { matte(rng)? };
+    Ok(Object::Sphere(Sphere::new(radius, center, surface)?))
+}
+
+fn cuboid(rng: &mut Rng, u: DVec3, v: DVec3) -> Result<Object> {
+    Ok(Object::Cuboid(Cuboid::new([u, v], matte(rng)?)?))
+}
+
+fn triangle(rng: &mut Rng, vertices: [DVec3; 3]) -> Result<Object> {
+    Ok(Object::Triangle(Triangle::new(vertices, matte(rng)?)?))
+}
+
+/// An object of about this size.
+fn any(rng: &mut Rng, at: DVec3, size: f64) -> Result<Object> {
+    match rng.u32(0..3) {
+        0 => sphere(rng, 0.5 * size, at),
+        1 => {
+            let reach = point(rng, 0.7 * size);
+            cuboid(rng, at, at + reach)
+        }
+        _ => {
+            let vertices = [at, at + point(rng, size), at + point(rng, size)];
+            triangle(rng, vertices)
+        }
+    }
+}
+
+fn seen_from(eye: DVec3, target: DVec3, half: f64, screen: Screen) -> Result<Camera> {
+    let half = DVec2::new(1.0, f64::from(screen.height()) / f64::from(screen.width())) * half;
+    Ok(Camera::Pinhole(Pinhole::new(eye, target - eye, DVec3::new(0.1, 1.0, 0.05), 1.0, -half, half)?))
+}
+
+/// A picture of the objects, lit.
+fn picture(rng: &mut Rng, objects: Vec<Object>, eye: DVec3, target: DVec3) -> Result<Scene> {
+    let screen = Screen::new(rng.u32(24..48), rng.u32(24..48))?;
+    let mut scene = Scene::new(screen, seen_from(eye, target, 0.5, screen)?);
+    scene.set_background(color(rng))?;
+    scene.objects = objects.into();
+    let lights: Result<Vec<_>, _> =
+        (0..rng.u32(1..3)).map(|_| light(0.7, direction(rng).to_array())).collect();
+    scene.lights = lights?.into();
+    Ok(scene)
+}
+
+fn heap(rng: &mut Rng, count: usize) -> Result<Vec<Object>> {
+    (0..count)
+        .map(|_| {
+            let (at, size) = (point(rng, 2.0), within(rng, 0.3, 1.5));
+            any(rng, at, size)
+        })
+        .collect()
+}
+
+fn of_all_scales(rng: &mut Rng) -> Result<Scene> {
+    let range = [3.0, 6.0, 12.0, 30.0][rng.usize(0..4)];
+    let objects: Result<Vec<_>> = (0..rng.usize(2..24))
+        .map(|_| {
+            let size = power(rng, -range, 0.0);
+            let at = (direction(rng) + DVec3::NEG_Z) * size * within(rng, 1.0, 5.0);
+            any(rng, at, size)
+        })
+        .collect();
+    picture(rng, objects?, DVec3::ZERO, DVec3::NEG_Z)
+}
+
+/// Boxes, rectangles and triangles whose faces lie in a few planes; the first in the script is seen.
+fn stack(rng: &mut Rng, gap: f64) -> Result<Vec<Object>> {
+    let levels = [-1.0, -0.3, 0.4];
+    (0..rng.usize(3..20))
+        .map(|k| {
+            let low = levels[rng.usize(0..3)] + gap * k as f64;
+            let (from, to) = (point(rng, 2.0), point(rng, 2.0));
+            let (u, v) = (DVec3::new(from.x, low, from.z), DVec3::new(to.x, low, to.z));
+            match rng.u32(0..3) {
+                0 => cuboid(rng, u, v),
+                1 => cuboid(rng, u, v - DVec3::Y * 0.5),
+                _ => {
+                    let third = DVec3::new(from.x, low, to.z);
+                    triangle(rng, [u, v, third])
+                }
+            }
+        })
+        .collect()
+}
+
+fn coplanar(rng: &mut Rng) -> Result<Scene> {
+    let objects = stack(rng, 0.0)?;
+    let eye = DVec3::new(within(rng, -2.0, 2.0), within(rng, -2.0, 4.0), 6.0);
+    picture(rng, objects, eye, DVec3::ZERO)
+}
+
+fn almost_coplanar(rng: &mut Rng) -> Result<Scene> {
+    let gap = power(rng, -12.0, -2.0);
+    let mut objects = stack(rng, gap)?;
+    if rng.bool() {
+        objects.push(sphere(rng, 1.0, DVec3::new(0.0, 1.5, -1.0))?);
+    }
+    let eye = DVec3::new(within(rng, -2.0, 2.0), within(rng, -2.0, 4.0), 6.0);
+    picture(rng, objects, eye, DVec3::ZERO)
+}
+
+fn from_within(rng: &mut Rng) -> Result<Scene> {
+    let eye = point(rng, 1.0);
+    let mut objects = heap(rng, 6)?;
+    let size = power(rng, 0.2, 3.0);
+    let aside = direction(rng) * size;
+    objects.push(match rng.u32(0..3) {
+        0 => sphere(rng, 2.0 * size, eye + aside)?,
+        1 => cuboid(rng, eye - DVec3::new(size, 1.5, 3.0), eye + DVec3::new(2.0, size, 0.5))?,
+        // The eye is on the surface.
+        _ => sphere(rng, size, eye + size * DVec3::Y)?,
+    });
+    let target = eye + direction(rng);
+    picture(rng, objects, eye, target)
+}
+
+fn mirrors(rng: &mut Rng) -> Result<Scene> {
+    let mut objects = heap(rng, 8)?;
+    for side in [DVec3::X, DVec3::NEG_X, DVec3::NEG_Z] {
+        let radius = power(rng, 0.3, 3.0);
+        let bright = Material::new(DVec3::splat(0.02), DVec3::splat(0.1), DVec3::splat(0.85))?;
+        objects.push(Object::Sphere(Sphere::new(radius, side * (radius + 2.5), bright)?));
+    }
+    picture(rng, objects, DVec3::new(0.3, 0.2, 2.4), DVec3::ZERO)
+}
+
+fn needles(rng: &mut Rng) -> Result<Scene> {
+    let objects: Result<Vec<_>> = (0..rng.usize(10..90))
+        .map(|_| {
+            let (tip, along, thickness) = (point(rng, 2.0), direction(rng), power(rng, -9.0, -1.0));
+            let across = direction(rng) * thickness;
+            let vertices = [tip, tip + 3.0 * along, tip + 3.0 * along + across];
+            triangle(rng, vertices)
+        })
+        .collect();
+    let mut objects = objects?;
+    objects.push(sphere(rng, 1.0, DVec3::NEG_Z)?);
+    picture(rng, objects, DVec3::new(0.0, 1.0, 6.0), DVec3::ZERO)
+}
+
+fn equal(rng: &mut Rng) -> Result<Scene> {
+    let shapes = heap(rng, 5)?;
+    let count = [10, 60, 300][rng.usize(0..3)];
+    let objects: Result<Vec<_>> = (0..count)
+        .map(|_| {
+            let surface = matte(rng)?;
+            Ok(match &shapes[rng.usize(0..shapes.len())] {
+                Object::Sphere(s) => Object::Sphere(Sphere::new(s.radius(), s.center(), surface)?),
+                Object::Cuboid(c) => Object::Cuboid(Cuboid::new(*c.corners(), surface)?),
+                Object::Triangle(t) => Object::Triangle(Triangle::new(*t.vertices(), surface)?),
+            })
+        })
+        .collect();
+    picture(rng, objects?, DVec3::new(0.0, 1.0, 6.0), DVec3::ZERO)
+}
+
+fn far_off(rng: &mut Rng) -> Result<Scene> {
+    let objects = heap(rng, 12)?;
+    let scene = picture(rng, objects, DVec3::new(0.0, 1.0, 6.0), DVec3::ZERO)?;
+    let offset = direction(rng) * power(rng, 4.0, 14.0);
+    moved(&scene, 1.0, offset)
+}
+
+fn in_other_units(rng: &mut Rng) -> Result<Scene> {
+    let objects = heap(rng, 12)?;
+    let scene = picture(rng, objects, DVec3::new(0.0, 1.0, 6.0), DVec3::ZERO)?;
+    let scale = power(rng, -305.0, 305.0);
+    moved(&scene, scale, DVec3::ZERO)
+}
+
+fn of_all_angles(rng: &mut Rng) -> Result<Scene> {
+    let objects = heap(rng, 12)?;
+    let eye = direction(rng) * 6.0;
+    let mut scene = picture(rng, objects, eye, DVec3::ZERO)?;
+    let half = power(rng, -8.0, 3.0);
+    scene.camera = seen_from(eye, DVec3::ZERO, half, scene.screen)?;
+    Ok(scene)
+}
+
+fn odd_screens(rng: &mut Rng) -> Result<Scene> {
+    let objects = heap(rng, 12)?;
+    let mut scene = picture(rng, objects, DVec3::new(0.0, 1.0, 6.0), DVec3::ZERO)?;
+    let (width, height) = [(1, 1), (1, 200), (200, 1), (3, 2), (8, 300), (300, 5), (17, 33)][rng.usize(0..7)];
+    scene.screen = Screen::new(width, height)?;
+    let Camera::Pinhole(p) = scene.camera else { return Ok(scene) };
+    // As the language allows: mirrored, and off the axis.
+    let (a, b) = (DVec2::new(0.6, -0.3), DVec2::new(-0.2, 0.5));
+    scene.camera = Camera::Pinhole(Pinhole::new(p.eye(), p.gaze(), p.up(), 1.0, a, b)?);
+    Ok(scene)
+}
+
+/// Rays that meet edges, corners and planes exactly.
+fn whole_numbers(rng: &mut Rng) -> Result<Scene> {
+    let whole = |rng: &mut Rng| DVec3::from_array([(); 3].map(|()| f64::from(rng.i32(-4..5))));
+    let objects: Result<Vec<_>> = (0..rng.usize(2..40))
+        .map(|_| match rng.u32(0..3) {
+            0 => {
+                let (radius, center) = (f64::from(rng.u32(1..4)), whole(rng));
+                sphere(rng, radius, center)
+            }
+            1 => {
+                let (u, v) = (whole(rng), whole(rng));
+                cuboid(rng, u, v)
+            }
+            _ => {
+                let vertices = [whole(rng), whole(rng), whole(rng)];
+                triangle(rng, vertices)
+            }
+        })
+        .collect();
+    let screen = Screen::new(33, 33)?;
+    let axis = rng.usize(0..3);
+    let (back, up) = (DVec3::AXES[axis], DVec3::AXES[(axis + 1) % 3]);
+    let eye = 8.0 * back;
+    let camera = Pinhole::new(eye, -back, up, 1.0, DVec2::splat(-0.5), DVec2::splat(0.5))?;
+    let mut scene = Scene::new(screen, Camera::Pinhole(camera));
+    scene.set_background(color(rng))?;
+    scene.objects = objects?.into();
+    scene.lights = vec![light(0.5, [-1.0, -1.0, -1.0])?, light(0.4, [0.0, -1.0, 0.0])?].into();
+    Ok(scene)
+}
+
+fn parallel(rng: &mut Rng) -> Result<Scene> {
+    let scale = power(rng, 0.0, 2.0);
+    let objects: Result<Vec<_>> = (0..rng.usize(2..100))
+        .map(|_| {
+            let at = point(rng, 30.0) + DVec3::new(20.0, 20.0, -40.0 * scale);
+            let size = power(rng, 0.0, 1.5);
+            any(rng, at, size)
+        })
+        .collect();
+    let mut scene = picture(rng, objects?, DVec3::ZERO, DVec3::NEG_Z)?;
+    scene.camera = Camera::Orthographic;
+    Ok(scene)
+}
+
+fn bright(rng: &mut Rng) -> Result<Scene> {
+    let glare = power(rng, 0.0, 8.0);
+    let signed = |rng: &mut Rng| (color(rng) * 2.0 - 1.0) * glare;
+    let objects: Result<Vec<_>> = heap(rng, 10)?
+        .into_iter()
+        .map(|object| {
+            let (ambient, diffuse) = (signed(rng), signed(rng));
+            let mirror = if rng.bool() { signed(rng) } else { DVec3::ZERO };
+            Ok(match object {
+                Object::Sphere(s) => {
+                    let surface = Material::new(ambient, diffuse, mirror)?;
+                    Object::Sphere(Sphere::new(s.radius(), s.center(), surface)?)
+                }
+                Object::Cuboid(c) => {
+                    let surface = Material::new(ambient, diffuse, DVec3::ZERO)?;
+                    Object::Cuboid(Cuboid::new(*c.corners(), surface)?)
+                }
+                Object::Triangle(t) => {
+                    let surface = Material::new(ambient, diffuse, DVec3::ZERO)?;
+                    Object::Triangle(Triangle::new(*t.vertices(), surface)?)
+                }
+            })
+        })
+        .collect();
+    picture(rng, objects?, DVec3::new(0.0, 1.0, 6.0), DVec3::ZERO)
+}

@@ -1,0 +1,167 @@
+//! The textbook's formulas, to measure what robustness costs.
+//!
+//! Tiles, candidates, constants and shadows are those of the robust kernels; what differs is how a root is computed,
+//! that no error bound widens an edge or a slab, and that new rays start a fixed way off their surface.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd};
+
+use super::Job;
+use super::features::{Everything, Features, Mesh, Solids};
+use super::intersect::{Formulas, Moment, Nearest, Ray, Slopes, Surface};
+use super::prepare::{Cuboid, Edge, Sphere, Triangle};
+use super::real::{Lanes, Real, Vec3, constant, splat};
+use super::tile::Band;
+
+/// How far from a surface a ray starts; a scene has the size of 1.
+const EPSILON: f64 = 1e-4;
+
+/// With the kernels of scenes of all kinds, of meshes, and of any number of objects.
+pub(super) fn draw(job: &Job<f32>, level: Level, band: Band) {
+    let needs = job.prepared.needs;
+    if !needs.tree {
+        on!(level, simd => job.draw::<_, Naive<Solids>>(simd, band));
+    } else if needs.cuboids || needs.mirrors {
+        on!(level, simd => job.draw::<_, Naive<Everything>>(simd, band));
+    } else {
+        on!(level, simd => job.draw::<_, Naive<Mesh>>(simd, band));
+    }
+}
+
+/// What `F` can draw, by the textbook.
+struct Naive<F>(core::marker::PhantomData<F>);
+
+impl<F: Features> Features for Naive<F> {
+    const CUBOIDS: bool = F::CUBOIDS;
+    const TRIANGLES: bool = F::TRIANGLES;
+    const MIRRORS: bool = F::MIRRORS;
+    const SHADOWS: bool = F::SHADOWS;
+    const TREE: bool = F::TREE;
+}
+
+impl<F> Formulas for Naive<F> {
+    #[inline(always)]
+    fn sphere<S: Simd, E: Real>(simd: S, sphere: &Sphere<E>, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+        let from_center = ray.origin.sub(Vec3::splat(simd, sphere.center));
+        let half = from_center.dot(ray.direction);
+        let rest = half.mul_sub(half, from_center.dot(from_center) - splat::<S, E>(simd, sphere.square));
+        let middle = constant::<S, E>(simd, 0.0) - half;
+        roots(simd, middle, rest, sphere.order, nearest);
+    }
+
+    #[inline(always)]
+    fn sphere_from_eye<S: Simd, E: Real>(
+        simd: S,
+        sphere: &Sphere<E>,
+        direction: Vec3<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
+        let middle = Vec3::splat(simd, sphere.center).dot(direction);
+        let rest = middle.mul_sub(middle, splat::<S, E>(simd, sphere.power));
+        roots(simd, middle, rest, sphere.order, nearest);
+    }
+
+    #[inline(always)]
+    fn cuboid<S: Simd, E: Real>(
+        simd: S,
+        cuboid: &Cuboid<E>,
+        ray: Ray<S, E>,
+        slopes: Slopes<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
+        let zero = constant::<S, E>(simd, 0.0);
+        let a = Vec3::splat(simd, cuboid.min).sub(ray.origin).mul(slopes.inverse);
+        let b = Vec3::splat(simd, cuboid.max).sub(ray.origin).mul(slopes.inverse);
+        let enter = a.x.min(b.x).max(a.y.min(b.y)).max(a.z.min(b.z));
+        let leave = a.x.max(b.x).min(a.y.max(b.y)).min(a.z.max(b.z));
+        let hit = enter.simd_le(leave);
+        if hit.any_true() {
+            let distance = enter.simd_gt(zero).select(enter, leave);
+            nearest.offer(simd, hit & distance.simd_gt(zero), distance, cuboid.order);
+        }
+    }
+
+    #[inline(always)]
+    fn triangle<S: Simd, E: Real>(
+        simd: S,
+        triangle: &Triangle<E>,
+        ray: Ray<S, E>,
+        moment: Moment<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
+        let zero = constant::<S, E>(simd, 0.0);
+        let [a, b, c] = &triangle.edges;
+        let (a, b, c) = (side(simd, a, ray, moment), side(simd, b, ray, moment), side(simd, c, ray, moment));
+        let inside = a.min(b).min(c).simd_ge(zero) | a.max(b).max(c).simd_le(zero);
+        if inside.any_true() {
+            let normal = Vec3::splat(simd, triangle.normal);
+            let above = splat::<S, E>(simd, triangle.height) - normal.dot(ray.origin);
+            let distance = above / normal.dot(ray.direction);
+            nearest.offer(simd, inside & distance.simd_gt(zero), distance, triangle.order);
+        }
+    }
+
+    #[inline(always)]
+    fn sphere_surface<S: Simd, E: Real, const EYE: bool>(
+        simd: S,
+        sphere: &Sphere<E>,
+        ray: Ray<S, E>,
+        distance: Lanes<S, E>,
+    ) -> Surface<S, E> {
+        let point = ray.direction.scale_add(distance, ray.origin);
+        let inverse = constant::<S, E>(simd, 1.0) / splat::<S, E>(simd, sphere.outer);
+        let outward = point.sub(Vec3::splat(simd, sphere.center)).scale(inverse);
+        off(
+            simd,
+            point,
+            if EYE && sphere.power > E::narrow(0.0) { outward } else { facing(simd, outward, ray) },
+        )
+    }
+
+    #[inline(always)]
+    fn triangle_surface<S: Simd, E: Real>(
+        simd: S,
+        triangle: &Triangle<E>,
+        ray: Ray<S, E>,
+        distance: Lanes<S, E>,
+        _: f64,
+    ) -> Surface<S, E> {
+        let point = ray.direction.scale_add(distance, ray.origin);
+        off(simd, point, facing(simd, Vec3::splat(simd, triangle.normal), ray))
+    }
+}
+
+#[inline(always)]
+fn roots<S: Simd, E: Real>(
+    simd: S,
+    middle: Lanes<S, E>,
+    rest: Lanes<S, E>,
+    order: E,
+    nearest: &mut Nearest<S, E>,
+) {
+    let zero = constant::<S, E>(simd, 0.0);
+    let meets = rest.simd_ge(zero);
+    if meets.any_true() {
+        let root = rest.sqrt();
+        let near = middle - root;
+        let distance = near.simd_gt(zero).select(near, middle + root);
+        nearest.offer(simd, meets & distance.simd_gt(zero), distance, order);
+    }
+}
+
+#[inline(always)]
+fn side<S: Simd, E: Real>(simd: S, edge: &Edge<E>, ray: Ray<S, E>, moment: Moment<S, E>) -> Lanes<S, E> {
+    let side = Vec3::splat(simd, edge.moment).dot(ray.direction);
+    Vec3::splat(simd, edge.direction).dot_add(moment.moment, side)
+}
+
+#[inline(always)]
+fn facing<S: Simd, E: Real>(simd: S, normal: Vec3<S, E>, ray: Ray<S, E>) -> Vec3<S, E> {
+    let away = normal.dot(ray.direction).simd_gt(constant::<S, E>(simd, 0.0));
+    normal.scale(away.select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0)))
+}
+
+#[inline(always)]
+fn off<S: Simd, E: Real>(simd: S, point: Vec3<S, E>, normal: Vec3<S, E>) -> Surface<S, E> {
+    Surface { start: normal.scale_add(constant::<S, E>(simd, EPSILON), point), normal }
+}
