@@ -41,8 +41,8 @@ fn draw(path: &Path, labels: &Labels, series: &[Series]) -> Result<(), Box<dyn s
     let range = |of: fn(&(f64, f64)) -> f64| {
         let all = series.iter().flat_map(|s| &s.points).map(of);
         let (low, high) = all.fold((f64::INFINITY, 0f64), |(l, h), v| (l.min(v), h.max(v)));
-        // Whole decades, with half a decade to spare.
-        10f64.powf((low.log10() - 0.2).floor())..10f64.powf((high.log10() + 0.2).ceil())
+        // Whole decades, the first and the last of them with their names.
+        0.8 * 10f64.powf((low.log10() - 0.2).floor())..1.25 * 10f64.powf((high.log10() + 0.2).ceil())
     };
     let area = SVGBackend::new(path, SIZE).into_drawing_area();
     area.fill(&WHITE)?;

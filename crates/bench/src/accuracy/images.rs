@@ -4,14 +4,14 @@ use anyhow::{Context, Result};
 use glam::DVec3;
 use image::RgbImage;
 use rayfold_scene::Scene;
-use rayfold_tracer::{MAX_BOUNCES, reference};
+use rayfold_tracer::{MAX_BOUNCES, Precision, RenderOptions, reference};
 use rayon::prelude::*;
 
 use super::flip::flip;
 use super::rays;
 use crate::cpu_time;
 use crate::oracle;
-use crate::tracers::{self, Tracer};
+use crate::tracers::{self, Tracer, packets};
 
 /// The deepest recursion that is measured: what the error of stopping early is taken against.
 pub(crate) const DEEPEST: u32 = 16;
@@ -26,6 +26,8 @@ pub(crate) struct Subject {
     pub(crate) samples: usize,
     /// Whether every object is looked at for every ray of the truth; the f64 packets draw it where that takes too long.
     pub(crate) plain: bool,
+    /// Whether it is drawn at other depths than the language's as well.
+    pub(crate) deep: bool,
 }
 
 /// A way on a scene, at a depth.
@@ -61,7 +63,7 @@ pub(crate) struct Comparison {
     pub(crate) scene: String,
     pub(crate) objects: usize,
     pub(crate) size: (u32, u32),
-    /// Way by way, each from the least depth to the greatest; only the language's where nothing mirrors.
+    /// Way by way, each from the least depth to the greatest; depths that add no ray are left out.
     pub(crate) measurements: Vec<Measurement>,
     pub(crate) truth: Truth,
 }
@@ -101,8 +103,16 @@ struct Drawn {
 /// Draws the scene with every way at every depth in turn.
 pub(crate) fn compare(subject: &Subject) -> Result<Comparison> {
     let scene = &subject.scene;
-    let mirrors = scene.objects.iter().any(|object| object.material().mirror() != DVec3::ZERO);
-    let depths: Vec<u32> = if mirrors { (1..=DEEPEST).collect() } else { vec![MAX_BOUNCES] };
+    let counter = if subject.plain {
+        tracers::reference()
+    } else {
+        packets("f64", RenderOptions { precision: Precision::F64, ..Default::default() })
+    };
+    let counts = rays::count(scene, &counter, if subject.deep { DEEPEST } else { MAX_BOUNCES })?;
+    let adds =
+        |bounces: &u32| *bounces == MAX_BOUNCES || counts[*bounces as usize] > counts[*bounces as usize - 1];
+    let depths: Vec<u32> =
+        if subject.deep { (1..=DEEPEST).filter(adds).collect() } else { vec![MAX_BOUNCES] };
     let ways: Vec<Vec<Tracer>> = depths.iter().map(|&bounces| tracers::for_pictures(bounces)).collect();
     let truth_of = |ways: &[Tracer]| if subject.plain { 0 } else { ways.len() - 1 };
     let mut drawn: Vec<Drawn> = Vec::new();
@@ -133,8 +143,6 @@ pub(crate) fn compare(subject: &Subject) -> Result<Comparison> {
     let truths: Vec<&RgbImage> =
         drawn.iter().filter(|one| one.tracer == truth.name).map(|one| &one.image).collect();
     let last = truths.last().context("no truth")?;
-    let counter = &ways[0][if subject.plain { 0 } else { ways[0].len() - 1 }];
-    let counts = rays::count(scene, counter, *depths.last().context("no depth")?)?;
     let mut measurements: Vec<Measurement> = drawn
         .par_iter()
         .map(|one| Measurement {

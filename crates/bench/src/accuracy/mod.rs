@@ -28,7 +28,7 @@ pub struct Args {
     /// Small images, each drawn once; hard cases at the sizes of the tests
     #[arg(long)]
     quick: bool,
-    /// The hard cases at full size, and not the images: half an hour
+    /// The hard cases at full size instead of the images
     #[arg(long)]
     hard_cases: bool,
     /// Of the hard cases only this one
@@ -72,8 +72,8 @@ fn introduction(quick: bool) -> String {
          their surface. `auto` is what users get: `f32 robust`, or `f64` where bounds on the errors of `f32` say so.\n\n\
          The truth is the plain `f64` tracer (`reference`) at the same depth, whose own error is measured against an oracle \
          that computes with 640 bits. *Depth* is how often light is followed through mirrors; {MAX_BOUNCES} is the \
-         language's. *Unfinished* is the root mean square of the difference from the truth at depth {DEEPEST}, rounding and \
-         stopping early together. *Front*: no other way and depth is both as fast and as close to that truth.\n\n\
+         language's; up to {DEEPEST} are drawn, those that add rays. *Unfinished* is the root mean square of the difference \
+         from the truth at the greatest depth, rounding and stopping early together. *Front*: no other way and depth is both as fast and as close to that truth.\n\n\
          RMSE and the largest error are in levels (0 to 255) over the three channels; FLIP is the mean of LDR-FLIP \
          (Andersson et al. 2020) at 67 pixels a degree; NaN counts channels that were not a number before they became \
          a level. Rays are those that the language asks for: from the camera, to each light that a surface faces, from \
@@ -83,14 +83,15 @@ fn introduction(quick: bool) -> String {
 
 fn subjects(quick: bool) -> Result<Vec<Subject>> {
     let (rounds, samples) = if quick { (1, 200) } else { (5, 2000) };
-    let subject = |name: &str, scene| Subject { name: name.into(), scene, rounds, samples, plain: true };
+    let subject =
+        |name: &str, scene| Subject { name: name.into(), scene, rounds, samples, plain: true, deep: true };
     let mut all = Vec::new();
     for name in EXAMPLES {
         all.push(subject(name, example(name)?));
     }
     all.push(subject("table", if quick { table(160, 120)? } else { table(480, 360)? }));
     for (name, scene) in one_of_each(if quick { 48 } else { 128 })? {
-        all.push(Subject { samples: samples / 20, ..subject(name, scene) });
+        all.push(Subject { samples: samples / 20, deep: false, ..subject(name, scene) });
     }
     let (plain, big) = if quick { (1280, 20_480) } else { (20_480, 327_680) };
     all.push(Subject { samples: samples / 50, ..subject("rock", rock(plain, 128, 128)?) });
@@ -180,13 +181,17 @@ const NONE: f64 = 1e-4;
 fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
     let mut text = String::from("## Error over time\n\n![Error over time](accuracy-images.svg)\n\n");
     let ways = comparisons.first().map_or(0, |c| c.pictures().count());
-    let of_way = |way: usize| comparisons.iter().filter_map(move |c| c.pictures().nth(way));
-    let series: Vec<Series> = (0..ways)
-        .filter_map(|way| {
-            let points = of_way(way).map(|m| (m.seconds, m.error.rmse.max(NONE))).collect();
-            Some(Series { name: of_way(way).next()?.tracer.clone(), points, joined: false })
+    let names = comparisons.first().into_iter().flat_map(Comparison::pictures).map(|m| m.tracer.clone());
+    let series: Vec<Series> = names
+        .filter(|name| name != "reference")
+        .map(|name| {
+            let pictures = comparisons.iter().flat_map(Comparison::pictures).filter(|m| m.tracer == name);
+            Series {
+                points: pictures.map(|m| (m.seconds, m.error.rmse.max(NONE))).collect(),
+                name,
+                joined: false,
+            }
         })
-        .filter(|series| series.name != "reference")
         .collect();
     let labels = Labels {
         title: "Error over time at the language's depth, a point a scene",
@@ -204,11 +209,11 @@ fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
             }
         }
         let file = format!("accuracy-{}.svg", c.scene.replace(' ', "-"));
-        let title = format!("{}: error over time, depth 1 to {DEEPEST}", c.scene);
+        let title = format!("{}: error over time, a point a depth", c.scene);
         let labels = Labels {
             title: &title,
             x: "CPU seconds an image",
-            y: "RMSE in levels against depth 16 (1e-4: none)",
+            y: "RMSE in levels against the greatest depth (1e-4: none)",
         };
         log_log(&folder.join(&file), &labels, &series)?;
         writeln!(text, "![{title}]({file})\n")?;

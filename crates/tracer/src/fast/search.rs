@@ -324,21 +324,21 @@ fn nearest_in_tree<S: Simd, E: Real, F: Features, const EYE: bool>(
             if F::TRIANGLES && kind == Kind::Triangle {
                 for of in &scene.triangles[items] {
                     if EYE {
-                        triangle_from_eye(simd, of, ray.direction, &mut nearest);
+                        F::triangle_from_eye(simd, of, ray.direction, &mut nearest);
                     } else {
-                        triangle(simd, of, ray, moment, &mut nearest);
+                        F::triangle(simd, of, ray, moment, &mut nearest);
                     }
                 }
             } else if F::CUBOIDS && kind == Kind::Cuboid {
                 for of in &scene.cuboids[items] {
-                    cuboid(simd, of, ray, slopes, &mut nearest);
+                    F::cuboid(simd, of, ray, slopes, &mut nearest);
                 }
             } else {
                 for of in &scene.spheres[items] {
                     if EYE {
-                        sphere_from_eye(simd, of, ray.direction, &mut nearest);
+                        F::sphere_from_eye(simd, of, ray.direction, &mut nearest);
                     } else {
-                        sphere(simd, of, ray, &mut nearest);
+                        F::sphere(simd, of, ray, &mut nearest);
                     }
                 }
             }
