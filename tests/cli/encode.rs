@@ -1,6 +1,9 @@
 //! `rayfold encode`.
 
-use crate::{BALL, Folder, ball_at};
+use image::{DynamicImage, GrayAlphaImage, ImageBuffer, Luma, LumaA, Rgb, RgbImage, Rgba};
+use snapbox::str;
+
+use crate::{BALL, Folder, ball_at, decode_gif};
 
 #[test]
 fn encoded_images_are_the_rendered_animation() {
@@ -32,4 +35,93 @@ fn the_image_at_fault_is_named_and_nothing_is_written() {
     folder.rayfold("encode a.png -o out.png").assert().code(2);
     folder.rayfold("encode a.png -o out.gif --fps 0").assert().code(2);
     assert_eq!(folder.list("."), ["a.png", "b.png", "ball.txt", "text.png"]);
+}
+
+#[test]
+fn all_that_cannot_be_used_is_told_before_anything_is_encoded() {
+    let folder = Folder::with("text.png", "this is no image");
+    folder.write("empty.tif", "");
+    folder.write("frames/note.txt", "no image either");
+    // The first bytes of a JPEG.
+    folder.write("photo.png", b"\xff\xd8\xff\xe0\0\x10JFIF\0\x01\x01\0\0\x01\0\x01\0\0");
+    RgbImage::new(9, 9).save(folder.join("a.png")).unwrap();
+    folder
+        .rayfold("encode a.png text.png empty.tif frames none.png photo.png -o out.gif")
+        .assert()
+        .code(1)
+        .stdout_eq("")
+        .stderr_eq(str![[r#"
+error: cannot read text.png: it is neither a PNG nor a TIFF image
+error: cannot read empty.tif: it is neither a PNG nor a TIFF image
+error: cannot read frames: it is a folder, expected its images, such as frames/*.png
+error: cannot read none.png: No such file or directory
+error: cannot read photo.png: it is neither a PNG nor a TIFF image
+error: 5 of 6 frames cannot be used
+
+"#]]);
+    assert_eq!(folder.list("."), ["a.png", "empty.tif", "frames", "photo.png", "text.png"]);
+}
+
+#[test]
+fn grey_deep_and_transparent_images_are_frames_too() {
+    let folder = Folder::new();
+    let images: [(&str, DynamicImage, [u8; 3]); 6] = [
+        ("grey.png", ImageBuffer::from_pixel(3, 2, Luma([77_u8])).into(), [77; 3]),
+        ("deep.png", ImageBuffer::from_pixel(3, 2, Luma([0x8000_u16])).into(), [128; 3]),
+        ("rgb.png", ImageBuffer::from_pixel(3, 2, Rgb([0_u16, 0x8000, 0xffff])).into(), [0, 128, 255]),
+        ("half.png", ImageBuffer::from_pixel(3, 2, Rgba([200_u8, 100, 50, 128])).into(), [100, 50, 25]),
+        ("none.png", GrayAlphaImage::from_pixel(3, 2, LumaA([200, 0])).into(), [0; 3]),
+        ("deep.tif", ImageBuffer::from_pixel(3, 2, Rgb([0_u16, 0x8000, 0xffff])).into(), [0, 128, 255]),
+    ];
+    for (name, image, _) in &images {
+        image.save(folder.join(name)).unwrap();
+    }
+    let names = images.each_ref().map(|(name, ..)| *name).join(" ");
+    folder.rayfold(&format!("encode {names} -o out.gif")).assert().code(0);
+    let shown = decode_gif(&folder.read("out.gif"));
+    assert_eq!(shown.len(), images.len());
+    for ((name, _, expected), (frame, _)) in images.iter().zip(&shown) {
+        assert!(frame.pixels().all(|pixel| pixel.0 == *expected), "{name}: {:?}", frame.get_pixel(0, 0));
+    }
+}
+
+#[test]
+fn a_thousand_frames_are_all_there() {
+    let folder = Folder::new();
+    for number in 0..4_u8 {
+        RgbImage::from_pixel(5, 4, Rgb([60 * number; 3]))
+            .save(folder.join(&format!("{number}.png")))
+            .unwrap();
+    }
+    let frames = "0.png 1.png 2.png 3.png ".repeat(250);
+    folder.rayfold(&format!("encode {frames} -o out.gif --fps 20")).assert().code(0);
+    let shown = decode_gif(&folder.read("out.gif"));
+    assert_eq!(shown.len(), 1_000);
+    assert!(
+        shown
+            .iter()
+            .enumerate()
+            .all(|(k, (frame, delay))| { frame.get_pixel(0, 0).0 == [60 * (k % 4) as u8; 3] && *delay == 5 })
+    );
+}
+
+#[test]
+fn a_side_that_a_gif_cannot_hold_is_an_error() {
+    let folder = Folder::new();
+    RgbImage::new(65_536, 1).save(folder.join("wide.png")).unwrap();
+    folder.rayfold("encode wide.png -o out.gif").assert().code(1).stderr_eq(str![[r#"
+error: wide.png: frame 1 is 65536 x 1 pixels, a GIF can hold 1 to 65535 on each side
+
+"#]]);
+    assert_eq!(folder.list("."), ["wide.png"]);
+}
+
+#[test]
+fn a_rate_below_zero_is_told_as_such() {
+    let folder = Folder::new();
+    RgbImage::new(2, 2).save(folder.join("a.png")).unwrap();
+    folder.rayfold("encode a.png -o out.gif --fps -1").assert().code(2).stderr_eq(str![[r#"
+error: --fps -1: -1 frames a second: a GIF can hold rates from 0.00153 up
+
+"#]]);
 }

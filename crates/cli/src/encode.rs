@@ -1,10 +1,11 @@
 //! `rayfold encode`: images that are already there to an animation.
 
-use std::io::BufWriter;
+use std::fs::File;
+use std::io::{BufReader, BufWriter};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use image::{DynamicImage, ImageReader, Rgb, RgbImage};
+use image::{DynamicImage, ImageFormat, ImageReader, Rgb, RgbImage};
 use rayfold_gif::{Encoder, Error, Settings};
 
 use crate::console::Console;
@@ -12,11 +13,12 @@ use crate::interrupt;
 use crate::outcome::{Outcome, Usage};
 use crate::output::{OutputError, OutputFile, probe};
 use crate::progress::Progress;
-use crate::render::{ahead, tell};
+use crate::render::tell;
 use crate::threads::Threads;
+use crate::wording::number;
 
-/// Frames that are read ahead of the encoder.
-const AHEAD: usize = 2;
+/// Files at fault that are named, at most.
+const MOST_TOLD: usize = 20;
 
 /// Turn images into an animated GIF
 ///
@@ -34,10 +36,10 @@ pub(crate) struct Args {
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
     /// Frames a second; above 50 some are left out, because a GIF cannot show them
-    #[arg(long, value_name = "N", default_value_t = Settings::default().fps)]
+    #[arg(long, value_name = "N", default_value_t = Settings::default().fps, allow_negative_numbers = true)]
     fps: f64,
     /// How often to repeat; 0 is for ever
-    #[arg(long = "loop", value_name = "TIMES", default_value_t = Settings::default().loops)]
+    #[arg(long = "loop", value_name = "TIMES", default_value_t = Settings::default().loops, allow_negative_numbers = true)]
     loops: u16,
     #[command(flatten)]
     threads: Threads,
@@ -50,25 +52,27 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         return Err(Usage(message).into());
     }
     probe(path)?;
+    check(&args.frames, console)?;
     args.threads.start()?;
-    let mut out = BufWriter::with_capacity(1 << 20, OutputFile::create(path)?);
+    let mut out = BufWriter::with_capacity(1 << 16, OutputFile::create(path)?);
     let settings = Settings { fps: args.fps, loops: args.loops };
     let mut encoder =
         Encoder::new(&mut out, settings).map_err(|error| Usage(format!("--fps {}: {error}", args.fps)))?;
     let mut progress = Progress::start(console, "frames", args.frames.len() as u64);
-    let mut frames = args.frames.iter().zip(1..);
-    ahead::in_order(
-        args.frames.iter(),
-        AHEAD,
-        |frame| read(frame),
-        |image| {
-            anyhow::ensure!(!interrupt::stopping(), "interrupted");
-            let (frame, done) = frames.next().context("an image for each frame")?;
-            encoder.push(image).map_err(|error| explain(error, frame, path))?;
-            progress.set(console, done);
-            Ok(())
-        },
-    )?;
+    let mut next = args.frames.first().map(|frame| read(frame));
+    for (frame, done) in args.frames.iter().zip(1..) {
+        anyhow::ensure!(!interrupt::stopping(), "interrupted");
+        let image = next.take().context("an image for each frame")??;
+        let mut pushed = Ok(());
+        rayon::in_place_scope(|scope| {
+            scope.spawn(|_| pushed = encoder.push(image));
+            // Beside it, and all on this thread: memory that is given back is kept for the thread that asked for it, so
+            // images read by several would take up to half as much again.
+            next = args.frames.get(done).map(|frame| read(frame));
+        });
+        pushed.map_err(|error| explain(error, frame, path))?;
+        progress.set(console, done as u64);
+    }
     let summary = encoder.finish().map_err(|error| explain(error, path, path))?;
     let took = progress.finish();
     let failed = |source| OutputError::Io { path: path.clone(), source };
@@ -85,10 +89,39 @@ fn explain(error: Error, frame: &Path, output: &Path) -> anyhow::Error {
     }
 }
 
+/// Looks at all files before any is encoded: that each is there, and by its first bytes a PNG or TIFF image.
+///
+/// # Errors
+/// When one is not; each is told.
+fn check(frames: &[PathBuf], console: &Console) -> anyhow::Result<()> {
+    let faults = frames.iter().filter_map(|path| open(path).err()).collect::<Vec<_>>();
+    if faults.is_empty() {
+        return Ok(());
+    }
+    faults.iter().take(MOST_TOLD).for_each(|fault| console.error(fault));
+    anyhow::bail!("{} of {} cannot be used", faults.len(), number(frames.len() as u64, "frame"))
+}
+
+fn open(path: &Path) -> anyhow::Result<ImageReader<BufReader<File>>> {
+    let opened = || {
+        anyhow::ensure!(
+            !path.is_dir(),
+            "it is a folder, expected its images, such as {0}/*.png",
+            path.display()
+        );
+        let reader = ImageReader::new(BufReader::new(File::open(path)?)).with_guessed_format()?;
+        match reader.format() {
+            Some(ImageFormat::Png | ImageFormat::Tiff) => Ok(reader),
+            _ => anyhow::bail!("it is neither a PNG nor a TIFF image"),
+        }
+    };
+    opened().with_context(|| format!("cannot read {}", path.display()))
+}
+
 fn read(path: &Path) -> anyhow::Result<RgbImage> {
-    let read = || Ok::<_, anyhow::Error>(ImageReader::open(path)?.with_guessed_format()?.decode()?);
-    let image = read().with_context(|| format!("cannot read {}", path.display()))?;
-    Ok(opaque(image))
+    // The decoder's words say already what its cause says again.
+    let decoded = open(path)?.decode().map_err(|error| anyhow::anyhow!("{error}"));
+    Ok(opaque(decoded.with_context(|| format!("cannot read {}", path.display()))?))
 }
 
 /// A GIF's pixel is there or not; what is half there is shown over black.

@@ -24,7 +24,7 @@ use crate::progress::Progress;
 use crate::threads::Threads;
 use crate::wording::{Size, number};
 
-pub(crate) mod ahead;
+mod ahead;
 pub(crate) mod target;
 
 use target::{Format, Pattern, Target};
