@@ -7,6 +7,7 @@
 #![allow(clippy::print_stderr, reason = "a measurement says what it is at")]
 
 pub mod accuracy;
+#[cfg(feature = "bucket")]
 pub mod cold_start;
 pub mod cpu_time;
 pub mod gif;
@@ -15,9 +16,11 @@ pub mod measure;
 pub mod needs;
 pub mod oracle;
 pub mod parsing;
+#[cfg(feature = "bucket")]
 pub mod pipeline;
 mod plot;
 pub mod scenes;
+#[cfg(feature = "bucket")]
 pub mod simulate;
 pub mod speed;
 pub mod tracers;

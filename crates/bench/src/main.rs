@@ -1,7 +1,9 @@
 //! The program that measures: a subcommand a report.
 
 use clap::{Parser, Subcommand};
-use rayfold_bench::{accuracy, cold_start, gif, measure, needs, parsing, pipeline, simulate, speed};
+use rayfold_bench::{accuracy, gif, measure, needs, parsing, speed};
+#[cfg(feature = "bucket")]
+use rayfold_bench::{cold_start, pipeline, simulate};
 
 #[derive(Debug, Parser)]
 #[command(name = "rayfold-bench", about = "Measures rayfold and writes the reports in docs/reports")]
@@ -15,12 +17,15 @@ enum Measurement {
     /// Error and speed of every way to trace, and the hard cases at full size
     Accuracy(accuracy::Args),
     /// The paper's table: scenes from upload to GIF on MinIO and the local invoker
+    #[cfg(feature = "bucket")]
     Pipeline(pipeline::Args),
     /// Size of the functions, and how soon a new process asks for its first invocation
+    #[cfg(feature = "bucket")]
     ColdStart(cold_start::Args),
     /// What it takes to read and write the largest scripts
     Parsing(parsing::Args),
     /// The pipeline's protocol in a simulated world: seeds, broken rules, requests at scale
+    #[cfg(feature = "bucket")]
     Simulate(simulate::Args),
     /// Time, memory, size and quality of GIFs, beside those of other encoders
     Gif(gif::Args),
@@ -36,9 +41,12 @@ enum Measurement {
 fn main() -> anyhow::Result<()> {
     match Cli::parse().measurement {
         Measurement::Accuracy(args) => accuracy::run(&args),
+        #[cfg(feature = "bucket")]
         Measurement::Pipeline(args) => pipeline::run(&args),
+        #[cfg(feature = "bucket")]
         Measurement::ColdStart(args) => cold_start::run(&args),
         Measurement::Parsing(args) => parsing::run(&args),
+        #[cfg(feature = "bucket")]
         Measurement::Simulate(args) => simulate::run(&args),
         Measurement::Gif(args) => gif::run(&args),
         Measurement::Measure(args) => measure::run(&args),

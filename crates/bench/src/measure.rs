@@ -32,6 +32,17 @@ pub struct Cost {
     pub memory: f64,
 }
 
+impl Cost {
+    /// The least times of two runs, and the most memory.
+    pub(crate) fn least(self, other: Self) -> Self {
+        Self {
+            wall: self.wall.min(other.wall),
+            cpu: self.cpu.min(other.cpu),
+            memory: self.memory.max(other.memory),
+        }
+    }
+}
+
 /// Runs the program and prints its [`Cost`].
 ///
 /// # Errors

@@ -37,6 +37,71 @@ pub(crate) fn log_log(path: &Path, labels: &Labels, series: &[Series]) -> Result
     draw(path, labels, series).map_err(|error| anyhow!("{}: {error}", path.display()))
 }
 
+/// Draws a column of points for each name, x being the name's index, and level lines.
+pub(crate) fn columns(
+    path: &Path,
+    labels: &Labels,
+    names: &[&str],
+    lines: &[f64],
+    series: &[Series],
+) -> Result<()> {
+    draw_columns(path, labels, names, lines, series).map_err(|error| anyhow!("{}: {error}", path.display()))
+}
+
+fn draw_columns(
+    path: &Path,
+    labels: &Labels,
+    names: &[&str],
+    lines: &[f64],
+    series: &[Series],
+) -> Result<(), Box<dyn std::error::Error>> {
+    let top = series.iter().flat_map(|s| &s.points).map(|p| p.1).fold(1.0, f64::max) * 1.08;
+    let area = SVGBackend::new(path, SIZE).into_drawing_area();
+    area.fill(&WHITE)?;
+    // The names of the series stand to the right of the columns.
+    let width = names.len() as f64 * 1.2;
+    let mut chart = ChartBuilder::on(&area)
+        .caption(labels.title, ("sans-serif", 20))
+        .margin(12)
+        .x_label_area_size(110)
+        .y_label_area_size(72)
+        .build_cartesian_2d(-0.6..width - 0.4, 0.0..top)?;
+    chart
+        .configure_mesh()
+        .disable_x_mesh()
+        .disable_x_axis()
+        .y_desc(labels.y)
+        .max_light_lines(0)
+        .label_style(("sans-serif", 14))
+        .draw()?;
+    let turned = ("sans-serif", 14).into_font().transform(FontTransform::Rotate270);
+    for (k, name) in names.iter().enumerate() {
+        let place = chart.backend_coord(&(k as f64, 0.0));
+        area.draw(&Text::new(*name, (place.0 - 8, place.1 + 8 + 8 * name.len() as i32), turned.clone()))?;
+    }
+    for &line in lines {
+        let ends = [(-0.6, line), (names.len() as f64 - 0.4, line)];
+        chart.draw_series(LineSeries::new(ends, BLACK.mix(0.5).stroke_width(1)))?;
+    }
+    for (k, series) in series.iter().enumerate() {
+        let style = COLORS[k % COLORS.len()].filled();
+        let shift = 0.1 * (k as f64 - 0.5 * (COLORS.len() - 1) as f64);
+        chart
+            .draw_series(series.points.iter().map(|&(x, y)| Circle::new((x + shift, y), 4, style)))?
+            .label(&series.name)
+            .legend(move |(x, y)| Circle::new((x + 8, y), 5, style));
+    }
+    chart
+        .configure_series_labels()
+        .background_style(WHITE.mix(0.85))
+        .border_style(BLACK.mix(0.3))
+        .label_font(("sans-serif", 14))
+        .position(SeriesLabelPosition::UpperRight)
+        .draw()?;
+    area.present()?;
+    Ok(())
+}
+
 fn draw(path: &Path, labels: &Labels, series: &[Series]) -> Result<(), Box<dyn std::error::Error>> {
     let range = |of: fn(&(f64, f64)) -> f64| {
         let all = series.iter().flat_map(|s| &s.points).map(of);

@@ -1,6 +1,6 @@
 //! Scenes to measure on, made from a seed.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use glam::{DVec2, DVec3};
@@ -42,20 +42,40 @@ pub fn pixel_ray(scene: &Scene, i: u32, j: u32) -> Ray {
 /// # Errors
 /// When its script cannot be read.
 pub fn example(name: &str) -> Result<Scene> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(name);
+    let scripts = scripts(name)?;
+    first_frame(name, scripts.get(scripts.len() / 2).context("a folder without scripts")?)
+}
+
+/// The names of the scripts of an animation in `scenes/`, in order.
+///
+/// # Errors
+/// When there is no such folder.
+pub(crate) fn scripts(animation: &str) -> Result<Vec<String>> {
+    let folder = folder(animation);
     let mut scripts: Vec<String> = std::fs::read_dir(&folder)
         .with_context(|| folder.display().to_string())?
         .map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()))
         .collect::<Result<_>>()?;
     scripts.retain(|name| name.ends_with(".txt"));
     scripts.sort_by(|a, b| natural_cmp(a, b));
-    let script = scripts.get(scripts.len() / 2).context("a folder without scripts")?;
-    let text = std::fs::read(folder.join(script))?;
+    Ok(scripts)
+}
+
+/// What a script of an animation in `scenes/` shows first.
+///
+/// # Errors
+/// When it cannot be read.
+pub(crate) fn first_frame(animation: &str, script: &str) -> Result<Scene> {
+    let text = std::fs::read(folder(animation).join(script))?;
     let parsed = parse(script, &text, &Limits::default());
     parsed
         .script
         .and_then(|script| script.frame(0))
         .with_context(|| format!("{script}: {:?}", parsed.diagnostics))
+}
+
+fn folder(animation: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(animation)
 }
 
 /// The animations in `scenes/`.

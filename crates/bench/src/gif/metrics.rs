@@ -1,11 +1,15 @@
-//! How far a shown animation is from the one meant.
+//! How far a shown animation is from the one meant, judged frame by frame.
+
+use std::sync::LazyLock;
 
 use image::RgbImage;
-use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+
+/// Of how many pixels one is compared by CIE 2000, which costs as much as all else together. No side of a picture or
+/// of a pattern of dots is a multiple of it.
+const SPARSE: usize = 7;
 
 /// Means over frames, but for the worst frame's PSNR.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Quality {
     /// Decibels over all three channels of sRGB, the mean of the frames' (99 for an exact frame).
     pub(super) psnr: f64,
@@ -17,39 +21,94 @@ pub(super) struct Quality {
     pub(super) de2000: f64,
     /// CIE 1976 after a mean over 5 x 5 pixels of both pictures.
     pub(super) blurred: f64,
-    /// CIE 2000 after the same.
-    pub(super) blurred2000: f64,
     /// Of pixels whose colour stays from one frame to the next: CIE 1976 difference of what is shown.
     pub(super) flicker: f64,
     /// The part of those pixels that change.
     pub(super) flicker_share: f64,
 }
 
-/// Compares frame by frame.
-pub(super) fn quality(meant: &[RgbImage], shown: &[&RgbImage]) -> Quality {
-    let per_frame = (0..meant.len().min(shown.len()))
-        .into_par_iter()
-        .map(|k| {
-            let (a, b) = (&meant[k], shown[k]);
-            let psnr = psnr(a, b);
-            let (de76, de2000) = mean_difference(&lab(a), &lab(b));
-            let (blurred, blurred2000) = mean_difference(&blurred_lab(a), &blurred_lab(b));
-            let (flicker, share) =
-                if k == 0 { (0.0, 0.0) } else { flicker([&meant[k - 1], a], [shown[k - 1], b]) };
-            [psnr, de76, de2000, blurred, blurred2000, flicker, share]
-        })
-        .collect::<Vec<_>>();
-    let mean = |at: usize| per_frame.iter().map(|f| f[at]).sum::<f64>() / per_frame.len() as f64;
-    let after_first = per_frame.len() as f64 / (per_frame.len() as f64 - 1.0).max(1.0);
-    Quality {
-        psnr: mean(0),
-        psnr_worst: per_frame.iter().map(|f| f[0]).fold(f64::MAX, f64::min),
-        de76: mean(1),
-        de2000: mean(2),
-        blurred: mean(3),
-        blurred2000: mean(4),
-        flicker: mean(5) * after_first,
-        flicker_share: mean(6) * after_first,
+/// A frame as it should be seen.
+pub(super) struct Meant<'a> {
+    pub(super) image: &'a RgbImage,
+    pub(super) before: Option<&'a RgbImage>,
+    /// `None`: the frame is not judged by colour differences.
+    pub(super) colours: Option<Colours>,
+}
+
+/// A frame's L\*a\*b\*, pixel by pixel.
+pub(super) struct Colours {
+    sharp: Vec<[f32; 3]>,
+    blurred: Vec<[f32; 3]>,
+}
+
+impl Colours {
+    pub(super) fn of(image: &RgbImage) -> Self {
+        Self { sharp: lab(image), blurred: blurred_lab(image) }
+    }
+}
+
+/// Compares what is shown with what is meant.
+#[derive(Default)]
+pub(super) struct Judge {
+    before: Option<RgbImage>,
+    psnr: Mean,
+    psnr_worst: Option<f64>,
+    de76: Mean,
+    de2000: Mean,
+    blurred: Mean,
+    flicker: Mean,
+    flicker_share: Mean,
+}
+
+#[derive(Default)]
+struct Mean {
+    sum: f64,
+    count: f64,
+}
+
+impl Mean {
+    fn add(&mut self, value: f64) {
+        self.sum += value;
+        self.count += 1.0;
+    }
+
+    /// Of nothing: 0.
+    fn value(&self) -> f64 {
+        self.sum / self.count.max(1.0)
+    }
+}
+
+impl Judge {
+    /// Takes the next frame.
+    pub(super) fn see(&mut self, meant: &Meant<'_>, shown: &RgbImage) {
+        let psnr = psnr(meant.image, shown);
+        self.psnr.add(psnr);
+        self.psnr_worst = Some(self.psnr_worst.map_or(psnr, |worst| worst.min(psnr)));
+        if let Some(colours) = &meant.colours {
+            let sharp = lab(shown);
+            self.de76.add(mean_difference(&colours.sharp, &sharp, 1, difference_1976));
+            self.de2000.add(mean_difference(&colours.sharp, &sharp, SPARSE, difference_2000));
+            self.blurred.add(mean_difference(&colours.blurred, &blurred_lab(shown), 1, difference_1976));
+        }
+        if let (Some(before), Some(shown_before)) = (meant.before, &self.before) {
+            let (flicker, share) = flicker([before, meant.image], [shown_before, shown]);
+            self.flicker.add(flicker);
+            self.flicker_share.add(share);
+        }
+        self.before = Some(shown.clone());
+    }
+
+    /// Of all frames so far.
+    pub(super) fn quality(&self) -> Quality {
+        Quality {
+            psnr: self.psnr.value(),
+            psnr_worst: self.psnr_worst.unwrap_or_default(),
+            de76: self.de76.value(),
+            de2000: self.de2000.value(),
+            blurred: self.blurred.value(),
+            flicker: self.flicker.value(),
+            flicker_share: self.flicker_share.value(),
+        }
     }
 }
 
@@ -58,29 +117,28 @@ fn psnr(a: &RgbImage, b: &RgbImage) -> f64 {
     if sum == 0 { 99.0 } else { 10.0 * (65_025.0 * a.as_raw().len() as f64 / sum as f64).log10() }
 }
 
-fn mean_difference(a: &[[f32; 3]], b: &[[f32; 3]]) -> (f64, f64) {
-    let (mut de76, mut de2000) = (0.0, 0.0);
-    for (a, b) in a.iter().zip(b) {
-        if a != b {
-            de76 += f64::from(difference_1976(*a, *b));
-            de2000 += f64::from(difference_2000(*a, *b));
-        }
-    }
-    (de76 / a.len() as f64, de2000 / a.len() as f64)
+/// Over every `step`th pixel.
+fn mean_difference(
+    a: &[[f32; 3]],
+    b: &[[f32; 3]],
+    step: usize,
+    difference: impl Fn([f32; 3], [f32; 3]) -> f32,
+) -> f64 {
+    let pairs = a.iter().zip(b).step_by(step);
+    let sum = pairs.filter(|(a, b)| a != b).map(|(a, b)| f64::from(difference(*a, *b))).sum::<f64>();
+    sum / a.len().div_ceil(step) as f64
 }
 
 fn flicker(meant: [&RgbImage; 2], shown: [&RgbImage; 2]) -> (f64, f64) {
-    let linear = linear_levels();
     let (mut still, mut changed, mut sum) = (0_u64, 0_u64, 0.0);
-    let pixels = |image: &'_ RgbImage| image.as_raw().as_chunks::<3>().0.to_vec();
-    let [before, now, shown_before, shown_now] = [meant[0], meant[1], shown[0], shown[1]].map(pixels);
+    let [before, now] = meant.map(|image| image.as_raw().as_chunks::<3>().0);
+    let [shown_before, shown_now] = shown.map(|image| image.as_raw().as_chunks::<3>().0);
     for k in 0..now.len() {
         if before[k] == now[k] {
             still += 1;
             if shown_before[k] != shown_now[k] {
                 changed += 1;
-                let of = |rgb: [u8; 3]| lab_of_linear(rgb.map(|level| linear[usize::from(level)]));
-                sum += f64::from(difference_1976(of(shown_before[k]), of(shown_now[k])));
+                sum += f64::from(difference_1976(lab_of(shown_before[k]), lab_of(shown_now[k])));
             }
         }
     }
@@ -92,8 +150,12 @@ fn linear(level: f32) -> f32 {
     if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
 
-fn linear_levels() -> Vec<f32> {
-    (0..256).map(|level| linear(level as f32)).collect()
+/// Linear light of the levels and, for means over 25 pixels, of twenty-fifths of them.
+static LINEAR: LazyLock<Vec<f32>> =
+    LazyLock::new(|| (0..=255 * 25).map(|sum| linear(sum as f32 / 25.0)).collect());
+
+pub(super) fn lab_of(rgb: [u8; 3]) -> [f32; 3] {
+    lab_of_linear(rgb.map(|level| LINEAR[usize::from(level) * 25]))
 }
 
 /// CIE L\*a\*b\* under D65 of linear sRGB.
@@ -106,9 +168,7 @@ fn lab_of_linear([r, g, b]: [f32; 3]) -> [f32; 3] {
 }
 
 fn lab(image: &RgbImage) -> Vec<[f32; 3]> {
-    let linear = linear_levels();
-    let pixels = image.as_raw().as_chunks::<3>().0.iter();
-    pixels.map(|rgb| lab_of_linear(rgb.map(|level| linear[usize::from(level)]))).collect()
+    image.as_raw().as_chunks::<3>().0.iter().map(|&rgb| lab_of(rgb)).collect()
 }
 
 /// L\*a\*b\* of the mean levels over 5 x 5 pixels, fewer at the edges.
@@ -129,20 +189,23 @@ fn blurred_lab(image: &RgbImage) -> Vec<[f32; 3]> {
         }
         for x in 0..width {
             let span = x.saturating_sub(2)..(x + 3).min(width);
-            let count = (span.len() * rows.len()) as f32;
+            let count = span.len() * rows.len();
             let mut sum = [0; 3];
             for column in &columns[span] {
                 for k in 0..3 {
                     sum[k] += column[k];
                 }
             }
-            out.push(lab_of_linear(sum.map(|sum| linear(sum as f32 / count))));
+            out.push(lab_of_linear(sum.map(|sum| match count {
+                25 => LINEAR[sum as usize],
+                _ => linear(sum as f32 / count as f32),
+            })));
         }
     }
     out
 }
 
-fn difference_1976(a: [f32; 3], b: [f32; 3]) -> f32 {
+pub(super) fn difference_1976(a: [f32; 3], b: [f32; 3]) -> f32 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f32>().sqrt()
 }
 
@@ -205,26 +268,46 @@ mod tests {
         }
     }
 
+    fn quality(meant: &[&RgbImage], shown: &[&RgbImage]) -> Quality {
+        let mut judge = Judge::default();
+        for k in 0..meant.len() {
+            let before = k.checked_sub(1).map(|k| meant[k]);
+            let colours = Some(Colours::of(meant[k]));
+            judge.see(&Meant { image: meant[k], before, colours }, shown[k]);
+        }
+        judge.quality()
+    }
+
     #[test]
     fn psnr_of_one_level_everywhere() {
         let (a, b) = (RgbImage::new(9, 9), RgbImage::from_pixel(9, 9, image::Rgb([1; 3])));
         assert!((psnr(&a, &b) - 48.1308).abs() < 1e-3);
-        assert_eq!(quality(std::slice::from_ref(&a), &[&a]).psnr, 99.0);
+        let both = quality(&[&a, &a], &[&a, &b]);
+        assert!((both.psnr - (99.0 + 48.1308) / 2.0).abs() < 1e-3 && both.psnr_worst < 49.0, "{both:?}");
     }
 
     #[test]
     fn blur_of_a_checkerboard_is_almost_grey() {
         let board = RgbImage::from_fn(40, 40, |x, y| image::Rgb([((x + y) % 2 * 200) as u8; 3]));
         let grey = RgbImage::from_pixel(40, 40, image::Rgb([100; 3]));
-        let quality = quality(&[grey], &[&board]);
+        let quality = quality(&[&grey], &[&board]);
         assert!(quality.de76 > 30.0 && quality.blurred < 2.5, "{quality:?}");
+    }
+
+    #[test]
+    fn a_part_of_the_pixels_tells_the_mean() {
+        let dots = RgbImage::from_fn(64, 64, |x, y| image::Rgb([((x ^ y) % 8 * 9) as u8, 80, 90]));
+        let grey = RgbImage::from_pixel(64, 64, image::Rgb([30, 80, 90]));
+        let (a, b) = (lab(&dots), lab(&grey));
+        let [all, some] = [1, SPARSE].map(|step| mean_difference(&a, &b, step, difference_2000));
+        assert!((some / all - 1.0).abs() < 0.01, "{some} for {all}");
     }
 
     #[test]
     fn flicker_counts_still_pixels_only() {
         let of =
             |left: u8, right: u8| RgbImage::from_fn(2, 1, |x, _| image::Rgb([[left, right][x as usize]; 3]));
-        let meant = [of(0, 50), of(0, 90)];
+        let meant = [&of(0, 50), &of(0, 90)];
         assert_eq!(quality(&meant, &[&of(0, 50), &of(0, 10)]).flicker, 0.0);
         let moved = quality(&meant, &[&of(0, 50), &of(119, 90)]);
         assert!((moved.flicker - 50.0).abs() < 0.2 && moved.flicker_share == 1.0, "{moved:?}");

@@ -5,50 +5,83 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, ensure};
-use image::RgbImage;
-use serde::{Deserialize, Serialize};
+use anyhow::Context;
+use image::{GenericImageView, RgbImage};
+use rayon::prelude::*;
 
 mod metrics;
+mod palettes;
 mod programs;
 mod report;
 mod sets;
+mod viewer;
 
 use crate::measure::Cost;
-use metrics::Quality;
+use metrics::{Colours, Judge, Meant, Quality};
+use palettes::Palettes;
 use programs::{Job, Program};
 use sets::Set;
+use viewer::Viewer;
 
 /// Frames a second of every set.
 const FPS: u32 = 20;
+/// The time of a frame in hundredths of a second.
+const DELAY: u32 = 100 / FPS;
+/// At most so many frames of a set, evenly spread, are judged by colour differences; by PSNR and flicker are all.
+const JUDGED: usize = 12;
+/// Repetitions of the large set's frames of which memory is measured.
+const REPEATED: [usize; 2] = [1, 10];
+/// Side of a crop, in pixels.
+const CROP: u32 = 64;
 
 /// The command line.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Only these sets; no report is written then
+    /// Only these sets; a report is written only where --reports says then
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     sets: Vec<String>,
+    /// How often rayfold and gifski at quality 100 are run; the best counts. The others run once
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    rounds: u32,
     /// Where frames and GIFs are kept
     #[arg(long, value_name = "DIR", default_value = "target/gif-bench")]
     work: PathBuf,
     /// The rayfold to measure; built when it is not given
     #[arg(long, value_name = "FILE")]
     rayfold: Option<PathBuf>,
-    /// Where the report goes
-    #[arg(long, value_name = "DIR", default_value = "docs/reports")]
-    reports: PathBuf,
+    /// Where the report goes [default: docs/reports]
+    #[arg(long, value_name = "DIR")]
+    reports: Option<PathBuf>,
+}
+
+/// What was found out about a set.
+struct Measured {
+    name: &'static str,
+    about: &'static str,
+    size: (u32, u32),
+    count: usize,
+    outcomes: Vec<Outcome>,
+    palettes: Option<Palettes>,
+    /// The middle frame's crop as it is meant, where one is shown.
+    crop: Option<RgbImage>,
 }
 
 /// One program on one set.
-#[derive(Debug, Clone, Serialize, Deserialize)]
 struct Outcome {
-    program: String,
+    program: &'static str,
     cost: Cost,
     bytes: u64,
     quality: Quality,
     frames: usize,
-    delays: Vec<u32>,
-    gif: PathBuf,
+    /// Whether every frame is there and each is shown for its time.
+    on_time: bool,
+    crop: Option<RgbImage>,
+}
+
+/// Memory for a number of frames.
+struct Held {
+    frames: usize,
+    memory: f64,
 }
 
 /// Measures and writes `gif.md`.
@@ -62,71 +95,135 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     };
     let programs = programs::all(&rayfold);
     let mut results = Vec::new();
+    let mut held = Vec::new();
     for set in sets::all() {
         if !args.sets.is_empty() && !args.sets.iter().any(|name| name == set.name) {
             continue;
         }
         eprintln!("{}: {}", set.name, set.about);
+        let frames = set.frames()?;
         let folder = args.work.join(set.name);
-        let paths = write_frames(&set, &folder)?;
-        let costs = programs
-            .iter()
-            .map(|program| {
-                let gif = folder.join(program.file_name());
-                let job = Job { frames: &paths, size: set.size, fps: FPS, out: &gif };
-                Ok((program, program.run(&job)?, gif))
-            })
-            .collect::<anyhow::Result<Vec<_>>>()?;
-        let meant = (0..set.count).map(|number| set.frame(number)).collect::<Vec<_>>();
-        let mut outcomes = Vec::new();
-        for (program, cost, gif) in costs {
-            let outcome = judge(program, cost, gif, &set, &meant)?;
-            eprintln!("{}", report::line(&outcome));
-            outcomes.push(outcome);
+        let paths = write_frames(&frames, &folder)?;
+        let measured = measure(&set, &programs, &frames, &paths, args.rounds)?;
+        for outcome in &measured.outcomes {
+            eprintln!("{}", report::line(outcome));
         }
-        results.push((set, outcomes));
+        if set.name == sets::LARGE {
+            held = memory(&rayfold, &paths, measured.size, &folder)?;
+        }
+        results.push(measured);
     }
-    if args.sets.is_empty() {
-        report::write(&args.reports, &programs, &results)?;
+    let all = args.sets.is_empty().then_some(Path::new("docs/reports"));
+    match args.reports.as_deref().or(all) {
+        Some(folder) => report::write(folder, &programs, &results, &held),
+        None => Ok(()),
     }
-    Ok(())
 }
 
-fn write_frames(set: &Set, folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+fn write_frames(frames: &[RgbImage], folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
-    (0..set.count)
-        .map(|number| {
-            let path = folder.join(format!("{:04}.png", number + 1));
-            set.frame(number).save(&path)?;
-            Ok(path)
+    let write = |(index, frame): (usize, &RgbImage)| {
+        let path = folder.join(format!("{:04}.png", index + 1));
+        frame.save(&path).with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(path)
+    };
+    frames.par_iter().enumerate().map(write).collect()
+}
+
+fn measure(
+    set: &Set,
+    programs: &[Program],
+    frames: &[RgbImage],
+    paths: &[PathBuf],
+    rounds: u32,
+) -> anyhow::Result<Measured> {
+    let folder = paths[0].parent().context("a folder with frames")?;
+    let size = frames[0].dimensions();
+    let here = programs.iter().filter(|program| program.version.is_some()).collect::<Vec<_>>();
+    let gifs = here.iter().map(|program| folder.join(program.file_name())).collect::<Vec<_>>();
+    let mut costs = vec![None::<Cost>; here.len()];
+    for round in 0..rounds {
+        for (at, program) in here.iter().enumerate() {
+            if round == 0 || at == 0 || program.name == programs::RIVAL {
+                let job = Job { frames: paths, size, fps: FPS, out: &gifs[at] };
+                let cost = program.run(&job)?;
+                costs[at] = Some(costs[at].map_or(cost, |best| best.least(cost)));
+            }
+        }
+    }
+    let crop = report::CROPS.iter().find(|(name, ..)| *name == set.name);
+    let crop = crop.map(|&(_, left, top)| (left, top));
+    let judged = judge(&gifs, frames, crop)?;
+    let outcomes = here
+        .iter()
+        .zip(costs)
+        .zip(gifs.iter().zip(judged))
+        .map(|((program, cost), (gif, (quality, crop, frames, on_time)))| {
+            let cost = cost.context("every program runs in the first round")?;
+            let bytes = std::fs::metadata(gif)?.len();
+            Ok(Outcome { program: program.name, cost, bytes, quality, frames, on_time, crop })
+        })
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let middle = &frames[frames.len() / 2];
+    let palettes = (size.0 < 1000).then(|| palettes::compare(middle, folder)).transpose()?;
+    let crop = crop.map(|(left, top)| cropped(middle, left, top));
+    Ok(Measured {
+        name: set.name,
+        about: set.about,
+        size,
+        count: frames.len(),
+        outcomes,
+        palettes: palettes.flatten(),
+        crop,
+    })
+}
+
+/// Shows all GIFs side by side. A program that leaves frames out is judged by what is on the screen at each frame's
+/// time.
+fn judge(
+    gifs: &[PathBuf],
+    frames: &[RgbImage],
+    crop: Option<(u32, u32)>,
+) -> anyhow::Result<Vec<(Quality, Option<RgbImage>, usize, bool)>> {
+    let size = frames[0].dimensions();
+    let open = |gif: &PathBuf| Ok((Viewer::open(gif, size)?, Judge::default(), None));
+    let mut shows = gifs.iter().map(open).collect::<anyhow::Result<Vec<_>>>()?;
+    let step = frames.len().div_ceil(JUDGED);
+    for (number, image) in frames.iter().enumerate() {
+        let before = number.checked_sub(1).map(|before| &frames[before]);
+        let colours = (number % step == step / 2).then(|| Colours::of(image));
+        let meant = Meant { image, before, colours };
+        shows.par_iter_mut().try_for_each(|(viewer, judge, cut)| {
+            let shown = viewer.at(number as u32 * DELAY)?;
+            judge.see(&meant, shown);
+            if number == frames.len() / 2 {
+                *cut = crop.map(|(left, top)| cropped(shown, left, top));
+            }
+            anyhow::Ok(())
+        })?;
+    }
+    let close = |(viewer, judge, cut): (Viewer, Judge, _)| {
+        let on_time =
+            viewer.delays.len() == frames.len() && viewer.delays.iter().all(|&delay| delay == DELAY);
+        Ok((judge.quality(), cut, viewer.close()?, on_time))
+    };
+    shows.into_iter().map(close).collect()
+}
+
+fn cropped(image: &RgbImage, left: u32, top: u32) -> RgbImage {
+    image.view(left, top, CROP, CROP).to_image()
+}
+
+/// What `rayfold encode` holds at once with two threads, for few and for many frames.
+fn memory(rayfold: &Path, paths: &[PathBuf], size: (u32, u32), folder: &Path) -> anyhow::Result<Vec<Held>> {
+    REPEATED
+        .iter()
+        .map(|&times| {
+            let frames = vec![paths; times].concat();
+            let job = Job { frames: &frames, size, fps: FPS, out: &folder.join("memory.gif") };
+            let mut command = programs::rayfold(rayfold, &job);
+            command.args(["--threads", "2"]);
+            Ok(Held { frames: frames.len(), memory: programs::cost_of(&command)?.memory })
         })
         .collect()
-}
-
-fn judge(
-    program: &Program,
-    cost: Cost,
-    gif: PathBuf,
-    set: &Set,
-    meant: &[RgbImage],
-) -> anyhow::Result<Outcome> {
-    let (shown, delays) = programs::decode(&gif, set.size)?;
-    ensure!(!shown.is_empty(), "{} wrote no frame", program.name);
-    // A program that leaves frames out is judged by what is on the screen at each frame's time.
-    let mut ends = delays.iter().scan(0, |at, delay| {
-        *at += delay;
-        Some(*at)
-    });
-    let mut end = ends.next().unwrap_or(0);
-    let mut index = 0;
-    let at_time = (0..meant.len() as u32).map(|frame| {
-        while frame * (100 / FPS) >= end && index + 1 < shown.len() {
-            index += 1;
-            end = ends.next().unwrap_or(u32::MAX);
-        }
-        &shown[index]
-    });
-    let quality = metrics::quality(meant, &at_time.collect::<Vec<_>>());
-    let bytes = std::fs::metadata(&gif)?.len();
-    Ok(Outcome { program: program.name.clone(), cost, bytes, quality, frames: shown.len(), delays, gif })
 }

@@ -3,30 +3,99 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use image::{GenericImage, Rgb, RgbImage, imageops};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, GenericImage, ImageEncoder, Rgb, RgbImage, imageops};
 
-use super::Outcome;
-use super::programs::{Program, decode};
-use super::sets::Set;
-use crate::plot::{Labels, Series, log_log};
+use super::palettes::Judged;
+use super::programs::{Program, RIVAL};
+use super::sets::NOISE;
+use super::{CROP, FPS, Held, JUDGED, Measured, Outcome};
+use crate::plot::{Labels, Series, columns, log_log};
 
-/// Which program is the one to beat.
-const RIVAL: &str = "gifski --quality 100";
 /// Sets and places of which crops are shown: left, top.
-const CROPS: [(&str, u32, u32); 3] = [("spheres", 380, 180), ("camera", 250, 190), ("texture", 260, 150)];
-const CROP: u32 = 96;
+pub(super) const CROPS: [(&str, u32, u32); 3] =
+    [("artisticsss", 200, 190), ("spheres", 380, 180), ("texture", 215, 180)];
+/// Whose crops, after the frame's own.
+const SHOWN: [&str; 4] = ["rayfold", RIVAL, "ffmpeg", "Pillow"];
 const ENLARGED: u32 = 3;
+/// The most memory at 1080p with two threads, in MB.
+const MOST_MEMORY: f64 = 64.0;
+
+/// What is asked for, against the rival.
+struct Goal {
+    name: &'static str,
+    asked: &'static str,
+    figure: fn(&Outcome, &Outcome) -> f64,
+    met: fn(f64, &str) -> bool,
+}
+
+const NO_WORSE: &str = "at most 1.01";
+
+const GOALS: [Goal; 9] = [
+    Goal { name: "wall", asked: "at most 1/3", figure: |a, b| ratio(a.cost.wall, b.cost.wall), met: third },
+    Goal { name: "CPU", asked: "at most 1/3", figure: |a, b| ratio(a.cost.cpu, b.cost.cpu), met: third },
+    Goal {
+        name: "size",
+        asked: "at most 1, noise 1.3",
+        figure: |a, b| a.bytes as f64 / b.bytes as f64,
+        met: |ratio, set| ratio <= if set == NOISE { 1.3 } else { 1.0 },
+    },
+    Goal {
+        name: "PSNR",
+        asked: "at least 0.99",
+        figure: |a, b| a.quality.psnr / b.quality.psnr,
+        met: |ratio, _| ratio >= 0.99,
+    },
+    Goal {
+        name: "worst",
+        asked: "at least 0.99",
+        figure: |a, b| a.quality.psnr_worst / b.quality.psnr_worst,
+        met: |ratio, _| ratio >= 0.99,
+    },
+    Goal { name: "dE", asked: NO_WORSE, figure: |a, b| ratio(a.quality.de76, b.quality.de76), met: no_worse },
+    Goal {
+        name: "dE 2000",
+        asked: NO_WORSE,
+        figure: |a, b| ratio(a.quality.de2000, b.quality.de2000),
+        met: no_worse,
+    },
+    Goal {
+        name: "blurred",
+        asked: NO_WORSE,
+        figure: |a, b| ratio(a.quality.blurred, b.quality.blurred),
+        met: no_worse,
+    },
+    Goal {
+        name: "flicker",
+        asked: "at most .05, no ratio",
+        figure: |a, _| a.quality.flicker,
+        met: |flicker, _| flicker <= 0.05,
+    },
+];
+
+/// Of errors and times, where nothing beside nothing is as much.
+fn ratio(ours: f64, theirs: f64) -> f64 {
+    if ours == 0.0 && theirs == 0.0 { 1.0 } else { ours / theirs }
+}
+
+fn third(ratio: f64, _: &str) -> bool {
+    ratio <= 1.0 / 3.0
+}
+
+fn no_worse(ratio: f64, _: &str) -> bool {
+    ratio <= 1.01
+}
 
 const HEAD: &str = "\
-| program | wall s | CPU s | MB | file MB | PSNR | worst | dE | dE 2000 | blurred | blurred 2000 | flicker | share | frames |
-| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
+| program | wall s | CPU s | MB | file MB | PSNR | worst | dE | dE 2000 | blurred | flicker | share | frames | on time |
+| --- | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --- |
 ";
 
-/// A row of the table.
+/// A row of a set's table.
 pub(super) fn line(o: &Outcome) -> String {
     let q = &o.quality;
     format!(
-        "| {} | {:.2} | {:.2} | {:.0} | {:.3} | {:.2} | {:.2} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | {} |",
+        "| {} | {:.2} | {:.2} | {:.0} | {:.3} | {:.2} | {:.2} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | {} | {} |",
         o.program,
         o.cost.wall,
         o.cost.cpu,
@@ -37,120 +106,200 @@ pub(super) fn line(o: &Outcome) -> String {
         q.de76,
         q.de2000,
         q.blurred,
-        q.blurred2000,
         q.flicker,
         q.flicker_share,
-        o.frames
+        o.frames,
+        if o.on_time { "yes" } else { "**no**" },
     )
 }
 
 pub(super) fn write(
     folder: &Path,
     programs: &[Program],
-    results: &[(Set, Vec<Outcome>)],
+    results: &[Measured],
+    held: &[Held],
 ) -> anyhow::Result<()> {
     let beside = folder.join("gif");
     std::fs::create_dir_all(&beside)?;
-    let mut text = String::from(
+    let mut text = format!(
         "# GIFs: rayfold beside other encoders\n\n\
-        Written by `cargo run --release -p rayfold-bench -- gif`. All programs encode the same PNG files, one after \
-        the other on the same machine, at their defaults but for the flags shown; FFmpeg decodes every result. PSNR is \
-        over the three channels of sRGB, the mean of the frames' and the worst frame's (99: exact). dE is the CIE 1976 \
-        colour difference, dE 2000 that of CIE 142-2001; blurred: of pictures averaged over 5 x 5 pixels. Flicker: of \
-        pixels that stay from one frame to the next, the mean CIE 1976 difference of what is shown, and the share of \
-        them that changes. Where a program leaves frames out, what it shows at the frame's time is judged.\n\n\
-        The wall times are only as good as the machine was idle.\n\n## Programs\n\n",
+        Written by `cargo run --release -p rayfold-bench -- gif`. All programs encode the same PNG files at {FPS} \
+        frames a second, one after the other on the same machine ({} processors); rayfold and {RIVAL} by turns, the \
+        best of several runs, the others once. Wall times are only as good as the machine was idle. FFmpeg decodes \
+        every result.\n\n\
+        PSNR is over the three channels of sRGB, the mean of the frames' and the worst frame's (99: exact). dE is the \
+        CIE 1976 colour difference, dE 2000 that of CIE 142-2001 (every seventh pixel); blurred: CIE 1976 of pictures \
+        averaged over 5 x 5 pixels; all three of at most {JUDGED} frames of a set, evenly spread. Flicker: of pixels \
+        that stay from one frame to the next, the mean CIE 1976 difference of what is shown, and the share of them \
+        that changes. Where a program leaves frames out, what it shows at the frame's time is judged. On time: every \
+        frame is there, for its time.\n\n",
+        std::thread::available_parallelism().map_or(1, usize::from),
     );
-    for program in programs {
-        writeln!(text, "- {}: {}", program.name, program.version)?;
+    goals(&mut text, results, held)?;
+    text.push_str("\n## Programs\n\n| program | version | how |\n| --- | --- | --- |\n");
+    for Program { name, version, how, .. } in programs {
+        let version = version.as_deref().unwrap_or("**not on this machine: not measured**");
+        writeln!(text, "| {name} | {version} | {how} |")?;
     }
-    text.push_str("\n## rayfold against gifski at quality 100\n\n");
-    text.push_str(
-        "Ratios of CPU and size; differences of PSNR in dB; ratios of dE. Bold: worse by more than 1 %.\n\n",
-    );
-    text.push_str("| set | CPU | wall | size | PSNR | worst | dE | dE 2000 | blurred | blurred 2000 |\n");
-    text.push_str("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
-    for (set, outcomes) in results {
-        if let (Some(ours), Some(rival)) = (outcomes.first(), outcomes.iter().find(|o| o.program == RIVAL)) {
-            writeln!(text, "| {} {}", set.name, against(ours, rival))?;
-        }
-    }
-    for (set, outcomes) in results {
+    palettes(&mut text, results)?;
+    text.push_str("\n## All sets\n\n![CPU time and size](gif/cost.svg)\n\n![dE and size](gif/quality.svg)\n");
+    for set in results {
         let (width, height) = set.size;
         writeln!(text, "\n## {}\n\n{} frames of {width} x {height}: {}.\n", set.name, set.count, set.about)?;
         text.push_str(HEAD);
-        for outcome in outcomes {
+        for outcome in &set.outcomes {
             writeln!(text, "{}", line(outcome))?;
         }
-        if let Some(&(_, left, top)) = CROPS.iter().find(|(name, ..)| *name == set.name) {
+        if let Some((sheet, names)) = crops(set)? {
             let file = format!("{}.png", set.name);
-            crops(set, outcomes, left, top)?.save(beside.join(&file))?;
-            writeln!(text, "\n![Enlarged crops: the frame, then each program's](gif/{file})")?;
+            save(&sheet, &beside.join(&file))?;
+            let names = names.join(", ");
+            writeln!(text, "\nEnlarged, of the middle frame: {names}.\n\n![Crops: {names}](gif/{file})")?;
         }
     }
     plots(&beside, results)?;
-    text.push_str("\n## All sets\n\n![Size and CPU time](gif/cost.svg)\n\n![Size and dE](gif/quality.svg)\n");
     std::fs::write(folder.join("gif.md"), text)?;
     Ok(())
 }
 
-fn against(ours: &Outcome, rival: &Outcome) -> String {
-    let ratio = |a: f64, b: f64| {
-        if b == 0.0 {
-            return if a == 0.0 { "both 0".to_owned() } else { "**more than 0**".to_owned() };
+/// The two that the goals compare, if both are there.
+fn rivals(set: &Measured) -> Option<(&Outcome, &Outcome)> {
+    let of = |name| set.outcomes.iter().find(|o| o.program == name);
+    of("rayfold").zip(of(RIVAL))
+}
+
+fn goals(text: &mut String, results: &[Measured], held: &[Held]) -> anyhow::Result<()> {
+    text.push_str("## rayfold against gifski at quality 100\n\n");
+    if results.iter().all(|set| rivals(set).is_none()) {
+        text.push_str("gifski is not on this machine, so there is nothing to compare with.\n");
+        return Ok(());
+    }
+    text.push_str("Ratios of rayfold's figure to gifski's; bold misses what is asked for.\n\n| set |");
+    GOALS.iter().for_each(|goal| text.push_str(&format!(" {} |", goal.name)));
+    text.push_str("\n| --- |");
+    GOALS.iter().for_each(|_| text.push_str(" --: |"));
+    text.push_str("\n| *asked for* |");
+    GOALS.iter().for_each(|goal| text.push_str(&format!(" *{}* |", goal.asked)));
+    text.push('\n');
+    let (mut figures, mut missed) = (0, Vec::new());
+    for set in results {
+        let Some((ours, theirs)) = rivals(set) else { continue };
+        write!(text, "| {} |", set.name)?;
+        for goal in &GOALS {
+            let figure = (goal.figure)(ours, theirs);
+            figures += 1;
+            if (goal.met)(figure, set.name) {
+                write!(text, " {figure:.3} |")?;
+            } else {
+                write!(text, " **{figure:.3}** |")?;
+                missed
+                    .push(format!("{} of {} ({figure:.3}, asked for: {})", goal.name, set.name, goal.asked));
+            }
         }
-        let text = format!("{:.2}", a / b);
-        if a / b > 1.01 { format!("**{text}**") } else { text }
-    };
-    let more =
-        |a: f64, b: f64| if a < b * 0.99 { format!("**{:+.2}**", a - b) } else { format!("{:+.2}", a - b) };
-    let (q, r) = (&ours.quality, &rival.quality);
-    format!(
-        "| {} | {} | {} | {} | {} | {} | {} | {} | {} |",
-        ratio(ours.cost.cpu, rival.cost.cpu),
-        ratio(ours.cost.wall, rival.cost.wall),
-        ratio(ours.bytes as f64, rival.bytes as f64),
-        more(q.psnr, r.psnr),
-        more(q.psnr_worst, r.psnr_worst),
-        ratio(q.de76, r.de76),
-        ratio(q.de2000, r.de2000),
-        ratio(q.blurred, r.blurred),
-        ratio(q.blurred2000, r.blurred2000),
-    )
+        text.push('\n');
+    }
+    for Held { frames, memory } in held {
+        figures += 1;
+        if *memory > MOST_MEMORY {
+            missed.push(format!(
+                "memory for {frames} frames ({memory:.0} MB, asked for: at most {MOST_MEMORY})"
+            ));
+        }
+    }
+    writeln!(text, "\n{} of {figures} figures are as asked for.", figures - missed.len())?;
+    if !missed.is_empty() {
+        text.push_str("Missed:\n\n");
+        missed.iter().for_each(|miss| text.push_str(&format!("- {miss}\n")));
+    }
+    text.push_str("\n![Ratios to gifski at quality 100](gif/ratios.svg)\n");
+    let memory = held.iter().map(|h| format!("{:.0} MB for {} frames", h.memory, h.frames));
+    let memory = memory.collect::<Vec<_>>().join(", ");
+    writeln!(
+        text,
+        "\nMost memory held at 1920 x 1080 with two threads (asked for: at most 64 MB): {memory}."
+    )?;
+    Ok(())
 }
 
-/// The middle frame's crop as it is meant, then as each program shows it, side by side.
-fn crops(set: &Set, outcomes: &[Outcome], left: u32, top: u32) -> anyhow::Result<RgbImage> {
-    let number = set.count / 2;
-    let mut panels = vec![set.frame(number)];
-    for outcome in outcomes {
-        let (shown, _) = decode(&outcome.gif, set.size)?;
-        panels.push(shown[shown.len() / 2].clone());
+fn palettes(text: &mut String, results: &[Measured]) -> anyhow::Result<()> {
+    text.push_str(
+        "\n## The palette beside quantette's\n\n\
+        The middle frame alone, by `rayfold-gif` and by the crate `quantette` (k-means in Oklab, no dithering; what \
+        it draws is then written by `rayfold-gif`, without further loss). PSNR and dE: of each pixel in the palette's \
+        nearest colour. CPU: milliseconds from pixels to GIF.\n\n\
+        | set | PSNR | quantette | dE | quantette | CPU ms | quantette | kB | quantette |\n\
+        | --- | --: | --: | --: | --: | --: | --: | --: | --: |\n",
+    );
+    for set in results {
+        let Some(both) = &set.palettes else { continue };
+        let pair = |figure: fn(&Judged) -> f64, places: usize| {
+            format!("{:.places$} | {:.places$}", figure(&both.ours), figure(&both.theirs))
+        };
+        writeln!(
+            text,
+            "| {} | {} | {} | {} | {} |",
+            set.name,
+            pair(|p| p.psnr, 2),
+            pair(|p| p.de76, 3),
+            pair(|p| p.cpu * 1e3, 1),
+            pair(|p| p.bytes as f64 / 1e3, 1),
+        )?;
     }
+    Ok(())
+}
+
+/// The crop as it is meant, then as some programs show it, side by side; and what is where.
+fn crops(set: &Measured) -> anyhow::Result<Option<(RgbImage, Vec<&str>)>> {
+    let Some(meant) = &set.crop else { return Ok(None) };
+    let of = |name| set.outcomes.iter().find(|o| o.program == name).and_then(|o| o.crop.as_ref());
+    let shown = SHOWN.iter().filter_map(|&name| Some((name, of(name)?)));
+    let panels = std::iter::once(("the frame", meant)).chain(shown).collect::<Vec<_>>();
     let side = CROP * ENLARGED;
-    let mut sheet = RgbImage::from_pixel((side + 6) * panels.len() as u32, side, Rgb([255; 3]));
-    for (panel, x) in panels.iter().zip((0..).step_by(side as usize + 6)) {
-        let crop = imageops::crop_imm(panel, left, top, CROP, CROP).to_image();
-        sheet.copy_from(&imageops::resize(&crop, side, side, imageops::FilterType::Nearest), x, 0)?;
+    let mut sheet = RgbImage::from_pixel((side + 6) * panels.len() as u32 - 6, side, Rgb([255; 3]));
+    for ((_, crop), x) in panels.iter().zip((0..).step_by(side as usize + 6)) {
+        sheet.copy_from(&imageops::resize(*crop, side, side, imageops::FilterType::Nearest), x, 0)?;
     }
-    Ok(sheet)
+    Ok(Some((sheet, panels.into_iter().map(|(name, _)| name).collect())))
 }
 
-fn plots(folder: &Path, results: &[(Set, Vec<Outcome>)]) -> anyhow::Result<()> {
-    let names = results.iter().flat_map(|(_, outcomes)| outcomes).map(|o| o.program.clone());
-    let mut programs = names.collect::<Vec<_>>();
-    programs.sort();
-    programs.dedup();
+/// As small as it gets: the repository keeps it.
+fn save(image: &RgbImage, path: &Path) -> anyhow::Result<()> {
+    let file = std::io::BufWriter::new(std::fs::File::create(path)?);
+    PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Up).write_image(
+        image.as_raw(),
+        image.width(),
+        image.height(),
+        ExtendedColorType::Rgb8,
+    )?;
+    Ok(())
+}
+
+fn plots(folder: &Path, results: &[Measured]) -> anyhow::Result<()> {
+    let mut programs = results.iter().flat_map(|set| &set.outcomes).map(|o| o.program).collect::<Vec<_>>();
+    let mut seen = std::collections::HashSet::new();
+    programs.retain(|&name| seen.insert(name));
     let series = |y: fn(&Outcome) -> f64| {
-        let of = |name: &String| {
-            let outcomes = results.iter().flat_map(|(_, outcomes)| outcomes).filter(|o| o.program == *name);
+        let of = |&name: &&str| {
+            let outcomes = results.iter().flat_map(|set| &set.outcomes).filter(|o| o.program == name);
             let points = outcomes.map(|o| (o.bytes as f64, y(o))).filter(|p| p.1 > 0.0).collect();
-            Series { name: name.clone(), points, joined: false }
+            Series { name: name.to_owned(), points, joined: false }
         };
         programs.iter().map(of).collect::<Vec<_>>()
     };
     let cost = Labels { title: "CPU time and size of each set", x: "bytes", y: "CPU seconds" };
     log_log(&folder.join("cost.svg"), &cost, &series(|o| o.cost.cpu))?;
     let quality = Labels { title: "dE and size of each set", x: "bytes", y: "mean CIE 1976 difference" };
-    log_log(&folder.join("quality.svg"), &quality, &series(|o| o.quality.de76))
+    log_log(&folder.join("quality.svg"), &quality, &series(|o| o.quality.de76))?;
+
+    let compared = results.iter().filter_map(|set| Some((set.name, rivals(set)?))).collect::<Vec<_>>();
+    if compared.is_empty() {
+        return Ok(());
+    }
+    let ratios = GOALS.iter().filter(|goal| goal.name != "flicker" && goal.name != "dE 2000").map(|goal| {
+        let points = compared.iter().enumerate().map(|(k, (_, (a, b)))| (k as f64, (goal.figure)(a, b)));
+        Series { name: goal.name.to_owned(), points: points.collect(), joined: false }
+    });
+    let names = compared.iter().map(|(name, _)| *name).collect::<Vec<_>>();
+    let labels = Labels { title: "rayfold / gifski at quality 100", x: "", y: "ratio" };
+    columns(&folder.join("ratios.svg"), &labels, &names, &[1.0 / 3.0, 1.0], &ratios.collect::<Vec<_>>())
 }

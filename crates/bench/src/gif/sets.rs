@@ -1,17 +1,32 @@
-//! Frames to encode: what a ray tracer makes, and what an encoder has to fear.
+//! Frames to encode: the project's scenes, traced, and drawn sets of what an encoder has to fear.
 
+use anyhow::Result;
 use image::{Rgb, RgbImage};
+use rayfold_scene::Screen;
+use rayfold_tracer::RenderOptions;
 use rayon::prelude::*;
 
-type Frame = dyn Fn(Canvas) -> RgbImage + Sync;
+use crate::scenes;
 
 /// An animation to be encoded.
 pub(super) struct Set {
     pub(super) name: &'static str,
     pub(super) about: &'static str,
-    pub(super) size: (u32, u32),
-    pub(super) count: u32,
-    draw: Box<Frame>,
+    source: Source,
+}
+
+enum Source {
+    /// The first frames of a folder in `scenes/`, as large as they say or at a size of ours.
+    Traced {
+        folder: &'static str,
+        size: Option<(u32, u32)>,
+        most: usize,
+    },
+    Drawn {
+        draw: fn(Canvas) -> RgbImage,
+        size: (u32, u32),
+        count: u32,
+    },
 }
 
 /// Which frame of what size to draw.
@@ -23,32 +38,74 @@ struct Canvas {
 }
 
 impl Set {
-    pub(super) fn frame(&self, number: u32) -> RgbImage {
-        (self.draw)(Canvas { width: self.size.0, height: self.size.1, number })
+    /// All frames, in order.
+    ///
+    /// # Errors
+    /// When a script cannot be read or traced.
+    pub(super) fn frames(&self) -> Result<Vec<RgbImage>> {
+        match self.source {
+            Source::Traced { folder, size, most } => {
+                let scripts = scenes::scripts(folder)?;
+                let trace = |script: &String| {
+                    let mut scene = scenes::first_frame(folder, script)?;
+                    if let Some((width, height)) = size {
+                        scene.screen = Screen::new(width, height)?;
+                    }
+                    Ok(rayfold_tracer::render(&scene, &RenderOptions::default())?)
+                };
+                scripts.iter().take(most).map(trace).collect()
+            }
+            Source::Drawn { draw, size: (width, height), count } => {
+                Ok((0..count).map(|number| draw(Canvas { width, height, number })).collect())
+            }
+        }
     }
 }
 
-/// All sets, from what is common to what is unkind.
+/// All sets: what the project makes, then what is common, then what is unkind.
 pub(super) fn all() -> Vec<Set> {
-    let set = |name, about, size, count, draw: fn(Canvas) -> RgbImage| Set {
+    let traced =
+        |name, about, size, most| Set { name, about, source: Source::Traced { folder: name, size, most } };
+    let drawn = |name, about, size, count, draw: fn(Canvas) -> RgbImage| Set {
         name,
         about,
-        size,
-        count,
-        draw: Box::new(draw),
+        source: Source::Drawn { draw, size, count },
+    };
+    let hello_1080p = Set {
+        name: "hello-1080p",
+        about: "its first frames, large",
+        source: Source::Traced { folder: "hello", size: Some((1920, 1080)), most: 12 },
     };
     vec![
-        set("spheres", "shaded spheres over a gradient", (640, 480), 50, spheres),
-        set("spheres-1080p", "the same, large", (1920, 1080), 30, spheres),
-        set("camera", "a moving camera: every pixel changes", (640, 480), 20, camera),
-        set("light", "a light that changes its colour: every pixel changes a little", (640, 480), 20, light),
-        set("dusk", "a slow gradient of few levels", (640, 360), 20, dusk),
-        set("texture", "a textured ground, one sphere moves", (640, 480), 20, texture),
-        set("pixel", "one pixel changes", (480, 360), 20, pixel),
-        set("flat", "flat colours", (480, 360), 20, flat),
-        set("noise", "noise, new in every frame", (320, 240), 10, noise),
+        traced("hello", "five letters wave, balls stroll around them", None, 50),
+        hello_1080p,
+        traced("artistic", "a crystal turns, a mirror ball circles it", None, 20),
+        traced("artisticsss", "colours circle a mirror, the camera sways", None, 20),
+        traced("moving_up", "a mirror ball rises and sinks", None, 10),
+        traced("sphere_light", "a shadow sweeps a slab", None, 10),
+        drawn("spheres", "shaded spheres over a gradient", (640, 480), 50, spheres),
+        drawn(LARGE, "the same, large", (1920, 1080), 30, spheres),
+        drawn("camera", "a moving camera: every pixel changes", (640, 480), 20, camera),
+        drawn(
+            "light",
+            "a light that changes its colour: every pixel changes a little",
+            (640, 480),
+            20,
+            light,
+        ),
+        drawn("dusk", "a slow gradient of few levels", (640, 360), 20, dusk),
+        drawn("texture", "a textured ground, one sphere moves", (640, 480), 20, texture),
+        drawn("pixel", "one pixel changes", (480, 360), 20, pixel),
+        drawn("flat", "flat colours", (480, 360), 20, flat),
+        drawn(NOISE, "noise, new in every frame", (320, 240), 10, noise),
     ]
 }
+
+/// The set that memory is measured on.
+pub(super) const LARGE: &str = "spheres-1080p";
+
+/// The set that may be larger than the rival's.
+pub(super) const NOISE: &str = "noise";
 
 fn paint(canvas: Canvas, colour: impl Fn(f32, f32) -> [f32; 3] + Sync) -> RgbImage {
     let Canvas { width, height, .. } = canvas;
