@@ -8,7 +8,7 @@
 use serde::Deserialize;
 
 use crate::assemble::generation_of;
-use crate::fold::Folded;
+use crate::fold::{Age, Folded};
 use crate::invocation::Invocation;
 use crate::keys::{Animation, Generation, Key, Part, ScriptName, Tag, decode_event_key};
 use crate::manifest::{Fact, Reason, Status};
@@ -105,7 +105,9 @@ pub async fn record_failure<S: Store, C: Clock>(
         Key::Retry { animation, name, tag, part, .. } => {
             invocation.record_frame(failure, animation, name, part, Some(tag.version)).await
         }
-        Key::Settings { animation } => invocation.fold(&animation, &Fact::Fold).await.map(Recorded::Resolved),
+        Key::Settings { animation } => {
+            invocation.fold(&animation, &Fact::Fold, Age::Old).await.map(Recorded::Resolved)
+        }
         Key::Claim { animation, generation, .. } => {
             invocation.record_assembly(failure, animation, generation).await
         }
@@ -123,15 +125,18 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         tried: Option<ETag>,
     ) -> Result<Recorded> {
         let Some(script) = self.head(&animation.script(&name)).await? else {
-            return self.fold(&animation, &Fact::Absent(name)).await.map(Recorded::Resolved);
+            return self.fold(&animation, &Fact::Absent(name), Age::Old).await.map(Recorded::Resolved);
         };
         let version = script.etag;
         if part.is_some() && tried.as_ref() != Some(&version) {
-            return self.fold(&animation, &Fact::Version(name, version)).await.map(Recorded::Resolved);
+            return self
+                .fold(&animation, &Fact::Version(name, version), Age::Old)
+                .await
+                .map(Recorded::Resolved);
         }
         if let Some(standing) = self.standing(&animation, &name, &version, part).await? {
             let fact = standing.fact(name, version, part);
-            return self.fold(&animation, &fact).await.map(Recorded::Resolved);
+            return self.fold(&animation, &fact, Age::Old).await.map(Recorded::Resolved);
         }
         let mut attempts = 0;
         for listed in self.retries(&animation).await? {
@@ -164,7 +169,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             Some(message) => {
                 let receipt = self.put_fault(&animation, &name, &tag, part, &Reason::new(message)).await?;
                 let fact = receipt.map_or(Fact::Fold, |receipt| Fact::Faulty(name, version, part, receipt));
-                self.fold(&animation, &fact).await.map(Recorded::GivenUp)
+                self.fold(&animation, &fact, Age::Old).await.map(Recorded::GivenUp)
             }
         }
     }
@@ -195,7 +200,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             head.total
         ));
         self.refuse(&manifest, &reason).await?;
-        self.fold(&animation, &Fact::Fold).await.map(Recorded::Refused)
+        self.fold(&animation, &Fact::Fold, Age::Old).await.map(Recorded::Refused)
     }
 }
 

@@ -10,7 +10,7 @@ use std::time::Duration;
 use bytes::Bytes;
 
 use crate::keys::Animation;
-use crate::manifest::{Fact, Manifest};
+use crate::manifest::{Beginning, Fact, Head, Manifest, frames_of};
 use crate::store::{ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store};
 use crate::{Clock, Error, Randomness, Result, Timestamp};
 
@@ -27,6 +27,8 @@ pub struct Policy {
     pub pause_per_frame: Duration,
     /// The longest such pause; with it the last finisher still claims within a second.
     pub pause_cap: Duration,
+    /// How many bytes of a manifest are read to see whether it covers a result. 32 KiB: all of it up to some 300 frames.
+    pub glimpse: u64,
     /// How long nothing may happen before the sweep wakes pending frames; doubles with each attempt. 15 min: as long
     /// as an invocation may run.
     pub stuck_after: Duration,
@@ -56,6 +58,7 @@ impl Default for Policy {
             quiet: Duration::from_secs(5),
             pause_per_frame: Duration::from_millis(1),
             pause_cap: Duration::from_millis(500),
+            glimpse: 32 * 1024,
             stuck_after: Duration::from_secs(15 * 60),
             attempts: 3,
             superseded_after: Duration::from_secs(7 * 24 * 3600),
@@ -101,11 +104,13 @@ pub enum Mutation {
     AssemblerDoesNotLookAgain,
     /// The GIF is put without its condition.
     DropGifCondition,
+    /// Any later revision of the manifest is taken to cover a result.
+    TrustNextRevision,
 }
 
 impl Mutation {
     /// All of them.
-    pub const ALL: [Mutation; 8] = [
+    pub const ALL: [Mutation; 9] = [
         Mutation::SkipSecondListing,
         Mutation::ClaimBeforeCommit,
         Mutation::DropIfMatch,
@@ -114,6 +119,7 @@ impl Mutation {
         Mutation::AssemblerLeavesEarly,
         Mutation::AssemblerDoesNotLookAgain,
         Mutation::DropGifCondition,
+        Mutation::TrustNextRevision,
     ];
 }
 
@@ -122,6 +128,32 @@ impl Mutation {
 pub(crate) struct Known {
     pub(crate) manifest: Manifest,
     pub(crate) etag: ETag,
+}
+
+/// What one small request shows of a manifest.
+#[derive(Debug)]
+pub(crate) enum Glimpse {
+    /// There is none.
+    Nothing,
+    /// All of it.
+    Whole(Known),
+    /// Its beginning; it is larger.
+    Start { beginning: Beginning, etag: ETag, size: u64 },
+}
+
+impl Glimpse {
+    pub(crate) fn head(&self) -> Option<&Head> {
+        match self {
+            Glimpse::Nothing => None,
+            Glimpse::Whole(known) => Some(&known.manifest.head),
+            Glimpse::Start { beginning, .. } => Some(&beginning.head),
+        }
+    }
+
+    /// 0 when there is none.
+    pub(crate) fn revision(&self) -> u64 {
+        self.head().map_or(0, |head| head.revision)
+    }
 }
 
 impl<'a, S, C> Invocation<'a, S, C> {
@@ -227,22 +259,48 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
     }
 
-    /// Whether the invocation may leave: the manifest shows the fact, and it is not this invocation's own, whose
-    /// claim may still be owed.
-    pub(crate) fn is_covered(&self, known: Option<&Known>, fact: &Fact) -> bool {
-        let may_leave = |known: &Known| !self.is_own(known) || self.breaks(Mutation::LeaveOwnCommit);
-        known.is_some_and(|known| may_leave(known) && known.manifest.shows(fact))
+    /// Reads the manifest's beginning, or all of it when it is small.
+    pub(crate) async fn glimpse(&self, animation: &Animation) -> Result<Glimpse> {
+        let key = animation.manifest();
+        let read = self.persist(|| self.store.get_range(&key, 0..self.policy.glimpse)).await;
+        let Some(Object { info, body }) = found(read)? else { return Ok(Glimpse::Nothing) };
+        if info.size == body.len() as u64 {
+            let manifest = Manifest::decode(animation, &body)?;
+            return Ok(Glimpse::Whole(Known { manifest, etag: info.etag }));
+        }
+        match Beginning::decode(animation, &body)? {
+            Some(beginning) => Ok(Glimpse::Start { beginning, etag: info.etag, size: info.size }),
+            None => Ok(self.manifest(animation).await?.map_or(Glimpse::Nothing, Glimpse::Whole)),
+        }
+    }
+
+    /// Whether the manifest shows the fact. Of a large one the lines are read that would; if it has been replaced since,
+    /// it does not.
+    pub(crate) async fn shows(&self, animation: &Animation, glimpse: &Glimpse, fact: &Fact) -> Result<bool> {
+        let (beginning, etag, size) = match glimpse {
+            Glimpse::Nothing => return Ok(false),
+            Glimpse::Whole(known) => return Ok(known.manifest.shows(fact)),
+            Glimpse::Start { beginning, etag, size } => (beginning, etag, *size),
+        };
+        let Some((name, part)) = fact.subject() else {
+            return Ok(fact.is_shown_by(&beginning.head, &[]));
+        };
+        let (key, range) = (animation.manifest(), beginning.lines_of(name, part, size));
+        let Some(lines) = found(self.persist(|| self.store.get_range(&key, range.clone())).await)? else {
+            return Ok(false);
+        };
+        Ok(lines.info.etag == *etag && fact.is_shown_by(&beginning.head, &frames_of(animation, &lines.body)?))
     }
 
     /// Whether this invocation, or an earlier attempt at the same event, wrote the manifest.
-    pub(crate) fn is_own(&self, known: &Known) -> bool {
-        known.manifest.head.writer == self.request_id
+    pub(crate) fn is_own(&self, head: &Head) -> bool {
+        head.writer == self.request_id
     }
 
     /// Waits a random time that is the longer the more frames are to come.
-    pub(crate) async fn pause(&self, known: Option<&Known>) {
-        let most = known.map_or(self.policy.pause_cap, |known| {
-            let missing = u32::try_from(known.manifest.head.missing()).unwrap_or(u32::MAX);
+    pub(crate) async fn pause(&self, head: Option<&Head>) {
+        let most = head.map_or(self.policy.pause_cap, |head| {
+            let missing = u32::try_from(head.missing()).unwrap_or(u32::MAX);
             self.policy.pause_per_frame.saturating_mul(missing).min(self.policy.pause_cap)
         });
         self.clock.sleep(self.random.up_to(most)).await;

@@ -3,17 +3,20 @@
 //! `docs/manifest.md` describes the document field by field. The type knows no store: [`mod@crate::fold`] decides when one
 //! is written, [`crate::reconcile()`] what it says, [`crate::invariants`] what it may never say.
 //!
-//! Its first line is the [`Head`], whose size does not grow with the number of frames; the frames follow, a line each.
+//! Its first line is the [`Head`], whose size does not grow with the number of frames; the frames follow, a line each,
+//! and the first line tells where.
 
 use std::num::NonZeroU64;
 
-use bytes::Bytes;
 use rayfold_scene::{AnimationSettings, Diagnostic};
 use serde::{Deserialize, Serialize};
 
 use crate::keys::{Animation, Generation, Part, ScriptName};
 use crate::store::ETag;
-use crate::{Error, Result};
+
+mod document;
+
+pub(crate) use document::{Beginning, frames_of};
 
 /// The version of the document's form. Readers refuse a later one.
 pub const SCHEMA: u32 = 1;
@@ -22,10 +25,9 @@ pub const SCHEMA: u32 = 1;
 pub const DIAGNOSTICS_SHOWN: usize = 3;
 
 /// The manifest of an animation.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Manifest {
     /// All but the frames.
-    #[serde(flatten)]
     pub head: Head,
     /// The frames in the order of the animation.
     pub frames: Vec<Frame>,
@@ -217,15 +219,31 @@ impl Manifest {
 
     /// Whether it shows the fact.
     pub fn shows(&self, fact: &Fact) -> bool {
+        fact.is_shown_by(&self.head, &self.frames)
+    }
+}
+
+impl Fact {
+    /// The script, or the part of it, that the fact is about; `None` when the head says all.
+    pub(crate) fn subject(&self) -> Option<(&ScriptName, Part)> {
+        match self {
+            Fact::Fold | Fact::Settings(_) => None,
+            Fact::Absent(name) | Fact::Version(name, _) | Fact::Split(name, _) => Some((name, None)),
+            Fact::Drawn(name, _, part, _) | Fact::Faulty(name, _, part, _) => Some((name, *part)),
+        }
+    }
+
+    /// Whether a manifest shows the fact, given its head and at least the frames of the fact's subject.
+    pub(crate) fn is_shown_by(&self, head: &Head, frames: &[Frame]) -> bool {
         let of = |name: &ScriptName, version: &ETag| {
             let (name, version) = (name.clone(), version.clone());
-            self.frames.iter().filter(move |frame| frame.script == name && frame.version == version)
+            frames.iter().filter(move |frame| frame.script == name && frame.version == version)
         };
-        match fact {
+        match self {
             Fact::Fold => false,
-            Fact::Absent(name) => self.frames.iter().all(|frame| frame.script != *name),
+            Fact::Absent(name) => frames.iter().all(|frame| frame.script != *name),
             Fact::Version(name, version) => of(name, version).next().is_some(),
-            Fact::Settings(version) => self.head.settings.version == *version,
+            Fact::Settings(version) => head.settings.version == *version,
             Fact::Drawn(name, version, part, pixels) => of(name, version).any(|frame| {
                 frame.part == *part
                     && matches!(frame.state, FrameState::Done { pixels: used } if used >= *pixels)
@@ -240,38 +258,6 @@ impl Manifest {
             }),
             Fact::Split(name, version) => of(name, version).any(|frame| frame.part.is_some()),
         }
-    }
-
-    /// The document.
-    pub fn encode(&self) -> Result<Bytes> {
-        let malformed = |source: serde_json::Error| self.malformed(source);
-        let mut text = serde_json::to_string(&self.head).map_err(malformed)?;
-        text.pop();
-        text.push_str(",\n\"frames\":[");
-        for (place, frame) in self.frames.iter().enumerate() {
-            text.push_str(if place == 0 { "\n" } else { ",\n" });
-            text.push_str(&serde_json::to_string(frame).map_err(malformed)?);
-        }
-        text.push_str("\n]}\n");
-        Ok(Bytes::from(text))
-    }
-
-    /// Reads the document.
-    pub fn decode(animation: &Animation, body: &[u8]) -> Result<Self> {
-        let malformed = |source| Error::Malformed { key: animation.manifest(), source };
-        #[derive(Deserialize)]
-        struct Form {
-            schema: u32,
-        }
-        let form: Form = serde_json::from_slice(body).map_err(|source| malformed(source.into()))?;
-        if form.schema > SCHEMA {
-            return Err(malformed(format!("schema {} is newer than {SCHEMA}", form.schema).into()));
-        }
-        serde_json::from_slice(body).map_err(|source| malformed(source.into()))
-    }
-
-    fn malformed(&self, source: serde_json::Error) -> Error {
-        Error::Malformed { key: self.head.animation.manifest(), source: source.into() }
     }
 }
 

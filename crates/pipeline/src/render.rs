@@ -14,8 +14,8 @@ use bytes::Bytes;
 use futures_util::future::{Either, select};
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 
-use crate::fold::Folded;
-use crate::invocation::Invocation;
+use crate::fold::{Age, Folded};
+use crate::invocation::{Glimpse, Invocation};
 use crate::keys::{Animation, Key, Part, Receipt, ScriptName, Tag};
 use crate::manifest::{Fact, Reason};
 use crate::observe::Standing;
@@ -126,7 +126,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let start = self.clock.now();
         let version = self.head(&animation.settings()).await?.map(|info| info.etag);
         let read = self.clock.now();
-        let folded = self.fold(&animation, &Fact::Settings(version)).await?;
+        let folded = self.fold(&animation, &Fact::Settings(version), Age::Old).await?;
         let stages =
             Stages { read: read.since(start), fold: self.clock.now().since(read), ..Stages::default() };
         Ok(Rendered { animation, script: None, outcome: Outcome::Settings, folded, stages })
@@ -172,7 +172,11 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         };
         let before_fold = self.clock.now();
         stages.read = before_fold.since(start).saturating_sub(stages.draw + stages.put);
-        let folded = self.fold(&animation, &fact).await?;
+        let age = match &outcome {
+            Outcome::Drawn | Outcome::Split(_) | Outcome::Faulty(_) => Age::New,
+            _ => Age::Old,
+        };
+        let folded = self.fold(&animation, &fact, age).await?;
         stages.fold = self.clock.now().since(before_fold);
         Ok(Rendered { animation, script: Some(name), outcome, folded, stages })
     }
@@ -288,7 +292,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             self.wake_lost_parts(&animation, &name, &tag, count, uploaded).await?;
         }
         let fact = Fact::Split(name.clone(), tag.version);
-        let folded = self.fold_from(&animation, &fact, known).await?;
+        let glimpse = known.map_or(Glimpse::Nothing, Glimpse::Whole);
+        let folded = self.fold_from(&animation, &fact, Age::Old, glimpse).await?;
         stages.fold = self.clock.now().since(start);
         Ok(Rendered { animation, script: Some(name), outcome: Outcome::Present, folded, stages })
     }

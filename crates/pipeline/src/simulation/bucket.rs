@@ -112,6 +112,8 @@ pub(super) struct Grounds {
     pub(super) seen: Mutex<std::collections::BTreeSet<(Actor, Action, String)>>,
     /// Requests by actor.
     pub(super) requests: [AtomicU64; 3],
+    /// Bytes of objects that were read, by actor.
+    pub(super) bytes: [AtomicU64; 3],
     /// What happened, line by line, for whoever replays a run.
     pub(super) log: Option<Mutex<Vec<String>>>,
 }
@@ -130,6 +132,7 @@ impl Grounds {
             late_writes: AtomicU64::new(0),
             seen: Mutex::default(),
             requests: Default::default(),
+            bytes: Default::default(),
         })
     }
 
@@ -327,7 +330,11 @@ impl WorldStore {
     fn apply(&self, effect: Effect) -> Result<Answer> {
         let grounds = &self.grounds;
         match effect {
-            Effect::Get(key, range) => lock(&grounds.bucket).get_range(&key, range).map(Answer::Object),
+            Effect::Get(key, range) => {
+                let object = lock(&grounds.bucket).get_range(&key, range)?;
+                grounds.bytes[self.actor as usize].fetch_add(object.body.len() as u64, Ordering::Relaxed);
+                Ok(Answer::Object(object))
+            }
             Effect::List(request) => {
                 let page = lock(&grounds.bucket).list(&request);
                 let listed = lock(&grounds.listed).clone();

@@ -102,6 +102,7 @@ impl Platform {
         policy: Policy,
         mutation: Option<Mutation>,
         concurrency: usize,
+        timeout: Duration,
         draw_ms: (u64, u64),
     ) -> Arc<Self> {
         Arc::new_cyclic(|me| Platform {
@@ -111,7 +112,7 @@ impl Platform {
             diary: Mutex::default(),
             mutation,
             concurrency,
-            timeout: Duration::from_secs(30),
+            timeout,
             draw_ms,
             state: Mutex::new(State { queue: VecDeque::new(), running: BTreeSet::new(), tokens: 0 }),
             me: me.clone(),

@@ -18,6 +18,9 @@ use crate::keys::{Animation, Key, Receipt};
 use crate::store::PutOptions;
 use crate::{Clock, Policy, Randomness};
 
+/// How long an invocation may run: as long as Lambda lets one.
+const TIMEOUT: Duration = Duration::from_secs(900);
+
 /// What to measure.
 #[derive(Debug, Clone, Copy)]
 pub struct Scale {
@@ -38,6 +41,8 @@ pub struct Scale {
 pub struct ScaleReport {
     /// Requests of the render function's invocations, divided by the frames.
     pub requests_a_frame: f64,
+    /// Bytes that the render function read, divided by the frames.
+    pub bytes_a_frame: f64,
     /// From the last result's put to the last claim's.
     pub tail: Duration,
     /// Claims that were put.
@@ -70,7 +75,8 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
     let engine = Engine::default();
     let random = Randomness::seeded(scale.seed);
     let grounds = Grounds::new(engine.clone(), scale.seed, false);
-    let platform = Platform::new(grounds.clone(), Policy::default(), None, scale.concurrency, scale.draw_ms);
+    let platform =
+        Platform::new(grounds.clone(), Policy::default(), None, scale.concurrency, TIMEOUT, scale.draw_ms);
     let animation = Animation::new("long").map_err(|error| error.to_string())?;
     let moments: Shared<Moments> = Shared::default();
     {
@@ -99,6 +105,7 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
         Expected::of(&bucket, &animation).check(&bucket, &animation)?;
     }
     let by_render = grounds.requests_of(Actor::Render);
+    let read_by_render = grounds.bytes[Actor::Render as usize].load(Ordering::Relaxed);
     let by_assemble = grounds.requests_of(Actor::Assemble);
     lock(&platform.diary).idle.clear();
     for number in [1, scale.frames / 2 + 1, scale.frames] {
@@ -116,6 +123,7 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
     let between = |from: u64, to: u64| Duration::from_micros(to.saturating_sub(from));
     Ok(ScaleReport {
         requests_a_frame: by_render as f64 / scale.frames as f64,
+        bytes_a_frame: read_by_render as f64 / scale.frames as f64,
         tail: between(moments.last_result_us, moments.last_claim_us),
         claims: moments.claims,
         revisions: moments.revisions,

@@ -20,6 +20,9 @@ use crate::{Clock, Mutation, Policy, Randomness};
 /// By when a run must have come to rest.
 const PATIENCE: Duration = Duration::from_secs(24 * 3600);
 
+/// How long an invocation may run.
+const TIMEOUT: Duration = Duration::from_secs(30);
+
 /// How many sweeps a run may need.
 const MOST_SWEEPS: u32 = 24;
 
@@ -41,6 +44,8 @@ pub(super) fn run(
         superseded_after: Duration::from_secs([1, 1_000, 7 * 24 * 3600][pick(&random, 3)]),
         pause_cap: Duration::from_millis([1, 50, 500][pick(&random, 3)]),
         pause_per_frame: Duration::from_millis([0, 1, 20][pick(&random, 3)]),
+        // Of most manifests here 800 bytes are the head and some of the frames.
+        glimpse: [64, 800, 32 * 1024][pick(&random, 3)],
         ..Policy::default()
     };
     let concurrency = [1, 2, 4, 100][pick(&random, 4)];
@@ -49,6 +54,7 @@ pub(super) fn run(
         policy,
         mutation,
         concurrency,
+        TIMEOUT,
         (1, [20, 300, 3_000][pick(&random, 3)]),
     );
     let calm = random.one_in(4);
