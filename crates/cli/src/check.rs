@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use rayfold_scene::{Diagnostic, Limits};
+use rayfold_scene::{Diagnostic, Limits, SETTINGS_FILE};
 use serde::Serialize;
 
 use crate::console::{Console, Format, describe};
-use crate::input::{Input, SETTINGS};
+use crate::input::Input;
 use crate::outcome::Outcome;
 use crate::survey::{Faults, parse_all};
 use crate::threads::Threads;
@@ -52,7 +52,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     args.threads.start()?;
     let limits = Limits { max_pixels: args.max_pixels, ..Limits::default() };
     let is_settings =
-        |path: &PathBuf| path.file_name().is_some_and(|name| name == SETTINGS) && !path.is_dir();
+        |path: &PathBuf| path.file_name().is_some_and(|name| name == SETTINGS_FILE) && !path.is_dir();
     let (settings, inputs): (Vec<_>, Vec<_>) = args.input.iter().cloned().partition(is_settings);
 
     let mut faults = Faults::default();

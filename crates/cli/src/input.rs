@@ -11,12 +11,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context;
-use rayfold_scene::{Limits, Parsed, natural_cmp, script_name};
+use rayfold_scene::{Limits, Parsed, SETTINGS_FILE, natural_cmp, script_name};
 
 use crate::outcome::Usage;
-
-/// The file beside a folder's scripts that says how to show them.
-pub(crate) const SETTINGS: &str = "animation.json";
 
 /// Scripts in the order of their frames.
 #[derive(Debug)]
@@ -142,7 +139,7 @@ fn folder(path: &Path) -> anyhow::Result<Input> {
         empty = false;
         let path = entry.path();
         let name = entry.file_name().to_string_lossy().into_owned();
-        if name == SETTINGS {
+        if name == SETTINGS_FILE {
             settings = Some(path);
         } else if name.ends_with(".txt") && !path.is_dir() {
             scripts.push((name, ScriptFile::at(path)));

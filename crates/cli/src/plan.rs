@@ -7,11 +7,11 @@ use std::ops::RangeInclusive;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use rayfold_scene::{AnimationSettings, Camera, Limits, Scene, Screen, Script};
+use rayfold_scene::{AnimationSettings, Camera, Limits, SETTINGS_FILE, Scene, Screen, Script};
 use rayfold_tracer::Precision;
 
 use crate::console::Console;
-use crate::input::{Input, SETTINGS, ScriptFile};
+use crate::input::{Input, ScriptFile};
 use crate::survey::{Faults, parse_all};
 use crate::wording::number;
 
@@ -77,7 +77,7 @@ pub(crate) struct Wishes {
 pub(crate) enum PlanError {
     #[error("the input has {}: there is no frame {wanted}", number(*.frames, "frame"))]
     NoSuchFrame { frames: u64, wanted: u64 },
-    #[error("{SETTINGS} says {}, but the scripts give {frames}", number(*.expected, "frame"))]
+    #[error("{SETTINGS_FILE} says {}, but the scripts give {frames}", number(*.expected, "frame"))]
     TooFew { frames: u64, expected: u64 },
     #[error(
         "--size needs a pinhole camera: frame {frame} ({name}) is drawn by Orthocamera, whose pixels are world units"

@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use rayfold_scene::Limits;
+use rayfold_scene::{Limits, SETTINGS_FILE};
 
 use crate::console::Console;
-use crate::input::{Input, SETTINGS};
+use crate::input::Input;
 use crate::interrupt;
 use crate::outcome::Outcome;
 use crate::output::OutputFile;
@@ -72,7 +72,7 @@ fn refuse_strangers(folder: &Path, ours: &BTreeSet<String>) -> anyhow::Result<()
         std::fs::read_dir(folder).with_context(|| format!("cannot list the folder {}", folder.display()))?;
     for entry in entries {
         let name = entry?.file_name().to_string_lossy().into_owned();
-        if (name.ends_with(".txt") || name == SETTINGS) && !ours.contains(&name) {
+        if (name.ends_with(".txt") || name == SETTINGS_FILE) && !ours.contains(&name) {
             anyhow::bail!(
                 "{} already holds {name}, which would be part of the same animation: expected a folder without scripts",
                 folder.display()

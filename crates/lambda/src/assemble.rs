@@ -9,8 +9,9 @@ use serde_json::Value;
 
 use crate::answer::{Answer, BatchItem, Failed, Outcome, chain, may_pass};
 use crate::context::{Call, Context};
-use crate::event::{Event, Message, ObjectEvent, Sweep};
+use crate::event::{Event, Message, Sweep};
 use crate::logs::ms;
+use crate::{Function, records};
 
 /// Works on a payload.
 ///
@@ -18,7 +19,7 @@ use crate::logs::ms;
 /// [`Failed`] when another try may end otherwise; for messages of the failure queue the answer says so instead.
 pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value) -> Result<Answer, Failed> {
     match Event::parse(payload) {
-        Ok(Event::Objects(objects)) => claims(context, call, objects).await,
+        Ok(Event::Objects(objects)) => records::work(Function::Assemble, context, call, objects).await,
         Ok(Event::Failures(messages)) => Ok(failures(context, call, messages).await),
         Ok(Event::Sweep(how)) => clean(context, call, how).await,
         Err(error) => {
@@ -28,37 +29,11 @@ pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value)
     }
 }
 
-async fn claims<S: Store>(
-    context: &Context<S>,
-    call: &Call,
-    objects: Vec<ObjectEvent>,
-) -> Result<Answer, Failed> {
-    let (mut answer, mut failed) = (Answer::default(), Vec::new());
-    for ObjectEvent { bucket, key } in objects {
-        if bucket != context.bucket {
-            tracing::error!(request_id = %call.request_id, bucket, key, "an event of another bucket");
-            answer.outcomes.push(Outcome { of: key, what: "of another bucket".into() });
-            continue;
-        }
-        let invocation = context.invocation(&context.policy, call);
-        match assemble(&invocation, &context.studio, &key).await {
-            Ok(assembled) => {
-                log(call, &assembled);
-                answer
-                    .outcomes
-                    .push(Outcome { of: key, what: format!("{:?}", assembled.status).to_lowercase() });
-            }
-            Err(error) if may_pass(&error) => {
-                tracing::error!(request_id = %call.request_id, key, error = chain(&error), "failed");
-                failed.push((key, error));
-            }
-            Err(error) => {
-                tracing::warn!(request_id = %call.request_id, key, error = chain(&error), "ignored");
-                answer.outcomes.push(Outcome { of: key, what: chain(&error) });
-            }
-        }
-    }
-    if failed.is_empty() { Ok(answer) } else { Err(Failed(failed)) }
+/// Works on one claim.
+pub(crate) async fn record<S: Store>(context: &Context<S>, call: &Call, key: &str) -> Result<String, Error> {
+    let assembled = assemble(&context.invocation(&context.policy, call), &context.studio, key).await?;
+    log(call, &assembled);
+    Ok(format!("{:?}", assembled.status).to_lowercase())
 }
 
 fn log(call: &Call, assembled: &Assembled) {
@@ -87,7 +62,7 @@ async fn failures<S: Store>(context: &Context<S>, call: &Call, messages: Vec<Mes
             }
         };
         for failure in failures {
-            match record(context, call, &failure).await {
+            match write_down(context, call, &failure).await {
                 Ok(what) => answer.outcomes.push(Outcome { of: failure.key, what }),
                 Err(_) => {
                     answer.batch_item_failures.push(BatchItem { item_identifier: id.clone() });
@@ -99,7 +74,7 @@ async fn failures<S: Store>(context: &Context<S>, call: &Call, messages: Vec<Mes
     answer
 }
 
-async fn record<S: Store>(context: &Context<S>, call: &Call, failure: &Failure) -> Result<String, Error> {
+async fn write_down<S: Store>(context: &Context<S>, call: &Call, failure: &Failure) -> Result<String, Error> {
     let invocation = context.invocation(&context.policy, call);
     let what = match record_failure(&invocation, failure).await {
         Ok(Recorded::Resolved(_)) => "resolved".to_owned(),

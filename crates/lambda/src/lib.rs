@@ -12,6 +12,7 @@ pub mod assemble;
 pub mod context;
 pub mod event;
 mod logs;
+mod records;
 pub mod render;
 
 use std::sync::Arc;

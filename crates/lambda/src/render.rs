@@ -1,13 +1,15 @@
 //! The render function: an event a frame.
 
+use rayfold_pipeline::Error;
 use rayfold_pipeline::render::{Outcome as Came, Rendered, render_frame};
 use rayfold_pipeline::store::Store;
 use serde_json::Value;
 
-use crate::answer::{Answer, Failed, Outcome, chain, may_pass};
+use crate::answer::{Answer, Failed};
 use crate::context::{Call, Context};
-use crate::event::{Event, ObjectEvent};
+use crate::event::Event;
 use crate::logs::ms;
+use crate::{Function, records};
 
 /// Works on a payload.
 ///
@@ -25,31 +27,15 @@ pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value)
             Vec::new()
         }
     };
-    let (mut answer, mut failed) = (Answer::default(), Vec::new());
-    for ObjectEvent { bucket, key } in objects {
-        if bucket != context.bucket {
-            tracing::error!(request_id = %call.request_id, bucket, key, "an event of another bucket");
-            answer.outcomes.push(Outcome { of: key, what: "of another bucket".into() });
-            continue;
-        }
-        let invocation = context.invocation(&context.policy, call);
-        match render_frame(&invocation, &context.studio, &key).await {
-            Ok(rendered) => {
-                let what = described(&rendered.outcome);
-                log(call, &rendered, &what);
-                answer.outcomes.push(Outcome { of: key, what });
-            }
-            Err(error) if may_pass(&error) => {
-                tracing::error!(request_id = %call.request_id, key, error = chain(&error), "failed");
-                failed.push((key, error));
-            }
-            Err(error) => {
-                tracing::warn!(request_id = %call.request_id, key, error = chain(&error), "ignored");
-                answer.outcomes.push(Outcome { of: key, what: chain(&error) });
-            }
-        }
-    }
-    if failed.is_empty() { Ok(answer) } else { Err(Failed(failed)) }
+    records::work(Function::Render, context, call, objects).await
+}
+
+/// Works on one event.
+pub(crate) async fn record<S: Store>(context: &Context<S>, call: &Call, key: &str) -> Result<String, Error> {
+    let rendered = render_frame(&context.invocation(&context.policy, call), &context.studio, key).await?;
+    let what = described(&rendered.outcome);
+    log(call, &rendered, &what);
+    Ok(what)
 }
 
 fn described(outcome: &Came) -> String {

@@ -111,6 +111,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let mut quiet = Quiet::default();
         let (mut rounds, mut built, mut frames) = (0, 0, 0);
         let (mut waited, mut building) = (Duration::ZERO, Duration::ZERO);
+        let began = self.clock.now();
         loop {
             rounds += 1;
             let known = self.manifest(animation).await?;
@@ -135,7 +136,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                         continue;
                     }
                     let start = self.clock.now();
-                    match self.build(animator, observed, gif).await? {
+                    match self.build(animator, observed, gif, began).await? {
                         Built::Put => {
                             built += 1;
                             frames = head.total;
@@ -191,11 +192,16 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 
     /// Writes the GIF of a manifest that is done over the version that was there, or fails to.
+    ///
+    /// A set that cannot be assembled in the function's time is refused, but only by an invocation that had most of its
+    /// time for that; one that `began` long before, and has waited and built other sets since, leaves it to its next
+    /// attempt.
     async fn build<A: Animator>(
         &self,
         animator: &A,
         manifest: &Manifest,
         gif: Option<ObjectInfo>,
+        began: Timestamp,
     ) -> Result<Built> {
         let head = &manifest.head;
         let animation = &head.animation;
@@ -239,6 +245,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             }
             pushed += 1;
             if self.is_out_of_time() {
+                if start.since(began) > self.clock.now().since(start) {
+                    upload.abort().await?;
+                    return Err(Error::OutOfTime {
+                        what: format!("{animation} became whole too late to assemble it"),
+                    });
+                }
                 break Some(out_of_time(pushed, head.total, self.clock.now().since(start)));
             }
         };

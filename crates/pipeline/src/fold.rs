@@ -102,8 +102,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         fact: &Fact,
         first: u64,
     ) -> Result<bool> {
-        let enough = if self.breaks(Mutation::TrustNextRevision) { 1 } else { 2 };
-        if *fact != Fact::Fold && glimpse.revision() >= first + enough {
+        if *fact != Fact::Fold && glimpse.revision() >= first + 2 {
             return Ok(true);
         }
         self.shows(animation, glimpse, fact).await

@@ -56,7 +56,7 @@ impl Default for Policy {
         Policy {
             pixels: rayfold_tracer::PIXEL_VERSION,
             quiet: Duration::from_secs(5),
-            pause_per_frame: Duration::from_millis(1),
+            pause_per_frame: Duration::from_millis(3),
             pause_cap: Duration::from_millis(500),
             glimpse: 32 * 1024,
             stuck_after: Duration::from_secs(15 * 60),
@@ -104,13 +104,11 @@ pub enum Mutation {
     AssemblerDoesNotLookAgain,
     /// The GIF is put without its condition.
     DropGifCondition,
-    /// Any later revision of the manifest is taken to cover a result.
-    TrustNextRevision,
 }
 
 impl Mutation {
     /// All of them.
-    pub const ALL: [Mutation; 9] = [
+    pub const ALL: [Mutation; 8] = [
         Mutation::SkipSecondListing,
         Mutation::ClaimBeforeCommit,
         Mutation::DropIfMatch,
@@ -119,7 +117,6 @@ impl Mutation {
         Mutation::AssemblerLeavesEarly,
         Mutation::AssemblerDoesNotLookAgain,
         Mutation::DropGifCondition,
-        Mutation::TrustNextRevision,
     ];
 }
 

@@ -15,6 +15,7 @@ use std::fmt;
 use std::num::NonZeroU64;
 use std::str::FromStr;
 
+use rayfold_scene::SETTINGS_FILE;
 use serde::{Deserialize, Serialize};
 
 use crate::store::ETag;
@@ -217,7 +218,7 @@ impl Animation {
 
     /// `scripts/<animation>/animation.json`
     pub fn settings(&self) -> String {
-        format!("{SCRIPTS}{self}/animation.json")
+        format!("{SCRIPTS}{self}/{SETTINGS_FILE}")
     }
 
     /// `scripts/<animation>/<name>.txt`
@@ -381,7 +382,7 @@ fn script(text: &str, rest: &str) -> Result<Key> {
         Error::Key { problem, .. } => Error::key(text, problem),
         other => other,
     })?;
-    if file == "animation.json" {
+    if file == SETTINGS_FILE {
         return Ok(Key::Settings { animation });
     }
     match file.strip_suffix(".txt") {

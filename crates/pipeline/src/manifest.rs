@@ -8,7 +8,7 @@
 
 use std::num::NonZeroU64;
 
-use rayfold_scene::{AnimationSettings, Diagnostic};
+use rayfold_scene::{AnimationSettings, Diagnostic, SETTINGS_FILE, parse_settings};
 use serde::{Deserialize, Serialize};
 
 use crate::keys::{Animation, Generation, Part, ScriptName};
@@ -279,7 +279,7 @@ impl Settings {
 
     /// Reads `animation.json`.
     pub fn parse(version: ETag, body: &[u8]) -> Self {
-        let parsed = rayfold_scene::parse_settings("animation.json", body);
+        let parsed = parse_settings(SETTINGS_FILE, body);
         let fault = match &parsed.settings {
             Some(_) => None,
             None => Some(Reason::from_diagnostics(parsed.diagnostics).shortened()),

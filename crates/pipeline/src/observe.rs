@@ -48,7 +48,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
     }
 
-    async fn list_scripts(
+    pub(crate) async fn list_scripts(
         &self,
         animation: &Animation,
         marks: &[ScriptName],

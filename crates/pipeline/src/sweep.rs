@@ -255,12 +255,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             },
         };
         let old = |modified: Timestamp| now.since(modified) >= self.policy.superseded_after;
-        let mut doomed: Vec<String> = Vec::new();
+        let mut doomed: Vec<Key> = Vec::new();
         let mut split_before = false;
         for found in observation.results.receipts.iter().filter(superseded) {
             if old(found.modified) {
                 split_before |= matches!(found.receipt, Receipt::Split { .. });
-                doomed.push(animation.receipt(&found.receipt));
+                doomed.push(Key::Receipt { animation: animation.clone(), receipt: found.receipt.clone() });
             }
         }
         if split_before {
@@ -272,13 +272,46 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                     && let Some((name, version)) = part_of(&key)
                     && current.get(name) != Some(&version)
                 {
-                    doomed.push(listed.key);
+                    doomed.push(key);
                 }
             }
         }
         visit.deleted = doomed.len() as u64;
-        let deletions: Vec<_> = doomed.iter().map(|key| self.delete(key)).collect();
+        let deletions: Vec<_> =
+            doomed.iter().map(|key| async { self.delete(&key.to_string()).await }).collect();
         stream::iter(deletions).buffer_unordered(self.policy.concurrency).try_collect::<Vec<()>>().await?;
+        self.wake_returned(animation, &current, &doomed, visit).await
+    }
+
+    /// A script may have come back to a version while what came of that was being deleted, and its event may have found
+    /// the result still there: wakes whatever is current again.
+    async fn wake_returned(
+        &self,
+        animation: &Animation,
+        before: &BTreeMap<&ScriptName, &ETag>,
+        deleted: &[Key],
+        visit: &mut Visit,
+    ) -> Result<()> {
+        let gone = deleted.iter().filter_map(|key| match key {
+            Key::Receipt {
+                receipt:
+                    Receipt::Frame { name, tag, part: None }
+                    | Receipt::Fault { name, tag, part: None }
+                    | Receipt::Split { name, tag, .. },
+                ..
+            } => Some((name, &tag.version)),
+            key => part_of(key),
+        });
+        let gone: BTreeSet<_> = gone.filter(|(name, version)| before.get(name) != Some(version)).collect();
+        if gone.is_empty() {
+            return Ok(());
+        }
+        let (scripts, _) = self.list_scripts(animation, &[]).await?;
+        for script in scripts.found.iter().filter(|found| gone.contains(&(&found.name, &found.version))) {
+            let tag = Tag { version: script.version.clone(), pixels: self.policy.pixels };
+            self.put_retry(animation, &script.name, tag, None, 1).await?;
+            visit.woken += 1;
+        }
         Ok(())
     }
 }

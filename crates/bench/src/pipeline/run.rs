@@ -15,7 +15,7 @@ use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::Manifest;
 use rayfold_pipeline::store::{PutOptions, S3Store, Store};
 use rayfold_pipeline::studio::decode;
-use rayfold_scene::{AnimationSettings, natural_cmp, parse_settings};
+use rayfold_scene::{AnimationSettings, SETTINGS_FILE, natural_cmp, parse_settings};
 use serde_json::Value;
 use tokio::sync::mpsc::UnboundedReceiver;
 
@@ -53,7 +53,7 @@ impl Folder {
             files.push((name, Bytes::from(std::fs::read(entry.path())?)));
         }
         files.sort_by(|(a, _), (b, _)| natural_cmp(a, b));
-        let settings = files.iter().find(|(name, _)| name == "animation.json");
+        let settings = files.iter().find(|(name, _)| name == SETTINGS_FILE);
         let settings = settings.map(|(name, text)| parse_settings(name, text).settings);
         let settings = settings.flatten().unwrap_or_default();
         Ok(Self { name: name.to_owned(), files, settings })

@@ -1,6 +1,7 @@
 //! What a manifest says, for people.
 
 use rayfold_pipeline::manifest::{Fault, Frame, FrameState, Manifest, Reason, Status};
+use rayfold_scene::SETTINGS_FILE;
 
 use crate::console::Console;
 use crate::wording::number;
@@ -44,7 +45,7 @@ pub(crate) fn name(frame: &Frame) -> String {
 pub(crate) fn faults(manifest: &Manifest) -> Vec<(String, Option<&Reason>)> {
     let mut faults = Vec::new();
     if let Some(reason) = &manifest.head.settings.fault {
-        faults.push(("animation.json".to_owned(), Some(reason)));
+        faults.push((SETTINGS_FILE.to_owned(), Some(reason)));
     }
     for frame in &manifest.frames {
         if let FrameState::Failed(Fault { reason, .. }) = &frame.state {

@@ -7,6 +7,7 @@ use rayfold_local::observation::{Observation, Outcome, Seen};
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{FrameState, Manifest, Status};
 use rayfold_pipeline::store::{S3Store, Store};
+use rayfold_scene::SETTINGS_FILE;
 use serde_json::Value;
 
 use crate::console::Console;
@@ -69,7 +70,7 @@ impl<'a> News<'a> {
         }
         match text("message") {
             "rendered" => {
-                let frame = if text("frame").is_empty() { "animation.json" } else { text("frame") };
+                let frame = if text("frame").is_empty() { SETTINGS_FILE } else { text("frame") };
                 let took = line["draw_ms"].as_u64().filter(|_| text("outcome") == "drawn");
                 let took = took.map(|ms| format!(" in {ms} ms")).unwrap_or_default();
                 self.console.note(format_args!("{}/{frame}: {}{took}", text("animation"), text("outcome")));
@@ -125,7 +126,7 @@ fn state(manifest: &Manifest) -> String {
         Status::Failed => {
             let mut text = format!("{name}: failed");
             if let Some(fault) = &head.settings.fault {
-                text.push_str(&format!("\n  animation.json: {}", fault.message));
+                text.push_str(&format!("\n  {SETTINGS_FILE}: {}", fault.message));
             }
             for frame in &manifest.frames {
                 if let FrameState::Failed(fault) = &frame.state {

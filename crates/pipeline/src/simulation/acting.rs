@@ -17,6 +17,7 @@ use bytes::Bytes;
 use rayfold_scene::AnimationSettings;
 
 use super::bucket::{Fate, Grounds};
+use super::engine::Engine;
 use crate::Result;
 use crate::assemble::{Animator, Encoding};
 use crate::keys::{Part, ScriptName};
@@ -95,11 +96,17 @@ impl Renderer for Actress {
     }
 }
 
-/// Lists frames.
-pub(super) struct Lister;
+/// Lists frames, in simulated time.
+pub(super) struct Lister {
+    pub(super) engine: Engine,
+    /// How long a frame takes.
+    pub(super) push: Duration,
+}
 
 /// A list in the making.
 pub(super) struct List {
+    engine: Engine,
+    push: Duration,
     settings: AnimationSettings,
     pictures: Vec<String>,
 }
@@ -108,12 +115,14 @@ impl Animator for Lister {
     type Encoding = List;
 
     fn begin(&self, settings: &AnimationSettings) -> Result<List, Reason> {
-        Ok(List { settings: *settings, pictures: Vec::new() })
+        let (engine, push) = (self.engine.clone(), self.push);
+        Ok(List { engine, push, settings: *settings, pictures: Vec::new() })
     }
 }
 
 impl Encoding for List {
     async fn push(&mut self, frame: Bytes) -> Result<Bytes, Reason> {
+        self.engine.sleep(self.push).await;
         self.pictures.push(String::from_utf8_lossy(&frame).into_owned());
         Ok(Bytes::new())
     }

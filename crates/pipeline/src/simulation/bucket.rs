@@ -3,6 +3,7 @@
 //! A request takes effect at some moment between its start and its answer, whether or not whoever sent it still lives.
 //! Listings are not atomic: each name is seen as it was at one of two moments within the request.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -66,6 +67,8 @@ pub(super) struct Fate {
     delay_last: Duration,
     killed: AtomicBool,
     requests: AtomicU64,
+    /// When it last asked for the listing of scripts, in microseconds.
+    listed_us: AtomicU64,
 }
 
 impl Fate {
@@ -76,6 +79,7 @@ impl Fate {
             delay_last,
             killed: AtomicBool::new(false),
             requests: AtomicU64::new(0),
+            listed_us: AtomicU64::new(0),
         }
     }
 
@@ -92,6 +96,17 @@ impl Fate {
     }
 }
 
+/// When a user can do the most awkward thing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Moment {
+    /// A function asks for the listing of the scripts.
+    Listing,
+    /// The listing has been made, and is on its way.
+    Listed,
+    /// An assembler begins to write a GIF.
+    Building,
+}
+
 /// What the bucket tells the world after a change: who, which key, whether it is there now.
 pub(super) type Notify = dyn Fn(Actor, &str, bool, &Bucket) + Send + Sync;
 
@@ -102,14 +117,18 @@ pub(super) struct Grounds {
     pub(super) faults: Mutex<Faults>,
     pub(super) bucket: Mutex<Bucket>,
     pub(super) notify: Mutex<Option<Arc<Notify>>>,
-    /// Told when a function has listed scripts: the moment at which a change is most awkward.
-    pub(super) listed: Mutex<Option<Arc<dyn Fn() + Send + Sync>>>,
+    /// Told of the moments at which a change is most awkward.
+    pub(super) moments: Mutex<Option<Arc<dyn Fn(Moment) + Send + Sync>>>,
+    /// By GIF: the moment from which the oldest listing is that one was made from. Equal files are one GIF.
+    gifs: Mutex<BTreeMap<ETag, u64>>,
+    /// A GIF gave way to one from an older listing.
+    pub(super) set_back: Mutex<Option<String>>,
     /// What users have overwritten or deleted, and where.
     pub(super) past: Mutex<Vec<(String, Option<String>)>>,
     /// A write took effect after its sender was killed.
     pub(super) late_writes: AtomicU64,
     /// What each actor was seen doing, with the prefix up to the first slash.
-    pub(super) seen: Mutex<std::collections::BTreeSet<(Actor, Action, String)>>,
+    pub(super) seen: Mutex<BTreeSet<(Actor, Action, String)>>,
     /// Requests by actor.
     pub(super) requests: [AtomicU64; 3],
     /// Bytes of objects that were read, by actor.
@@ -127,7 +146,9 @@ impl Grounds {
             faults: Mutex::default(),
             bucket: Mutex::default(),
             notify: Mutex::new(None),
-            listed: Mutex::new(None),
+            moments: Mutex::new(None),
+            gifs: Mutex::default(),
+            set_back: Mutex::default(),
             past: Mutex::default(),
             late_writes: AtomicU64::new(0),
             seen: Mutex::default(),
@@ -151,6 +172,25 @@ impl Grounds {
 
     pub(super) fn between_ms(&self, range: Range<u64>) -> Duration {
         Duration::from_micros(range.start * 1000 + self.random.below((range.end - range.start) * 1000))
+    }
+
+    fn tell(&self, moment: Moment) {
+        let moments = lock(&self.moments).clone();
+        if let Some(told) = moments {
+            told(moment);
+        }
+    }
+
+    /// Holds that a GIF never gives way to one from an older listing.
+    fn replace_gif(&self, key: &str, before: Option<&ETag>, next: &ETag, listed_us: u64) {
+        let mut gifs = lock(&self.gifs);
+        let older = before.and_then(|before| gifs.get(before)).filter(|before| **before > listed_us);
+        if let Some(before) = older {
+            let what = format!("{key} of a listing at {before} us gave way to one of {listed_us} us");
+            lock(&self.set_back).get_or_insert(what);
+        }
+        let first = gifs.entry(next.clone()).or_insert(listed_us);
+        *first = listed_us.min(*first);
     }
 
     fn changed(&self, actor: Actor, key: &str, there: bool) {
@@ -231,6 +271,15 @@ impl WorldStore {
         let key = effect.key().to_owned();
         let folder = key.split_inclusive('/').next().unwrap_or_default().to_owned();
         lock(&grounds.seen).insert((self.actor, effect.action(), folder));
+
+        match &effect {
+            Effect::List(request) if request.prefix.starts_with("scripts/") => {
+                self.fate.listed_us.store(grounds.engine.now_us(), Ordering::Relaxed);
+                grounds.tell(Moment::Listing);
+            }
+            Effect::Nothing(_) => grounds.tell(Moment::Building),
+            _ => {}
+        }
 
         let faults = *lock(&grounds.faults);
         let slowness = if grounds.chance(faults.slow) { 1 + grounds.random.below(8) } else { 1 };
@@ -337,16 +386,20 @@ impl WorldStore {
             }
             Effect::List(request) => {
                 let page = lock(&grounds.bucket).list(&request);
-                let listed = lock(&grounds.listed).clone();
-                if let Some(listed) = listed.filter(|_| request.prefix.starts_with("scripts/")) {
-                    listed();
+                if request.prefix.starts_with("scripts/") {
+                    grounds.tell(Moment::Listed);
                 }
                 Ok(Answer::Page(page))
             }
             Effect::Nothing(_) => Ok(Answer::Deleted),
             Effect::Put(key, body, options) => {
                 let now = WorldClock::exact(&grounds.engine).now();
+                let before = lock(&grounds.bucket).head(&key).ok().map(|info| info.etag);
                 let etag = lock(&grounds.bucket).put(now, &key, body, options)?;
+                if key.starts_with("animations/") {
+                    let listed_us = self.fate.listed_us.load(Ordering::Relaxed);
+                    grounds.replace_gif(&key, before.as_ref(), &etag, listed_us);
+                }
                 grounds.changed(self.actor, &key, true);
                 Ok(Answer::ETag(etag))
             }

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU64;
 
-use rayfold_scene::AnimationSettings;
+use rayfold_scene::{AnimationSettings, SETTINGS_FILE, parse_settings};
 
 use super::acting::{Play, film, picture};
 use crate::keys::{Animation, Key, Part, ScriptName};
@@ -27,7 +27,7 @@ impl Expected {
                     scripts.push((name, body.to_vec()));
                 }
                 Ok(Key::Settings { animation: of }) if of == *animation => {
-                    settings = rayfold_scene::parse_settings("animation.json", &body).settings;
+                    settings = parse_settings(SETTINGS_FILE, &body).settings;
                 }
                 _ => {}
             }

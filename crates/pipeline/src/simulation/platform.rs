@@ -92,6 +92,8 @@ pub(super) struct Platform {
     pub(super) concurrency: usize,
     pub(super) timeout: Duration,
     pub(super) draw_ms: (u64, u64),
+    /// How long the assembler takes for a frame.
+    pub(super) push: Duration,
     state: Mutex<State>,
     me: Weak<Platform>,
 }
@@ -104,6 +106,7 @@ impl Platform {
         concurrency: usize,
         timeout: Duration,
         draw_ms: (u64, u64),
+        push: Duration,
     ) -> Arc<Self> {
         Arc::new_cyclic(|me| Platform {
             grounds,
@@ -114,6 +117,7 @@ impl Platform {
             concurrency,
             timeout,
             draw_ms,
+            push,
             state: Mutex::new(State { queue: VecDeque::new(), running: BTreeSet::new(), tokens: 0 }),
             me: me.clone(),
         })
@@ -256,7 +260,8 @@ impl Platform {
             }
             Work::Assemble(key) => {
                 lock(&self.diary).invocations[1] += 1;
-                assemble(&invocation, &Lister, key).await?;
+                let lister = Lister { engine: grounds.engine.clone(), push: self.push };
+                assemble(&invocation, &lister, key).await?;
             }
             Work::Sweep => {
                 let swept = sweep(&invocation).await?;

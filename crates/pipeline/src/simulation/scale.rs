@@ -75,8 +75,15 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
     let engine = Engine::default();
     let random = Randomness::seeded(scale.seed);
     let grounds = Grounds::new(engine.clone(), scale.seed, false);
-    let platform =
-        Platform::new(grounds.clone(), Policy::default(), None, scale.concurrency, TIMEOUT, scale.draw_ms);
+    let platform = Platform::new(
+        grounds.clone(),
+        Policy::default(),
+        None,
+        scale.concurrency,
+        TIMEOUT,
+        scale.draw_ms,
+        Duration::ZERO,
+    );
     let animation = Animation::new("long").map_err(|error| error.to_string())?;
     let moments: Shared<Moments> = Shared::default();
     {

@@ -1,12 +1,12 @@
 //! One run: a story and a world made up from a seed, lived through, and judged.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bytes::Bytes;
 
-use super::bucket::{Actor, Faults, Grounds};
+use super::bucket::{Actor, Faults, Grounds, Moment};
 use super::engine::{Engine, WorldClock, lock};
 use super::expected::Expected;
 use super::platform::{Chaos, Platform, Work};
@@ -56,6 +56,7 @@ pub(super) fn run(
         concurrency,
         TIMEOUT,
         (1, [20, 300, 3_000][pick(&random, 3)]),
+        Duration::from_millis([0, 0, 100, 400][pick(&random, 4)]),
     );
     let calm = random.one_in(4);
     if !calm {
@@ -90,7 +91,7 @@ pub(super) fn run(
     }
     write_story(&random, &grounds, &platform, &animation);
     if random.one_in(2) {
-        *lock(&grounds.listed) = Some(awkward_user(&random, &grounds));
+        *lock(&grounds.moments) = Some(awkward_user(&random, &grounds));
     }
 
     engine.run(Duration::from_secs(45));
@@ -100,7 +101,7 @@ pub(super) fn run(
     let outcome = judge.judge();
     // The notification and the platform's tasks know each other.
     *lock(&judge.grounds.notify) = None;
-    *lock(&judge.grounds.listed) = None;
+    *lock(&judge.grounds.moments) = None;
     judge.engine.end();
     if let (Some(log), Some(noted)) = (log, &judge.grounds.log) {
         log.append(&mut lock(noted));
@@ -153,21 +154,41 @@ fn write_story(random: &Randomness, grounds: &Arc<Grounds>, platform: &Arc<Platf
     }
 }
 
-/// A user who changes a script just when a function has listed it, mostly back to what it was before.
-fn awkward_user(random: &Randomness, grounds: &Arc<Grounds>) -> Arc<dyn Fn() + Send + Sync> {
+/// A user who changes a script at the worst moment, mostly to what it was before.
+fn awkward_user(random: &Randomness, grounds: &Arc<Grounds>) -> Arc<dyn Fn(Moment) + Send + Sync> {
     let random = Randomness::seeded(random.bits());
     let (left, patience) = (AtomicU64::new(1 + random.below(4)), 1 + random.below(6));
+    // After a listing; before it and back after it, so that it alone has seen the change; during a build.
+    let habit = [Moment::Listed, Moment::Listing, Moment::Building][pick(&random, 3)];
+    let to_restore: Mutex<Option<(String, String)>> = Mutex::new(None);
     let world = Arc::downgrade(grounds);
-    Arc::new(move || {
+    Arc::new(move |moment| {
         let Some(grounds) = world.upgrade() else { return };
-        if left.load(Ordering::Relaxed) == 0 || !random.one_in(patience) {
+        if moment == Moment::Listed
+            && let Some((key, text)) = lock(&to_restore).take()
+        {
+            let soon = Duration::from_millis(random.below(2) * random.below(20));
+            act(&grounds, soon, key, Some(text));
+        }
+        if moment != habit || left.load(Ordering::Relaxed) == 0 || !random.one_in(patience) {
+            return;
+        }
+        let past = lock(&grounds.past).clone();
+        let Some((key, before)) = past.get(pick(&random, past.len().max(1))) else { return };
+        let key = if key.ends_with(".json") { return } else { key.clone() };
+        if moment == Moment::Listing {
+            let Ok(now) = lock(&grounds.bucket).get(&key) else { return };
+            let now = String::from_utf8_lossy(&now.body).into_owned();
+            let other = format!("frame {}", u64::from(now == "frame 0"));
+            if lock(&to_restore).is_none() {
+                left.fetch_sub(1, Ordering::Relaxed);
+                *lock(&to_restore) = Some((key.clone(), now));
+                act(&grounds, Duration::ZERO, key, Some(other));
+            }
             return;
         }
         left.fetch_sub(1, Ordering::Relaxed);
-        let past = lock(&grounds.past).clone();
-        let Some((key, before)) = past.get(pick(&random, past.len().max(1))) else { return };
         let text = if random.one_in(6) { Some(content(&random)) } else { before.clone() };
-        let key = if key.ends_with(".json") { return } else { key.clone() };
         let first = Duration::from_millis(random.below(60));
         act(&grounds, first, key.clone(), text);
         if random.one_in(3) {
@@ -315,6 +336,7 @@ impl Judge {
         if let Some(bug) = &lock(&self.platform.diary).bug {
             return Err(format!("an invocation failed for good: {bug}"));
         }
+        lock(&self.grounds.set_back).clone().map_or(Ok(()), Err)?;
         lock(&self.watch).violation.clone().map_or(Ok(()), Err)
     }
 

@@ -34,12 +34,12 @@ fn notices(rule: Mutation, seed: u64) {
 
 #[test]
 fn a_missing_second_listing_is_noticed() {
-    notices(Mutation::SkipSecondListing, 6_131);
+    notices(Mutation::SkipSecondListing, 919);
 }
 
 #[test]
 fn claims_before_their_commit_are_noticed() {
-    notices(Mutation::ClaimBeforeCommit, 18_710);
+    notices(Mutation::ClaimBeforeCommit, 47_457);
 }
 
 #[test]
@@ -49,12 +49,40 @@ fn unconditional_manifests_are_noticed() {
 
 #[test]
 fn leaving_ones_own_commit_is_noticed() {
-    notices(Mutation::LeaveOwnCommit, 32);
+    notices(Mutation::LeaveOwnCommit, 22);
 }
 
 #[test]
 fn missing_claims_are_noticed() {
     notices(Mutation::NeverClaim, 2);
+}
+
+#[test]
+fn assemblers_that_leave_early_are_noticed() {
+    notices(Mutation::AssemblerLeavesEarly, 8_218);
+}
+
+#[test]
+fn assemblers_that_do_not_look_again_are_noticed() {
+    notices(Mutation::AssemblerDoesNotLookAgain, 548);
+}
+
+#[test]
+fn unconditional_gifs_are_noticed() {
+    notices(Mutation::DropGifCondition, 28);
+}
+
+/// A user flickered a script while the sweep deleted what was superseded: the deleted frame was current again, and
+/// pending until the next sweep.
+#[test]
+fn what_comes_back_while_it_is_tidied_away_is_drawn_again() {
+    run(141, None).unwrap_or_else(|violation| panic!("{violation}"));
+}
+
+/// An assembler that had waited for most of its time refused a set for which only a moment was left.
+#[test]
+fn a_set_that_becomes_whole_late_is_not_refused() {
+    run(23_812, None).unwrap_or_else(|violation| panic!("{violation}"));
 }
 
 #[test]
