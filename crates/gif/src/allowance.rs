@@ -2,14 +2,26 @@
 //!
 //! A pixel that keeps its colour from frame to frame may be seen a little wrong, and a later palette may have a better
 //! colour for it. To draw it then makes the animation better, and flicker. So there is an allowance, of pixels and of
-//! visible difference, that grows with each frame; the pixels with the largest error are drawn first.
+//! visible difference, that grows with each frame, the more of it changes the more; the tiles with the largest error
+//! are drawn first. What only a few tiles ask for costs more bytes than it is worth: single pixels drawn among others
+//! that are left cost as much as if all were drawn.
 
 use crate::colour;
 
-/// At first, as a part of the pixels that stay, and as a CIE 1976 difference of all of them.
-const AT_FIRST: f64 = 0.35;
-/// More of both with each frame: over 20 frames and the first the mean stays at 0.05.
-const EACH_FRAME: f64 = 0.03;
+/// Of the pixels that stay: how many, as a part of them, and how much CIE 1976 difference in their mean.
+struct Grant {
+    pixels: f64,
+    difference: f64,
+}
+/// At the start. Over 10 frames and the first, the mean difference stays below 0.05 with what comes later.
+const AT_FIRST: Grant = Grant { pixels: 0.1, difference: 0.12 };
+/// More with each frame of which a fair part changes.
+const EACH_FRAME: Grant = Grant { pixels: 0.2, difference: 0.027 };
+/// A frame gives that grant in full when one pixel in so many of them changes.
+const FOR_CHANGES: f64 = 8.0;
+/// How much more may be asked for than is left: of what is asked for a part is drawn, and only that is taken off. One
+/// large improvement costs fewer bytes than many small ones.
+const AHEAD: f64 = 5.0;
 /// Steps of error in an octave, as a power of two.
 const FINENESS: u32 = 3;
 const STEPS: usize = 128;
@@ -27,15 +39,15 @@ impl Still {
         Self { pixels: 0, errors: [0; STEPS] }
     }
 
-    /// Counts one that is seen right enough.
-    pub(crate) fn count(&mut self) {
-        self.pixels += 1;
+    /// Counts some that are seen right enough.
+    pub(crate) fn count(&mut self, pixels: usize) {
+        self.pixels += pixels as u64;
     }
 
-    /// Counts one that is seen with an error that calls for a better colour.
-    pub(crate) fn count_wrong(&mut self, error: f32) {
-        self.pixels += 1;
-        self.errors[step(error)] += 1;
+    /// Counts some that are seen with a mean error that calls for better colours.
+    pub(crate) fn count_wrong(&mut self, pixels: u64, error: f32) {
+        self.pixels += pixels;
+        self.errors[step(error)] += pixels;
     }
 
     pub(crate) fn join(mut self, other: Self) -> Self {
@@ -55,9 +67,10 @@ pub(crate) struct Redrawn {
 }
 
 impl Redrawn {
-    pub(crate) fn count(&mut self, from: [u8; 3], to: [u8; 3]) {
+    /// Counts one, whose look changed by a squared error.
+    pub(crate) fn count(&mut self, error: f32) {
         self.pixels += 1;
-        self.difference += visible(colour::near_error(from, to));
+        self.difference += visible(error);
     }
 }
 
@@ -70,15 +83,18 @@ pub(crate) struct Allowance {
 
 impl Allowance {
     pub(crate) fn new() -> Self {
-        Self { share: AT_FIRST, difference: AT_FIRST }
+        Self { share: AT_FIRST.pixels, difference: AT_FIRST.difference }
+    }
+
+    pub(crate) fn is_left(&self) -> bool {
+        self.share > 0.01 && self.difference > 0.01
     }
 
     /// The error from which still pixels of the next frame may be drawn anew.
-    pub(crate) fn least_error(&mut self, still: &Still) -> f32 {
-        self.share += EACH_FRAME;
-        self.difference += EACH_FRAME;
+    pub(crate) fn least_error(&self, still: &Still) -> f32 {
         let pixels = still.pixels as f64;
-        let (mut share, mut difference) = (self.share * pixels, self.difference * pixels);
+        let mut share = self.share * pixels * AHEAD;
+        let mut difference = self.difference * pixels * AHEAD;
         for at in (0..STEPS).rev() {
             let count = still.errors[at] as f64;
             share -= count;
@@ -90,8 +106,11 @@ impl Allowance {
         0.0
     }
 
-    /// Takes off what was used.
-    pub(crate) fn pay(&mut self, still: &Still, redrawn: &[Redrawn]) {
+    /// Takes off what was used, and adds what a frame of which a part `changed` gives.
+    pub(crate) fn pay(&mut self, still: &Still, redrawn: &[Redrawn], changed: f64) {
+        let more = (changed * FOR_CHANGES).min(1.0);
+        self.share += EACH_FRAME.pixels * more;
+        self.difference += EACH_FRAME.difference * more;
         if still.pixels > 0 {
             let pixels = still.pixels as f64;
             self.share -= redrawn.iter().map(|r| r.pixels).sum::<u64>() as f64 / pixels;
@@ -131,20 +150,41 @@ mod tests {
     #[test]
     fn the_largest_errors_come_first_and_no_more_than_allowed() {
         let mut still = Still::none();
-        (0..1_000).for_each(|k| still.count_wrong(2.0 + k as f32 * 0.01));
+        (0..1_000).for_each(|k| still.count_wrong(1, 2.0 + k as f32 * 0.01));
         let least = Allowance::new().least_error(&still);
         let drawn = (0..1_000).filter(|&k| 2.0 + k as f32 * 0.01 >= least).count();
-        assert!((100..=380).contains(&drawn), "{drawn} of 1000 from {least}");
+        let most = 1_000.0 * AHEAD * AT_FIRST.pixels;
+        assert!((100..=most as usize).contains(&drawn), "{drawn} of 1000 from {least}");
+    }
+
+    #[test]
+    fn in_the_long_run_no_more_is_drawn_than_granted() {
+        let mut allowance = Allowance::new();
+        let (frames, mut sum) = (200, 0.0);
+        for frame in 0..frames {
+            let errors = (0..1_000_u32).map(|k| 2.0 + (k * 37 + frame * 101) as f32 % 97.0);
+            let mut still = Still::none();
+            errors.clone().for_each(|error| still.count_wrong(1, error));
+            let least = allowance.least_error(&still);
+            let mut redrawn = Redrawn::default();
+            errors
+                .filter(|&error| allowance.is_left() && error >= least)
+                .for_each(|error| redrawn.count(error));
+            sum += redrawn.difference / 1_000.0;
+            allowance.pay(&still, &[redrawn], 1.0);
+        }
+        let granted = AT_FIRST.difference * AHEAD + EACH_FRAME.difference * f64::from(frames);
+        assert!(sum <= granted && sum > 0.5 * granted, "{sum} of {granted}");
     }
 
     #[test]
     fn what_is_used_up_comes_back_slowly() {
         let mut still = Still::none();
-        (0..100).for_each(|_| still.count_wrong(50.0));
+        (0..100).for_each(|_| still.count_wrong(1, 50.0));
         let mut allowance = Allowance::new();
         let mut all = Redrawn::default();
-        (0..100).for_each(|_| all.count([0; 3], [4; 3]));
-        allowance.pay(&still, &[all]);
+        (0..100).for_each(|_| all.count(50.0));
+        allowance.pay(&still, &[all], 1.0);
         assert!(allowance.least_error(&still) > 50.0);
     }
 }

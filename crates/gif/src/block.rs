@@ -1,80 +1,77 @@
-//! One frame as the format stores it, before compression.
+//! One frame as the format stores it.
+
+use crate::lzw::{self, Part};
+
+/// A rectangle of pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Area {
+    pub(crate) left: usize,
+    pub(crate) top: usize,
+    /// The first column and row that are no longer in it.
+    pub(crate) right: usize,
+    pub(crate) bottom: usize,
+}
+
+impl Area {
+    pub(crate) fn whole(width: usize, pixels: usize) -> Self {
+        Self { left: 0, top: 0, right: width, bottom: pixels / width }
+    }
+
+    /// The smallest that holds all pixels wanted, row by row; `None` if there are none.
+    pub(crate) fn around<T>(items: &[T], width: usize, wanted: impl Fn(&T) -> bool) -> Option<Self> {
+        let mut around: Option<Self> = None;
+        for (y, row) in items.chunks_exact(width).enumerate() {
+            let Some(first) = row.iter().position(&wanted) else { continue };
+            let after = row.iter().rposition(&wanted).unwrap_or(first) + 1;
+            let area = around.get_or_insert(Self { left: first, top: y, right: after, bottom: y + 1 });
+            area.left = area.left.min(first);
+            area.right = area.right.max(after);
+            area.bottom = y + 1;
+        }
+        around
+    }
+}
 
 /// The part of a frame that is drawn over what is already seen.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Block {
-    pub(crate) left: u16,
-    pub(crate) top: u16,
-    pub(crate) width: u16,
-    pub(crate) height: u16,
-    /// One palette index a pixel, row by row.
-    pub(crate) indices: Vec<u8>,
+    pub(crate) area: Area,
     /// Red, green, blue for each index; at most 256 of them.
     pub(crate) palette: Vec<u8>,
     /// The index that leaves a pixel as it is.
     pub(crate) transparent: Option<u8>,
     pub(crate) delay_cs: u16,
+    /// The compressed indices, row by row.
+    pub(crate) data: Vec<u8>,
 }
 
 impl Block {
     /// Draws nothing, for the time given. The format has no empty block, so this is one pixel of nothing.
     pub(crate) fn nothing(delay_cs: u16) -> Self {
-        Self {
-            left: 0,
-            top: 0,
-            width: 1,
-            height: 1,
-            indices: vec![0],
-            palette: vec![0; 3],
-            transparent: Some(0),
-            delay_cs,
-        }
+        let mut writer = lzw::Writer::new(bits(1));
+        writer.put(0);
+        let area = Area { left: 0, top: 0, right: 1, bottom: 1 };
+        Self::new(area, &[], Some(0), delay_cs, &[writer.finish(true)])
     }
 
-    /// Cuts a whole frame's indices to the rectangle outside of which all are transparent.
-    ///
-    /// Without a transparent index the whole frame is drawn.
-    pub(crate) fn cut(
-        indices: Vec<u8>,
-        width: usize,
+    /// With the indices in parts.
+    pub(crate) fn new(
+        area: Area,
         colours: &[[u8; 3]],
         transparent: Option<u8>,
         delay_cs: u16,
+        parts: &[Part],
     ) -> Self {
         let filler = transparent.map(|_| [0; 3]);
-        let palette = colours.iter().chain(&filler).flatten().copied().collect();
-        let Some(clear) = transparent else {
-            let height = (indices.len() / width) as u16;
-            let width = width as u16;
-            return Self { left: 0, top: 0, width, height, indices, palette, transparent, delay_cs };
-        };
-        let (mut left, mut right, mut top, mut bottom) = (width, 0, usize::MAX, 0);
-        for (y, row) in indices.chunks_exact(width).enumerate() {
-            if let Some(first) = row.iter().position(|&index| index != clear) {
-                let last = row.iter().rposition(|&index| index != clear).unwrap_or(first);
-                left = left.min(first);
-                right = right.max(last + 1);
-                top = top.min(y);
-                bottom = y + 1;
-            }
-        }
-        if top == usize::MAX {
-            return Self::nothing(delay_cs);
-        }
-        let cut = (top..bottom).flat_map(|y| &indices[y * width + left..y * width + right]).copied();
-        let mut kept = Vec::with_capacity((right - left) * (bottom - top));
-        kept.extend(cut);
-        Self {
-            left: left as u16,
-            top: top as u16,
-            width: (right - left) as u16,
-            height: (bottom - top) as u16,
-            indices: kept,
-            palette,
-            transparent,
-            delay_cs,
-        }
+        let palette = colours.iter().chain(&filler).flatten().copied().collect::<Vec<_>>();
+        let data = lzw::join(bits(palette.len() / 3), parts);
+        Self { area, palette, transparent, delay_cs, data }
     }
+}
+
+/// Bits of an index into so many colours, as LZW has it.
+pub(crate) fn bits(colours: usize) -> u8 {
+    (2..8).find(|&bits| colours <= 1 << bits).unwrap_or(8)
 }
 
 #[cfg(test)]
@@ -82,17 +79,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cut_keeps_what_is_drawn() {
-        let mut indices = vec![7; 5 * 4];
-        indices[5 + 2] = 1;
-        indices[3 * 5 + 3] = 2;
-        let block = Block::cut(indices, 5, &[[0; 3]; 7], Some(7), 4);
-        assert_eq!((block.left, block.top, block.width, block.height), (2, 1, 2, 3));
-        assert_eq!(block.indices, [1, 7, 7, 7, 7, 2]);
+    fn area_around_what_is_drawn() {
+        let mut items = vec![7; 5 * 4];
+        items[5 + 2] = 1;
+        items[3 * 5 + 3] = 2;
+        let expected = Area { left: 2, top: 1, right: 4, bottom: 4 };
+        assert_eq!(Area::around(&items, 5, |&item| item != 7), Some(expected));
+        assert_eq!(Area::around(&items, 5, |&item| item == 9), None);
+        assert_eq!(Area::whole(5, 20), Area { left: 0, top: 0, right: 5, bottom: 4 });
     }
 
     #[test]
-    fn nothing_drawn_is_one_clear_pixel() {
-        assert_eq!(Block::cut(vec![3; 6], 2, &[[0; 3]; 3], Some(3), 9), Block::nothing(9));
+    fn nothing_is_one_clear_pixel() {
+        let block = Block::nothing(9);
+        let mut decoder = weezl::decode::Decoder::new(weezl::BitOrder::Lsb, block.data[0]);
+        assert_eq!(decoder.decode(&block.data[1..]).unwrap(), [0]);
+        assert_eq!((block.transparent, block.palette.len(), block.delay_cs), (Some(0), 3, 9));
     }
 }

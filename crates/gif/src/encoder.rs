@@ -6,7 +6,6 @@ use gif::{DisposalMethod, Repeat};
 use image::RgbImage;
 
 use crate::block::Block;
-use crate::lzw;
 use crate::quantise::Quantiser;
 use crate::timeline::Timeline;
 
@@ -105,8 +104,6 @@ struct Running<W: Write> {
     size: (u32, u32),
     file: gif::Encoder<Counting<W>>,
     quantiser: Quantiser,
-    /// The last frame, quantised but not yet compressed: that runs beside the quantising of the next.
-    pending: Block,
 }
 
 impl<W: Write> Encoder<W> {
@@ -141,27 +138,19 @@ impl<W: Write> Encoder<W> {
         self.pushed = number;
         let Some(delay_cs) = delay else { return Ok(()) };
 
-        self.stage = match std::mem::replace(&mut self.stage, Stage::Failed) {
+        let mut running = match std::mem::replace(&mut self.stage, Stage::Failed) {
             Stage::Empty(writer) => {
                 let file = begin(writer, found, self.settings.loops)
                     .map_err(|source| Error::Write { frame: number, source })?;
-                let mut quantiser = Quantiser::new();
-                let pending = quantiser.quantise(frame, delay_cs);
-                Stage::Running(Box::new(Running { size: found, file, quantiser, pending }))
+                Box::new(Running { size: found, file, quantiser: Quantiser::new() })
             }
-            Stage::Running(mut running) => {
-                let quantiser = &mut running.quantiser;
-                let pending = running.pending;
-                let (compressed, next) =
-                    rayon::join(|| compress(pending), || quantiser.quantise(frame, delay_cs));
-                running.pending = next;
-                write(&mut running.file, &compressed)
-                    .map_err(|source| Error::Write { frame: self.written + 1, source })?;
-                self.written += 1;
-                Stage::Running(running)
-            }
+            Stage::Running(running) => running,
             Stage::Failed => return Err(self.failed_before()),
         };
+        let block = running.quantiser.quantise(frame, delay_cs);
+        write(&mut running.file, block).map_err(|source| Error::Write { frame: self.written + 1, source })?;
+        self.stage = Stage::Running(running);
+        self.written += 1;
         self.duration_cs += u64::from(delay_cs);
         Ok(())
     }
@@ -172,22 +161,19 @@ impl<W: Write> Encoder<W> {
     ///
     /// [`Error::NoFrames`], [`Error::Write`].
     pub fn finish(mut self) -> Result<Summary, Error> {
-        let Running { size, mut file, pending, .. } = match std::mem::replace(&mut self.stage, Stage::Failed)
-        {
+        let Running { size, file, .. } = match std::mem::replace(&mut self.stage, Stage::Failed) {
             Stage::Empty(_) => return Err(Error::NoFrames),
             Stage::Running(running) => *running,
             Stage::Failed => return Err(self.failed_before()),
         };
-        let frame = self.written + 1;
         let end = || {
-            write(&mut file, &compress(pending))?;
             let mut counting = file.into_inner().map_err(into_io)?;
             counting.inner.flush()?;
             Ok(counting.bytes)
         };
-        let bytes = end().map_err(|source| Error::Write { frame, source })?;
-        let Self { pushed, duration_cs, .. } = self;
-        Ok(Summary { frames: frame, dropped: pushed - frame, size, duration_cs, bytes })
+        let Self { pushed, written, duration_cs, .. } = self;
+        let bytes = end().map_err(|source| Error::Write { frame: written, source })?;
+        Ok(Summary { frames: written, dropped: pushed - written, size, duration_cs, bytes })
     }
 
     fn failed_before(&self) -> Error {
@@ -202,25 +188,21 @@ fn begin<W: Write>(writer: W, size: (u32, u32), loops: u16) -> io::Result<gif::E
     Ok(file)
 }
 
-fn compress(block: Block) -> gif::Frame<'static> {
-    let colours = block.palette.len() / 3;
-    let bits = (2..8).find(|&bits| colours <= 1 << bits).unwrap_or(8);
-    gif::Frame {
-        delay: block.delay_cs,
+fn write<W: Write>(file: &mut gif::Encoder<Counting<W>>, block: Block) -> io::Result<()> {
+    let Block { area, palette, transparent, delay_cs, data } = block;
+    let frame = gif::Frame {
+        delay: delay_cs,
         dispose: DisposalMethod::Keep,
-        transparent: block.transparent,
-        left: block.left,
-        top: block.top,
-        width: block.width,
-        height: block.height,
-        palette: Some(block.palette),
-        buffer: lzw::compress(&block.indices, bits).into(),
+        transparent,
+        left: area.left as u16,
+        top: area.top as u16,
+        width: (area.right - area.left) as u16,
+        height: (area.bottom - area.top) as u16,
+        palette: Some(palette),
+        buffer: data.into(),
         ..gif::Frame::default()
-    }
-}
-
-fn write<W: Write>(file: &mut gif::Encoder<Counting<W>>, frame: &gif::Frame<'_>) -> io::Result<()> {
-    file.write_lzw_pre_encoded_frame(frame).map_err(into_io)
+    };
+    file.write_lzw_pre_encoded_frame(&frame).map_err(into_io)
 }
 
 fn into_io(error: gif::EncodingError) -> io::Error {

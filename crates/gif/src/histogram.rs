@@ -4,8 +4,7 @@
 //! are more than [`MOST_BINS`]: a frame with so many has them far apart in its palette, too.
 
 /// The most bins that a histogram grows to.
-pub(crate) const MOST_BINS: usize = 1 << 15;
-const SLOTS: usize = MOST_BINS * 4;
+pub(crate) const MOST_BINS: usize = 1 << 14;
 const EMPTY: u32 = u32::MAX;
 
 /// Counts of colours.
@@ -13,6 +12,7 @@ const EMPTY: u32 = u32::MAX;
 pub(crate) struct Histogram {
     shift: u32,
     slots: Vec<Slot>,
+    most_bins: usize,
     bins: Vec<Bin>,
 }
 
@@ -35,13 +35,20 @@ pub(crate) struct Bin {
 impl Bin {
     /// Mean levels.
     pub(crate) fn mean(&self) -> [f32; 3] {
-        self.sum.map(|sum| (sum as f64 / f64::from(self.count)) as f32)
+        let mean = |k: usize| (self.sum[k] as f64 / f64::from(self.count)) as f32;
+        [mean(0), mean(1), mean(2)]
     }
 }
 
 impl Histogram {
-    pub(crate) fn new() -> Self {
-        Self { shift: 0, slots: vec![Slot { key: EMPTY, bin: 0 }; SLOTS], bins: Vec::new() }
+    /// For at most 2^16 bins, a power of two.
+    pub(crate) fn new(most_bins: usize) -> Self {
+        Self {
+            shift: 0,
+            slots: vec![Slot { key: EMPTY, bin: 0 }; most_bins * 2],
+            most_bins,
+            bins: Vec::new(),
+        }
     }
 
     pub(crate) fn clear(&mut self) {
@@ -82,8 +89,11 @@ impl Histogram {
 
     /// Counts pixels of one colour.
     pub(crate) fn add(&mut self, rgb: [u8; 3], count: u32) {
-        let levels = rgb.map(|level| u64::from(level) * u64::from(count));
-        self.merge(Bin { key: self.key(rgb), count, sum: levels });
+        if count == 0 {
+            return;
+        }
+        let sum = |k: usize| u64::from(rgb[k]) * u64::from(count);
+        self.merge(Bin { key: self.key(rgb), count, sum: [sum(0), sum(1), sum(2)] });
     }
 
     /// The bin that holds a colour that was counted.
@@ -94,15 +104,17 @@ impl Histogram {
     }
 
     fn key(&self, rgb: [u8; 3]) -> u32 {
-        let [r, g, b] = rgb.map(|level| u32::from(level >> self.shift << self.shift));
-        r << 16 | g << 8 | b
+        let key = u32::from(rgb[0]) << 16 | u32::from(rgb[1]) << 8 | u32::from(rgb[2]);
+        let low = 0xFF >> (8 - self.shift);
+        key & !(low << 16 | low << 8 | low)
     }
 
     /// Where a key is, or would be put.
     fn slot(&self, key: u32) -> usize {
-        let mut at = (key.wrapping_mul(0x9E37_79B1) >> 15) as usize % SLOTS;
+        let last = self.slots.len() - 1;
+        let mut at = (key.wrapping_mul(0x9E37_79B1) >> 15) as usize & last;
         while self.slots[at].key != key && self.slots[at].key != EMPTY {
-            at = (at + 1) % SLOTS;
+            at = (at + 1) & last;
         }
         at
     }
@@ -119,7 +131,7 @@ impl Histogram {
         }
         self.slots[at] = Slot { key: bin.key, bin: self.bins.len() as u32 };
         self.bins.push(bin);
-        if self.bins.len() > MOST_BINS {
+        if self.bins.len() > self.most_bins {
             self.coarsen();
         }
     }
@@ -140,7 +152,7 @@ mod tests {
 
     #[test]
     fn few_colours_are_exact() {
-        let mut histogram = Histogram::new();
+        let mut histogram = Histogram::new(MOST_BINS);
         for k in 0..100_u8 {
             histogram.add([k, 0, 255 - k], 1 + u32::from(k));
         }
@@ -153,7 +165,7 @@ mod tests {
 
     #[test]
     fn many_colours_share_bins_and_none_is_lost() {
-        let mut histogram = Histogram::new();
+        let mut histogram = Histogram::new(MOST_BINS);
         for k in 0..200_000_u32 {
             let [a, b, c, _] = k.wrapping_mul(2_654_435_761).to_le_bytes();
             histogram.add([a, b, c], 1);

@@ -1,126 +1,167 @@
 //! LZW as the format has it: codes of growing width, at most 4,096 of them.
 //!
-//! The book of strings is begun anew as soon as it is full: frames change too much from top to bottom for an old book
-//! to be worth keeping (measured: files grow by 0 to 2 % when it is kept while it fits as well as it did).
+//! Image data is written in parts side by side, each with a book of strings of its own, and joined bit by bit. A book is
+//! begun anew as soon as it is full: frames change too much from top to bottom for an old book to be worth keeping
+//! (measured: files grow by 0 to 2 % when it is kept while it fits as well as it did).
 
 /// The most codes that the format allows.
 const MOST_CODES: u16 = 4096;
 /// Slots of the hash table: at most half of them are in use.
 const SLOTS: usize = 8192;
-const NONE: u32 = u32::MAX;
+/// Cannot be a string: the last code gets no longer ones.
+const EMPTY: u32 = u32::MAX;
 
 /// What has been seen since the last clear code: strings of indices, each one longer than its parent by one index.
 #[derive(Debug)]
-pub(crate) struct Book {
-    /// Parent and index of each string, and its code, where the hash of parent and index puts it.
-    slots: Vec<(u32, u16)>,
-    first_free: u16,
+struct Book {
+    /// Parent, index and code of each string in 12, 8 and 12 bits, where the hash of the first two puts it.
+    slots: Box<[u32; SLOTS]>,
     next: u16,
 }
 
 impl Book {
-    /// For indices below 2^`bits`.
-    pub(crate) fn new(bits: u8) -> Self {
-        let first_free = (1 << bits) + 2;
-        Self { slots: vec![(NONE, 0); SLOTS], first_free, next: first_free }
-    }
-
-    pub(crate) fn clear(&mut self) {
-        self.slots.fill((NONE, 0));
-        self.next = self.first_free;
-    }
-
-    pub(crate) fn is_full(&self) -> bool {
-        self.next == MOST_CODES
-    }
-
-    /// The code of the string `parent` with `index` after it.
-    pub(crate) fn get(&self, parent: u16, index: u8) -> Option<u16> {
-        let (key, at) = self.locate(parent, index);
-        (self.slots[at].0 == key).then(|| self.slots[at].1)
-    }
-
-    /// Gives it a code, if there is one left.
-    pub(crate) fn insert(&mut self, parent: u16, index: u8) {
-        if !self.is_full() {
-            let (key, at) = self.locate(parent, index);
-            self.slots[at] = (key, self.next);
-            self.next += 1;
-        }
-    }
-
-    fn locate(&self, parent: u16, index: u8) -> (u32, usize) {
+    /// The code of the string `parent` with `index` after it, or the slot to put it in.
+    fn find(&self, parent: u16, index: u8) -> Result<u16, usize> {
         let key = u32::from(parent) << 8 | u32::from(index);
-        let mut at = (key.wrapping_mul(0x9E37_79B1) >> 19) as usize;
-        while self.slots[at].0 != key && self.slots[at].0 != NONE {
+        let mut at = (key.wrapping_mul(0x9E37_79B1) >> 19) as usize % SLOTS;
+        loop {
+            let slot = self.slots[at];
+            if slot >> 12 == key && slot != EMPTY {
+                return Ok((slot & 0xFFF) as u16);
+            }
+            if slot == EMPTY {
+                return Err(at);
+            }
             at = (at + 1) % SLOTS;
         }
-        (key, at)
     }
 }
 
-/// The format's image data for indices below 2^`bits`, without its blocks: first `bits` itself, then the codes.
-pub(crate) fn compress(indices: &[u8], bits: u8) -> Vec<u8> {
-    let mut out = Codes { bytes: vec![bits], pending: 0, held: 0 };
-    let (clear, end) = (1_u16 << bits, (1_u16 << bits) + 1);
-    let mut book = Book::new(bits);
-    let mut width = u32::from(bits) + 1;
-    out.put(clear, width);
-    let mut string = None;
-    for &index in indices {
-        let Some(parent) = string else {
-            string = Some(u16::from(index));
-            continue;
-        };
-        if let Some(longer) = book.get(parent, index) {
-            string = Some(longer);
-            continue;
-        }
-        out.put(parent, width);
-        // The decoder knows this code one step later, so the width grows when the code itself does not fit.
-        if u32::from(book.next) == 1 << width {
-            width += 1;
-        }
-        book.insert(parent, index);
-        if book.is_full() {
-            out.put(clear, width);
-            book.clear();
-            width = u32::from(bits) + 1;
-        }
-        string = Some(u16::from(index));
-    }
-    if let Some(last) = string {
-        out.put(last, width);
-        if u32::from(book.next) == 1 << width {
-            width += 1;
-        }
-    }
-    out.put(end, width);
-    out.finish()
-}
-
+/// Writes a part of an image's data, index by index.
 #[derive(Debug)]
+pub(crate) struct Writer {
+    bits: u8,
+    book: Book,
+    /// Code of the string of indices that is not yet written.
+    string: Option<u16>,
+    width: u32,
+    codes: Codes,
+}
+
+impl Writer {
+    /// For indices below 2^`bits`, of 2 to 8 bits.
+    pub(crate) fn new(bits: u8) -> Self {
+        let book = Book { slots: Box::new([EMPTY; SLOTS]), next: (1 << bits) + 2 };
+        Self { bits, book, string: None, width: u32::from(bits) + 1, codes: Codes::default() }
+    }
+
+    /// Whether the string goes on with this index: it costs nothing yet.
+    pub(crate) fn continues(&self, index: u8) -> bool {
+        self.string.is_none_or(|string| self.book.find(string, index).is_ok())
+    }
+
+    /// Writes the index if the string goes on with it.
+    pub(crate) fn extend(&mut self, index: u8) -> bool {
+        let longer = match self.string {
+            Some(string) => self.book.find(string, index).ok(),
+            None => Some(u16::from(index)),
+        };
+        if longer.is_some() {
+            self.string = longer;
+        }
+        longer.is_some()
+    }
+
+    /// Writes an index.
+    pub(crate) fn put(&mut self, index: u8) {
+        let found = match self.string {
+            Some(string) => self.book.find(string, index).map_err(|at| (string, at)),
+            None => Ok(u16::from(index)),
+        };
+        self.string = match found {
+            Ok(longer) => Some(longer),
+            Err((string, at)) => {
+                self.end_string(string);
+                self.book.slots[at] =
+                    u32::from(string) << 20 | u32::from(index) << 12 | u32::from(self.book.next);
+                self.book.next += 1;
+                if self.book.next == MOST_CODES {
+                    self.codes.put(1 << self.bits, self.width);
+                    self.book.slots.fill(EMPTY);
+                    self.book.next = (1 << self.bits) + 2;
+                    self.width = u32::from(self.bits) + 1;
+                }
+                Some(u16::from(index))
+            }
+        };
+    }
+
+    fn end_string(&mut self, string: u16) {
+        self.codes.put(string, self.width);
+        // The decoder knows its next code one step later, so the width grows when the code itself does not fit.
+        if u32::from(self.book.next) == 1 << self.width {
+            self.width += 1;
+        }
+    }
+
+    /// The part, to be [joined](join).
+    pub(crate) fn finish(mut self, last: bool) -> Part {
+        if let Some(string) = self.string {
+            self.end_string(string);
+        }
+        self.codes.put((1 << self.bits) + u16::from(last), self.width);
+        Part(self.codes)
+    }
+}
+
+/// A part of an image's data.
+#[derive(Debug)]
+pub(crate) struct Part(Codes);
+
+/// The format's image data without its blocks: first `bits`, then the codes of all parts.
+pub(crate) fn join(bits: u8, parts: &[Part]) -> Vec<u8> {
+    let bytes = parts.iter().map(|part| part.0.bytes.len() + 9).sum::<usize>();
+    let mut all = Codes { bytes: Vec::with_capacity(bytes + 2), ..Codes::default() };
+    all.put(u16::from(bits), 8);
+    all.put(1 << bits, u32::from(bits) + 1);
+    for Part(part) in parts {
+        let (pairs, rest) = part.bytes.as_chunks::<2>();
+        for pair in pairs {
+            all.put(u16::from_le_bytes(*pair), 16);
+        }
+        for &byte in rest {
+            all.put(u16::from(byte), 8);
+        }
+        all.put(part.pending as u16 & 0xFF, part.held.min(8));
+        all.put((part.pending >> 8) as u16 & 0xFF, part.held.saturating_sub(8).min(8));
+        all.put((part.pending >> 16) as u16, part.held.saturating_sub(16));
+    }
+    all.finish()
+}
+
+/// Numbers one after the other, bit by bit, the lowest first.
+#[derive(Debug, Default)]
 struct Codes {
     bytes: Vec<u8>,
-    pending: u32,
+    /// The last bits, fewer than 32.
+    pending: u64,
     held: u32,
 }
 
 impl Codes {
     fn put(&mut self, code: u16, width: u32) {
-        self.pending |= u32::from(code) << self.held;
+        self.pending |= u64::from(code) << self.held;
         self.held += width;
-        while self.held >= 8 {
-            self.bytes.push(self.pending as u8);
-            self.pending >>= 8;
-            self.held -= 8;
+        if self.held >= 32 {
+            self.bytes.extend_from_slice(&(self.pending as u32).to_le_bytes());
+            self.pending >>= 32;
+            self.held -= 32;
         }
     }
 
     fn finish(mut self) -> Vec<u8> {
-        if self.held > 0 {
-            self.bytes.push(self.pending as u8);
-        }
+        let rest = self.held.div_ceil(8) as usize;
+        self.bytes.extend_from_slice(&self.pending.to_le_bytes()[..rest]);
         self.bytes
     }
 }
@@ -128,6 +169,16 @@ impl Codes {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn compress(indices: &[u8], bits: u8, parts: usize) -> Vec<u8> {
+        let size = indices.len().div_ceil(parts);
+        let written = indices.chunks(size).enumerate().map(|(number, part)| {
+            let mut writer = Writer::new(bits);
+            part.iter().for_each(|&index| writer.put(index));
+            writer.finish((number + 1) * size >= indices.len())
+        });
+        join(bits, &written.collect::<Vec<_>>())
+    }
 
     fn decode(bytes: &[u8], pixels: usize) -> Vec<u8> {
         let mut decoder = weezl::decode::Decoder::new(weezl::BitOrder::Lsb, bytes[0]);
@@ -141,15 +192,28 @@ mod tests {
         for bits in 2..=8_u8 {
             for pixels in [1, 2, 3, 255, 4_000, 100_000] {
                 for spread in [1, 2, 7, 256_u32] {
-                    let index = |k: u32| (k.wrapping_mul(2_654_435_761) >> 16) % spread.min(1 << bits);
-                    let indices = (0..pixels as u32).map(|k| index(k) as u8).collect::<Vec<_>>();
-                    assert_eq!(
-                        decode(&compress(&indices, bits), pixels),
-                        indices,
-                        "{bits} {pixels} {spread}"
-                    );
+                    for parts in [1, 2, 3] {
+                        let index = |k: u32| (k.wrapping_mul(2_654_435_761) >> 16) % spread.min(1 << bits);
+                        let indices = (0..pixels as u32).map(|k| index(k) as u8).collect::<Vec<_>>();
+                        assert_eq!(
+                            decode(&compress(&indices, bits, parts), pixels),
+                            indices,
+                            "{bits} {pixels} {spread} {parts}"
+                        );
+                    }
                 }
             }
         }
+    }
+
+    #[test]
+    fn what_continues_is_not_written() {
+        let mut writer = Writer::new(8);
+        [1, 2, 1, 2, 3, 1].iter().for_each(|&index| writer.put(index));
+        assert!(writer.continues(2) && !writer.continues(3));
+        assert!(writer.extend(2) && writer.extend(3) && !writer.extend(9));
+        writer.put(9);
+        let bytes = join(8, &[writer.finish(true)]);
+        assert_eq!(decode(&bytes, 9), [1, 2, 1, 2, 3, 1, 2, 3, 9]);
     }
 }

@@ -11,6 +11,8 @@ use crate::histogram::{Bin, Histogram};
 
 /// Rounds of k-means at most.
 const ROUNDS: usize = 5;
+/// The most colours that are looked at one by one.
+const SAMPLES: usize = 1 << 12;
 /// How many of a colour's nearest others are kept at hand.
 pub(crate) const NEIGHBOURS: usize = 16;
 
@@ -60,7 +62,12 @@ impl Palette {
             colours.sort_unstable();
             return Self::new(colours);
         }
-        Self::of(&samples, size)
+        if samples.len() <= SAMPLES {
+            return Self::of(&samples, size);
+        }
+        let mut coarse = Histogram::new(SAMPLES);
+        coarse.absorb(histogram);
+        Self::of(&coarse.bins().iter().map(Sample::from).collect::<Vec<_>>(), size)
     }
 
     /// At most `size` colours that fit the samples well, of which there is at least one.
@@ -101,25 +108,21 @@ impl Palette {
 }
 
 fn neighbours(points: &[Point]) -> Vec<Vec<Neighbour>> {
-    let by_distance = |a: &Neighbour, b: &Neighbour| a.apart.total_cmp(&b.apart).then(a.index.cmp(&b.index));
-    points
-        .iter()
-        .enumerate()
-        .map(|(own, point)| {
-            let mut all = points
-                .iter()
-                .enumerate()
-                .filter(|&(index, _)| index != own)
-                .map(|(index, other)| Neighbour { index: index as u8, apart: colour::error(point, other) })
-                .collect::<Vec<_>>();
-            if all.len() > NEIGHBOURS {
-                all.select_nth_unstable_by(NEIGHBOURS - 1, by_distance);
-                all.truncate(NEIGHBOURS);
+    let of = |own: usize| {
+        let mut near: Vec<Neighbour> = Vec::with_capacity(NEIGHBOURS + 1);
+        for (index, other) in points.iter().enumerate() {
+            let apart = colour::error(&points[own], other);
+            let full = near.len() == NEIGHBOURS;
+            if index == own || full && near.last().is_some_and(|last| apart >= last.apart) {
+                continue;
             }
-            all.sort_unstable_by(by_distance);
-            all
-        })
-        .collect()
+            let at = near.iter().rposition(|n| n.apart <= apart).map_or(0, |before| before + 1);
+            near.insert(at, Neighbour { index: index as u8, apart });
+            near.truncate(NEIGHBOURS);
+        }
+        near
+    };
+    (0..points.len()).map(of).collect()
 }
 
 fn nearest(points: &[Point], neighbours: &[Vec<Neighbour>], point: &Point, guess: u8) -> u8 {
@@ -176,7 +179,7 @@ fn centres(samples: &[Sample], owners: &mut [u8]) -> Vec<[f32; 3]> {
 }
 
 struct Cluster {
-    /// Weighted squared error against the mean.
+    /// Weighted difference from the mean, about.
     error: f64,
     /// The coordinate with the largest part in it, and its mean.
     widest: usize,
@@ -200,7 +203,9 @@ impl Cluster {
         }
         let spread = |k: usize| squares[k] - sums[k] * sums[k] / weight;
         let widest = (1..DIMENSIONS).fold(0, |best, k| if spread(k) > spread(best) { k } else { best });
-        let error = if members.len() > 1 { (0..DIMENSIONS).map(spread).sum() } else { 0.0 };
+        let squares = if members.len() > 1 { (0..DIMENSIONS).map(spread).sum::<f64>() } else { 0.0 };
+        // The mean of differences, not of their squares: the eye is not helped by a few colours that are right.
+        let error = (squares.max(0.0) * weight).sqrt();
         Self { error, widest, mean: (sums[widest] / weight) as f32, members }
     }
 }

@@ -1,23 +1,30 @@
-//! A frame's indices, chosen as LZW will read them.
+//! Indices of rows of pixels, chosen as LZW reads them.
 //!
 //! LZW writes a string of indices that it has met before as one code. So where the best index would end such a string
 //! and another one, nearly as good, would not, the other is taken. Frames are worked on in stripes of rows side by side,
-//! each with a book of its own.
+//! each a part of the image's data of its own.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
 
 use crate::allowance::Redrawn;
-use crate::colour;
+use crate::block::{self, Area, Block};
+use crate::colour::{self, Near};
 use crate::histogram::Histogram;
-use crate::ink::Ink;
-use crate::lzw::Book;
+use crate::ink::{Dye, Ink};
+use crate::lzw::{Part, Writer};
 use crate::palette::Palette;
 
-/// How much more squared error (see [`colour`]) an index may have that makes the file smaller. The error of a good
-/// palette is about as large.
-const LENIENCE: f32 = 4.0;
-/// A still pixel is drawn anew when that leaves at most this part of its squared error.
-const WORTHWHILE: f32 = 0.5;
+/// How much more squared error (see [`colour`](crate::colour)) an index may have that makes the file smaller.
+const LENIENCE: f32 = 6.0;
+/// The level error against the pixels to the left and above, together, up to which the surroundings are smooth, so that
+/// a pattern is seen as its mean.
+const SMOOTH: u32 = 24;
 /// How many of a colour's nearest others are tried.
 const TRIED: usize = 8;
+/// Pixels of a stripe, about. Fewer cost size: each stripe begins with an empty book.
+const STRIPE: usize = 150_000;
 
 /// What a pixel asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,28 +49,54 @@ pub(crate) struct Inks<'a> {
     pub(crate) clear: Option<u8>,
 }
 
+/// Runs `draw` on stripes of whole rows of `area`, side by side: with a writer, the first row and what is seen from it
+/// on. Gives the block and the results.
+pub(crate) fn in_stripes<R: Send>(
+    area: Area,
+    width: usize,
+    seen: &mut [[u8; 3]],
+    colours: &[[u8; 3]],
+    clear: Option<u8>,
+    delay_cs: u16,
+    draw: impl Fn(&mut Writer, usize, &mut [[u8; 3]]) -> R + Sync,
+) -> (Block, Vec<R>) {
+    let bits = block::bits(colours.len() + usize::from(clear.is_some()));
+    let height = area.bottom - area.top;
+    let count = ((area.right - area.left) * height).div_ceil(STRIPE);
+    let rows = height.div_ceil(count);
+    let stripes = seen[area.top * width..area.bottom * width].par_chunks_mut(rows * width).enumerate();
+    let drawn = stripes.map(|(number, seen)| {
+        let mut writer = Writer::new(bits);
+        let result = draw(&mut writer, area.top + number * rows, seen);
+        (writer.finish((number + 1) * rows >= height), result)
+    });
+    let (parts, results): (Vec<Part>, Vec<R>) = drawn.unzip();
+    (Block::new(area, colours, clear, delay_cs, &parts), results)
+}
+
 /// Chooses indices row by row.
 #[derive(Debug)]
 pub(crate) struct Stripe<'a> {
     inks: Inks<'a>,
-    book: Book,
-    string: Option<u16>,
+    writer: &'a mut Writer,
     redrawn: Redrawn,
+    near: Near,
 }
 
-/// Part of a row: what is meant, what it needs, and what comes of it.
+/// Part of a row: what is meant, what it needs, and what a viewer sees.
 pub(crate) struct Row<'a> {
-    pub(crate) left: usize,
+    pub(crate) columns: Range<usize>,
     pub(crate) y: usize,
     pub(crate) pixels: &'a [[u8; 3]],
+    /// What is meant in the row above.
+    pub(crate) above: &'a [[u8; 3]],
     pub(crate) needs: &'a [Need],
-    pub(crate) indices: &'a mut [u8],
     pub(crate) seen: &'a mut [[u8; 3]],
 }
 
 impl<'a> Stripe<'a> {
-    pub(crate) fn new(inks: Inks<'a>) -> Self {
-        Self { inks, book: Book::new(8), string: None, redrawn: Redrawn::default() }
+    pub(crate) fn new(inks: Inks<'a>, writer: &'a mut Writer) -> Self {
+        Self { inks, writer, redrawn: Redrawn::default(), near: Near::new() }
     }
 
     /// What all rows together drew anew.
@@ -72,87 +105,102 @@ impl<'a> Stripe<'a> {
     }
 
     pub(crate) fn draw(&mut self, row: Row<'_>) {
+        let clear = self.inks.clear;
         let mut previous = None;
-        for (x, (&now, &need)) in row.pixels.iter().zip(row.needs).enumerate() {
+        let mut last = ([0; 3], None);
+        for (k, x) in row.columns.enumerate() {
+            let (now, need) = (row.pixels[k], row.needs[k]);
+            let seen = row.seen[k];
             let index = match need {
-                Need::Nothing => self.inks.clear.unwrap_or(0),
-                Need::Free => self.free(now, row.seen[x], previous),
-                Need::Better | Need::Draw => self.drawn(now, need, row.seen[x], row.left + x, row.y),
+                Need::Nothing => {
+                    let clear = clear.unwrap_or(0);
+                    self.writer.put(clear);
+                    clear
+                }
+                Need::Free => self.free(now, seen, previous),
+                Need::Better | Need::Draw => {
+                    if last.0 != now || last.1.is_none() {
+                        let bin = self.inks.histogram.find(now).unwrap_or(0);
+                        last = (now, Some(&self.inks.of_bins[bin]));
+                    }
+                    let Some(ink) = last.1 else { continue };
+                    let smooth = colour::level_error(now, row.pixels[k.saturating_sub(1)])
+                        + colour::level_error(now, row.above[k])
+                        <= SMOOTH;
+                    let best = if smooth { ink.at(x, row.y) } else { ink.plain };
+                    self.drawn(now, need, seen, ink, best)
+                }
             };
-            self.follow(index);
             previous = Some(index);
-            row.indices[x] = index;
-            if Some(index) != self.inks.clear {
+            if Some(index) != clear {
                 let colour = self.inks.palette.colours[usize::from(index)];
                 if need == Need::Better {
-                    self.redrawn.count(row.seen[x], colour);
+                    self.redrawn.count(self.near.error(seen, colour));
                 }
-                row.seen[x] = colour;
+                row.seen[k] = colour;
             }
         }
     }
 
     /// The index before, if that is at least as good as nothing and nothing would end the string.
-    fn free(&self, now: [u8; 3], seen: [u8; 3], previous: Option<u8>) -> u8 {
+    fn free(&mut self, now: [u8; 3], seen: [u8; 3], previous: Option<u8>) -> u8 {
         let clear = self.inks.clear.unwrap_or(0);
-        match previous.filter(|&index| index != clear) {
+        if self.writer.extend(clear) {
+            return clear;
+        }
+        let index = match previous.filter(|&index| index != clear) {
             Some(index)
-                if self.continues(index)
-                    && !self.continues(clear)
-                    && self.error(now, index) <= colour::near_error(now, seen) =>
+                if self.writer.continues(index) && self.error(now, index) <= self.near.error(now, seen) =>
             {
                 index
             }
             _ => clear,
-        }
+        };
+        self.writer.put(index);
+        index
     }
 
-    fn drawn(&self, now: [u8; 3], need: Need, seen: [u8; 3], x: usize, y: usize) -> u8 {
-        let ink = &self.inks.of_bins[self.inks.histogram.find(now).unwrap_or(0)];
-        let best = ink.at(x, y);
-        let least = self.error(now, best);
+    fn drawn(&mut self, now: [u8; 3], need: Need, seen: [u8; 3], ink: &Ink, best: Dye) -> u8 {
+        let Dye { index: best, error: least } = best;
         if let Some(clear) = self.inks.clear {
-            let part = if need == Need::Better { WORTHWHILE } else { 1.0 };
-            if least >= colour::near_error(now, seen) * part {
+            let shown = self.near.error(now, seen);
+            let lenience = if need == Need::Better { least } else { LENIENCE };
+            if least >= shown || shown <= least + lenience && self.writer.extend(clear) {
+                if least >= shown {
+                    self.writer.put(clear);
+                }
                 return clear;
             }
         }
-        if self.continues(best) {
+        if self.writer.extend(best) {
             return best;
         }
-        let near = self.inks.palette.neighbours(ink.plain).iter().take(TRIED).map(|n| n.index);
         let mut found = (best, least + LENIENCE);
-        for other in std::iter::once(ink.plain).chain(near) {
-            if self.continues(other) {
-                let error = self.error(now, other);
-                if error < found.1 {
-                    found = (other, error);
-                }
-            }
+        let reach = ink.reach(found.1);
+        if best != ink.plain.index {
+            self.consider(now, ink.plain.index, &mut found);
         }
+        for neighbour in self.inks.palette.neighbours(ink.plain.index).iter().take(TRIED) {
+            if neighbour.apart > reach {
+                break;
+            }
+            self.consider(now, neighbour.index, &mut found);
+        }
+        self.writer.put(found.0);
         found.0
     }
 
-    fn error(&self, now: [u8; 3], index: u8) -> f32 {
-        colour::near_error(now, self.inks.palette.colours[usize::from(index)])
-    }
-
-    /// Whether LZW knows the string it is in with this index after it.
-    fn continues(&self, index: u8) -> bool {
-        self.string.is_none_or(|string| self.book.get(string, index).is_some())
-    }
-
-    fn follow(&mut self, index: u8) {
-        let longer = self.string.and_then(|string| {
-            let longer = self.book.get(string, index);
-            if longer.is_none() {
-                self.book.insert(string, index);
-                if self.book.is_full() {
-                    self.book.clear();
-                }
+    /// Prefers an index that the string goes on with if its error is less.
+    fn consider(&self, now: [u8; 3], index: u8, found: &mut (u8, f32)) {
+        if self.writer.continues(index) {
+            let error = self.error(now, index);
+            if error < found.1 {
+                *found = (index, error);
             }
-            longer
-        });
-        self.string = Some(longer.unwrap_or_else(|| u16::from(index)));
+        }
+    }
+
+    fn error(&self, now: [u8; 3], index: u8) -> f32 {
+        self.near.error(now, self.inks.palette.colours[usize::from(index)])
     }
 }
