@@ -3,20 +3,56 @@
 use crate::block::{Area, Block};
 use crate::stripe;
 
-/// The colours of a frame in order, if there are at most 256.
-pub(crate) fn few_colours(pixels: &[[u8; 3]]) -> Option<Vec<[u8; 3]>> {
-    let mut colours = Vec::with_capacity(256);
+/// Colours, at most 256, and their numbers in order of appearance.
+#[derive(Debug)]
+pub(crate) struct FewColours {
+    pub(crate) colours: Vec<[u8; 3]>,
+    /// Number + 1 of a colour where its hash puts it, 0 where there is none.
+    slots: [u16; SLOTS],
+}
+
+const SLOTS: usize = 1024;
+
+impl FewColours {
+    fn new() -> Self {
+        Self { colours: Vec::with_capacity(256), slots: [0; SLOTS] }
+    }
+
+    /// The number of a colour, or the slot to put it in.
+    fn find(&self, rgb: [u8; 3]) -> Result<u8, usize> {
+        let key = u32::from_le_bytes([rgb[0], rgb[1], rgb[2], 0]);
+        let mut at = (key.wrapping_mul(0x9E37_79B1) >> 22) as usize % SLOTS;
+        loop {
+            match self.slots[at] {
+                0 => return Err(at),
+                number if self.colours[usize::from(number) - 1] == rgb => return Ok((number - 1) as u8),
+                _ => at = (at + 1) % SLOTS,
+            }
+        }
+    }
+
+    /// Says whether there was room.
+    fn add(&mut self, rgb: [u8; 3]) -> bool {
+        let Err(at) = self.find(rgb) else { return true };
+        if self.colours.len() == 256 {
+            return false;
+        }
+        self.colours.push(rgb);
+        self.slots[at] = self.colours.len() as u16;
+        true
+    }
+}
+
+/// The colours of a frame, if there are at most 256.
+pub(crate) fn few_colours(pixels: &[[u8; 3]]) -> Option<FewColours> {
+    let mut colours = FewColours::new();
     let mut last = None;
     for now in pixels {
-        if last == Some(now) {
-            continue;
-        }
-        last = Some(now);
-        if let Err(at) = colours.binary_search(now) {
-            if colours.len() == 256 {
+        if last != Some(now) {
+            last = Some(now);
+            if !colours.add(*now) {
                 return None;
             }
-            colours.insert(at, *now);
         }
     }
     Some(colours)
@@ -28,22 +64,21 @@ pub(crate) fn draw(
     width: usize,
     first: bool,
     seen: &mut [[u8; 3]],
-    frame_colours: Vec<[u8; 3]>,
+    frame_colours: FewColours,
     delay_cs: u16,
 ) -> Block {
-    let mut drawn = Vec::with_capacity(256);
+    let mut drawn = FewColours::new();
     let mut wrong = vec![false; pixels.len()];
     let mut last = None;
     for ((now, seen), wrong) in pixels.iter().zip(&*seen).zip(&mut wrong) {
         *wrong = now != seen;
         if *wrong && last != Some(now) {
             last = Some(now);
-            if let Err(at) = drawn.binary_search(now) {
-                drawn.insert(at, *now);
-            }
+            // There is room: all are colours of the frame.
+            drawn.add(*now);
         }
     }
-    let (colours, clear) = match u8::try_from(drawn.len()) {
+    let (colours, clear) = match u8::try_from(drawn.colours.len()) {
         Ok(clear) if !first => (drawn, Some(clear)),
         _ => (frame_colours, None),
     };
@@ -52,18 +87,24 @@ pub(crate) fn draw(
         None => Some(Area::whole(width, pixels.len())),
     };
     let Some(area) = area else { return Block::nothing(delay_cs) };
-    let (block, _) =
-        stripe::in_stripes(area, width, seen, &colours, clear, delay_cs, |writer, first_row, seen| {
-            let mut last = ([0; 3], colours.binary_search(&[0; 3]).ok());
+    let (block, _) = stripe::in_stripes(
+        area,
+        width,
+        seen,
+        &colours.colours,
+        clear,
+        delay_cs,
+        |writer, first_row, seen| {
+            let mut last = ([0; 3], colours.find([0; 3]).ok());
             for (y, seen) in (first_row..).zip(seen.chunks_exact_mut(width)) {
                 for x in area.left..area.right {
                     let now = pixels[y * width + x];
                     if last.0 != now {
-                        last = (now, colours.binary_search(&now).ok());
+                        last = (now, colours.find(now).ok());
                     }
                     // What is seen right may be drawn or left, whichever LZW knows.
                     let right = clear.filter(|_| now == seen[x]);
-                    let index = last.1.map(|index| index as u8);
+                    let index = last.1;
                     match (right, index) {
                         (None, index) => writer.put(index.unwrap_or(0)),
                         (Some(clear), Some(index)) => {
@@ -76,6 +117,7 @@ pub(crate) fn draw(
                     seen[x] = now;
                 }
             }
-        });
+        },
+    );
     block
 }

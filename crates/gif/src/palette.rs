@@ -108,17 +108,33 @@ impl Palette {
 }
 
 fn neighbours(points: &[Point]) -> Vec<Vec<Neighbour>> {
+    // Coordinate by coordinate, and to the end: several distances are worked out at once.
+    let mut columns = [[0.0_f32; 256]; DIMENSIONS];
+    for (index, point) in points.iter().enumerate() {
+        for (column, &at) in columns.iter_mut().zip(point) {
+            column[index] = at;
+        }
+    }
     let of = |own: usize| {
+        let mut apart = [0.0_f32; 256];
+        for (column, at) in columns.iter().zip(points[own]) {
+            for (sum, other) in apart.iter_mut().zip(column) {
+                *sum += (at - other) * (at - other);
+            }
+        }
+        apart[own] = f32::INFINITY;
         let mut near: Vec<Neighbour> = Vec::with_capacity(NEIGHBOURS + 1);
-        for (index, other) in points.iter().enumerate() {
-            let apart = colour::error(&points[own], other);
-            let full = near.len() == NEIGHBOURS;
-            if index == own || full && near.last().is_some_and(|last| apart >= last.apart) {
+        let mut farthest = f32::INFINITY;
+        for (index, &apart) in apart[..points.len()].iter().enumerate() {
+            if apart >= farthest || index == own {
                 continue;
             }
             let at = near.iter().rposition(|n| n.apart <= apart).map_or(0, |before| before + 1);
             near.insert(at, Neighbour { index: index as u8, apart });
-            near.truncate(NEIGHBOURS);
+            if near.len() >= NEIGHBOURS {
+                near.truncate(NEIGHBOURS);
+                farthest = near[NEIGHBOURS - 1].apart;
+            }
         }
         near
     };
