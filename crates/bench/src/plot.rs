@@ -121,8 +121,8 @@ fn draw(path: &Path, labels: &Labels, series: &[Series]) -> Result<(), Box<dyn s
         .configure_mesh()
         .x_desc(labels.x)
         .y_desc(labels.y)
-        .x_label_formatter(&|x| format!("{x:e}"))
-        .y_label_formatter(&|y| format!("{y:e}"))
+        .x_label_formatter(&|x| label(*x))
+        .y_label_formatter(&|y| label(*y))
         .max_light_lines(0)
         .label_style(("sans-serif", 14))
         .draw()?;
@@ -148,4 +148,25 @@ fn draw(path: &Path, labels: &Labels, series: &[Series]) -> Result<(), Box<dyn s
         .draw()?;
     area.present()?;
     Ok(())
+}
+
+/// One digit and the power of ten, for 1, 2 and 5; the lines between have no room for names.
+fn label(x: f64) -> String {
+    let exponent = (x.log10() + 1e-9).floor();
+    let digit = (x / 10f64.powf(exponent)).round();
+    if [1.0, 2.0, 5.0].contains(&digit) { format!("{digit}e{exponent}") } else { String::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_are_short() {
+        assert_eq!(
+            [1e-6, 9.999_999_999_999_999e-6, 3.000_000_000_000_000_3e-4].map(label),
+            ["1e-6", "1e-5", ""]
+        );
+        assert_eq!([2e-4, 5e7, 1.0].map(label), ["2e-4", "5e7", "1e0"]);
+    }
 }

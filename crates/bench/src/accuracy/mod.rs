@@ -62,10 +62,13 @@ pub fn run(args: &Args) -> Result<()> {
 
 fn introduction(quick: bool) -> String {
     let command = if quick { " --quick" } else { "" };
+    let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let load = load.trim();
     format!(
         "# Accuracy\n\n\
-         Written by `cargo run --release -p rayfold-bench -- accuracy{command}`; all figures are of one run. The hard \
-         cases at full size are in [hard-cases.md](hard-cases.md).\n\n\
+         Written by `cargo run --release -p rayfold-bench -- accuracy{command}`; all figures are of one run, with a load \
+         of {load} (`/proc/loadavg`) when it ended. `... accuracy --hard-cases` measures the hard cases at full size and \
+         writes `hard-cases.md`.\n\n\
          Every way to trace draws the same scenes on one thread, in turn, and its processor time is taken (the machine \
          may be busy with other work; the median of the rounds is shown). `f32 naive` is the same packet machinery, tiles \
          and trees with textbook formulas: quadratic roots, edges and slabs without error bounds, rays that start 1e-4 off \
