@@ -212,6 +212,9 @@ fn goals(text: &mut String, results: &[Measured], held: &[Held]) -> anyhow::Resu
         missed.iter().for_each(|miss| text.push_str(&format!("- {miss}\n")));
     }
     text.push_str("\n![Ratios to gifski at quality 100](gif/ratios.svg)\n");
+    if held.is_empty() {
+        return Ok(());
+    }
     let memory = held.iter().map(|h| format!("{:.0} MB for {} frames", h.memory, h.frames));
     let memory = memory.collect::<Vec<_>>().join(", ");
     writeln!(
