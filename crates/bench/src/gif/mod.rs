@@ -71,6 +71,11 @@ struct Outcome {
     program: &'static str,
     cost: Cost,
     bytes: u64,
+    seen: Seen,
+}
+
+/// What a viewer sees of a GIF.
+struct Seen {
     quality: Quality,
     frames: usize,
     /// Whether every frame is there and each is shown for its time.
@@ -158,10 +163,10 @@ fn measure(
         .iter()
         .zip(costs)
         .zip(gifs.iter().zip(judged))
-        .map(|((program, cost), (gif, (quality, crop, frames, on_time)))| {
+        .map(|((program, cost), (gif, seen))| {
             let cost = cost.context("every program runs in the first round")?;
             let bytes = std::fs::metadata(gif)?.len();
-            Ok(Outcome { program: program.name, cost, bytes, quality, frames, on_time, crop })
+            Ok(Outcome { program: program.name, cost, bytes, seen })
         })
         .collect::<anyhow::Result<Vec<_>>>()?;
     let middle = &frames[frames.len() / 2];
@@ -180,11 +185,7 @@ fn measure(
 
 /// Shows all GIFs side by side. A program that leaves frames out is judged by what is on the screen at each frame's
 /// time.
-fn judge(
-    gifs: &[PathBuf],
-    frames: &[RgbImage],
-    crop: Option<(u32, u32)>,
-) -> anyhow::Result<Vec<(Quality, Option<RgbImage>, usize, bool)>> {
+fn judge(gifs: &[PathBuf], frames: &[RgbImage], crop: Option<(u32, u32)>) -> anyhow::Result<Vec<Seen>> {
     let size = frames[0].dimensions();
     let open = |gif: &PathBuf| Ok((Viewer::open(gif, size)?, Judge::default(), None));
     let mut shows = gifs.iter().map(open).collect::<anyhow::Result<Vec<_>>>()?;
@@ -202,10 +203,10 @@ fn judge(
             anyhow::Ok(())
         })?;
     }
-    let close = |(viewer, judge, cut): (Viewer, Judge, _)| {
+    let close = |(viewer, judge, crop): (Viewer, Judge, _)| {
         let on_time =
             viewer.delays.len() == frames.len() && viewer.delays.iter().all(|&delay| delay == DELAY);
-        Ok((judge.quality(), cut, viewer.close()?, on_time))
+        Ok(Seen { quality: judge.quality(), frames: viewer.close()?, on_time, crop })
     };
     shows.into_iter().map(close).collect()
 }

@@ -43,32 +43,37 @@ const GOALS: [Goal; 9] = [
     Goal {
         name: "PSNR",
         asked: "at least 0.99",
-        figure: |a, b| a.quality.psnr / b.quality.psnr,
+        figure: |a, b| a.seen.quality.psnr / b.seen.quality.psnr,
         met: |ratio, _| ratio >= 0.99,
     },
     Goal {
         name: "worst",
         asked: "at least 0.99",
-        figure: |a, b| a.quality.psnr_worst / b.quality.psnr_worst,
+        figure: |a, b| a.seen.quality.psnr_worst / b.seen.quality.psnr_worst,
         met: |ratio, _| ratio >= 0.99,
     },
-    Goal { name: "dE", asked: NO_WORSE, figure: |a, b| ratio(a.quality.de76, b.quality.de76), met: no_worse },
+    Goal {
+        name: "dE",
+        asked: NO_WORSE,
+        figure: |a, b| ratio(a.seen.quality.de76, b.seen.quality.de76),
+        met: no_worse,
+    },
     Goal {
         name: "dE 2000",
         asked: NO_WORSE,
-        figure: |a, b| ratio(a.quality.de2000, b.quality.de2000),
+        figure: |a, b| ratio(a.seen.quality.de2000, b.seen.quality.de2000),
         met: no_worse,
     },
     Goal {
         name: "blurred",
         asked: NO_WORSE,
-        figure: |a, b| ratio(a.quality.blurred, b.quality.blurred),
+        figure: |a, b| ratio(a.seen.quality.blurred, b.seen.quality.blurred),
         met: no_worse,
     },
     Goal {
         name: "flicker",
         asked: "at most .05, no ratio",
-        figure: |a, _| a.quality.flicker,
+        figure: |a, _| a.seen.quality.flicker,
         met: |flicker, _| flicker <= 0.05,
     },
 ];
@@ -93,7 +98,7 @@ const HEAD: &str = "\
 
 /// A row of a set's table.
 pub(super) fn line(o: &Outcome) -> String {
-    let q = &o.quality;
+    let q = &o.seen.quality;
     format!(
         "| {} | {:.2} | {:.2} | {:.0} | {:.3} | {:.2} | {:.2} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | {} | {} |",
         o.program,
@@ -108,8 +113,8 @@ pub(super) fn line(o: &Outcome) -> String {
         q.blurred,
         q.flicker,
         q.flicker_share,
-        o.frames,
-        if o.on_time { "yes" } else { "**no**" },
+        o.seen.frames,
+        if o.seen.on_time { "yes" } else { "**no**" },
     )
 }
 
@@ -254,7 +259,7 @@ fn palettes(text: &mut String, results: &[Measured]) -> anyhow::Result<()> {
 /// The crop as it is meant, then as some programs show it, side by side; and what is where.
 fn crops(set: &Measured) -> anyhow::Result<Option<(RgbImage, Vec<&str>)>> {
     let Some(meant) = &set.crop else { return Ok(None) };
-    let of = |name| set.outcomes.iter().find(|o| o.program == name).and_then(|o| o.crop.as_ref());
+    let of = |name| set.outcomes.iter().find(|o| o.program == name).and_then(|o| o.seen.crop.as_ref());
     let shown = SHOWN.iter().filter_map(|&name| Some((name, of(name)?)));
     let panels = std::iter::once(("the frame", meant)).chain(shown).collect::<Vec<_>>();
     let side = CROP * ENLARGED;
@@ -292,7 +297,7 @@ fn plots(folder: &Path, results: &[Measured]) -> anyhow::Result<()> {
     let cost = Labels { title: "CPU time and size of each set", x: "bytes", y: "CPU seconds" };
     log_log(&folder.join("cost.svg"), &cost, &series(|o| o.cost.cpu))?;
     let quality = Labels { title: "dE and size of each set", x: "bytes", y: "mean CIE 1976 difference" };
-    log_log(&folder.join("quality.svg"), &quality, &series(|o| o.quality.de76))?;
+    log_log(&folder.join("quality.svg"), &quality, &series(|o| o.seen.quality.de76))?;
 
     let compared = results.iter().filter_map(|set| Some((set.name, rivals(set)?))).collect::<Vec<_>>();
     if compared.is_empty() {
