@@ -110,6 +110,9 @@ pub(super) enum Moment {
 /// What the bucket tells the world after a change: who, which key, whether it is there now.
 pub(super) type Notify = dyn Fn(Actor, &str, bool, &Bucket) + Send + Sync;
 
+/// Is told of a moment at which a change is most awkward.
+pub(super) type Told = dyn Fn(Moment) + Send + Sync;
+
 /// The bucket and everything around it.
 pub(super) struct Grounds {
     pub(super) engine: Engine,
@@ -118,7 +121,7 @@ pub(super) struct Grounds {
     pub(super) bucket: Mutex<Bucket>,
     pub(super) notify: Mutex<Option<Arc<Notify>>>,
     /// Told of the moments at which a change is most awkward.
-    pub(super) moments: Mutex<Option<Arc<dyn Fn(Moment) + Send + Sync>>>,
+    pub(super) moments: Mutex<Option<Arc<Told>>>,
     /// By GIF: the moment from which the oldest listing is that one was made from. Equal files are one GIF.
     gifs: Mutex<BTreeMap<ETag, u64>>,
     /// A GIF gave way to one from an older listing.
