@@ -133,6 +133,8 @@ struct Row {
     without: &'static str,
     whole: u64,
     less: u64,
+    /// Whether it must keep to [`MOST`]: what is drawn in `f32`. There are but two kernels for `f64`.
+    is_held: bool,
 }
 
 impl Row {
@@ -179,8 +181,8 @@ pub fn run(args: &Args) -> Result<()> {
         let path = args.output.join("needs.md");
         std::fs::write(&path, &report).with_context(|| path.display().to_string())?;
     }
-    let beyond = rows.iter().filter(|row| row.beyond() > MOST).count();
-    ensure!(beyond == 0, "{beyond} scenes execute over {MOST} % more than they need");
+    let beyond = rows.iter().filter(|row| row.is_held && row.beyond() > MOST).count();
+    ensure!(beyond == 0, "{beyond} times a scene executes over {MOST} % more than it needs");
     Ok(())
 }
 
@@ -238,7 +240,8 @@ fn compare(subject: &Subject, script: &Path, builds: &[PathBuf]) -> Result<Vec<R
         }
         let (less, same) = frame(build, script, subject.precision)?;
         ensure!(picture == same, "{}: another picture without {}", subject.name, part.feature);
-        rows.push(Row { subject: subject.name, without: part.feature, whole, less });
+        let is_held = subject.precision != "f64";
+        rows.push(Row { subject: subject.name, without: part.feature, whole, less, is_held });
     }
     Ok(rows)
 }
@@ -270,18 +273,26 @@ fn report(rows: &[Row]) -> Result<String> {
     let mut text = format!(
         "# Only what a scene needs\n\n\
          Written by `cargo run -p rayfold-bench -- needs`. Instructions of a frame, preparations included, on one thread \
-         and the AVX2 path, counted by `valgrind --tool=callgrind`: by the whole tracer, and by one that was built without \
-         a part that the scene does not use. *Beyond* is what the whole one executes more; at most {MOST} % is asked for. Every pair draws the same picture bit for bit, and a scene that uses what a build leaves \
-         out is refused by it.\n\n\
-         | built without | scenes | most beyond | of |\n| --- | --- | --- | --- |\n"
+         and the AVX2 path, counted by `valgrind --tool=callgrind`: by the whole tracer, and by one that was built \
+         without a part that the scene does not use. *Beyond* is what the whole one executes more; `.ci/run` fails where \
+         it is over {MOST} % of a scene that is drawn in `f32`. For `f64`, which few scenes need, there are but two \
+         kernels: what its scenes pay is shown and not held. Every pair draws the same picture bit for bit, and a scene \
+         that uses what a build leaves out is refused by it.\n\n\
+         | built without | scenes | most beyond | of | most beyond in `f64` |\n| --- | --- | --- | --- | --- |\n"
     );
     for part in &PARTS {
-        let of: Vec<&Row> = rows.iter().filter(|row| row.without == part.feature).collect();
-        let worst =
-            of.iter().max_by(|a, b| a.beyond().total_cmp(&b.beyond())).context("a part without scenes")?;
-        writeln!(text, "| {} | {} | {:+.2} % | {} |", part.feature, of.len(), worst.beyond(), worst.subject)?;
+        let worst = |held: bool| {
+            let of = rows.iter().filter(|row| row.without == part.feature && row.is_held == held);
+            of.max_by(|a, b| a.beyond().total_cmp(&b.beyond()))
+        };
+        let count = rows.iter().filter(|row| row.without == part.feature && row.is_held).count();
+        let most = worst(true).context("a part without scenes")?;
+        let double = worst(false).map_or("-".to_owned(), |row| format!("{:+.2} %", row.beyond()));
+        let (feature, beyond, subject) = (part.feature, most.beyond(), most.subject);
+        writeln!(text, "| {feature} | {count} | {beyond:+.2} % | {subject} | {double} |")?;
     }
-    text += "\n| built without | scene | instructions, whole | without the part | beyond |\n| --- | --- | --- | --- | --- |\n";
+    text += "\n| built without | scene | instructions, whole | without the part | beyond |\n\
+             | --- | --- | --- | --- | --- |\n";
     for row in rows {
         writeln!(
             text,

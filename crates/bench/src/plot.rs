@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Result, anyhow};
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// Points with a name; joined by lines where they are a course.
 pub(crate) struct Series {
@@ -19,7 +20,10 @@ pub(crate) struct Labels<'a> {
     pub(crate) y: &'a str,
 }
 
-const SIZE: (u32, u32) = (900, 560);
+const SIZE: (u32, u32) = (1100, 560);
+
+/// Columns of the part beside the legend.
+const CHART: u32 = 800;
 
 /// Colours that those who see few colours tell apart (Okabe and Ito, 2008).
 const COLORS: [RGBColor; 7] = [
@@ -111,7 +115,8 @@ fn draw(path: &Path, labels: &Labels, series: &[Series]) -> Result<(), Box<dyn s
     };
     let area = SVGBackend::new(path, SIZE).into_drawing_area();
     area.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&area)
+    let (left, legend) = area.split_horizontally(CHART);
+    let mut chart = ChartBuilder::on(&left)
         .caption(labels.title, ("sans-serif", 20))
         .margin(12)
         .x_label_area_size(44)
@@ -134,18 +139,12 @@ fn draw(path: &Path, labels: &Labels, series: &[Series]) -> Result<(), Box<dyn s
         // Colours repeat after seven; the shape tells the rest.
         let filled = k < COLORS.len();
         let style = if filled { color.filled() } else { color.stroke_width(2) };
-        chart
-            .draw_series(series.points.iter().map(|&p| Circle::new(p, 5, style)))?
-            .label(&series.name)
-            .legend(move |(x, y)| Circle::new((x + 8, y), 5, style));
+        chart.draw_series(series.points.iter().map(|&p| Circle::new(p, 5, style)))?;
+        let row = 60 + 22 * k as i32;
+        legend.draw(&Circle::new((8, row), 5, style))?;
+        let text = ("sans-serif", 14).into_text_style(&legend).pos(Pos::new(HPos::Left, VPos::Center));
+        legend.draw_text(&series.name, &text, (20, row))?;
     }
-    chart
-        .configure_series_labels()
-        .background_style(WHITE.mix(0.85))
-        .border_style(BLACK.mix(0.3))
-        .label_font(("sans-serif", 14))
-        .position(SeriesLabelPosition::UpperRight)
-        .draw()?;
     area.present()?;
     Ok(())
 }

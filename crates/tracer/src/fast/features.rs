@@ -19,7 +19,7 @@ pub(super) struct Needs {
 }
 
 /// What this build has.
-const BUILT: Needs = Needs {
+pub(super) const BUILT: Needs = Needs {
     cuboids: cfg!(feature = "boxes"),
     triangles: cfg!(feature = "triangles"),
     mirrors: cfg!(feature = "mirrors"),
@@ -52,37 +52,37 @@ pub(super) trait Features: Formulas + 'static {
     const MIRRORS: bool;
     const SHADOWS: bool;
     const TREE: bool;
+
+    /// The same with mirrors, for what mirrors make no difference to.
+    type Mirroring: Features;
 }
 
-macro_rules! kernels {
-    ($($(#[$doc:meta])* $name:ident: $cuboids:literal, $triangles:literal, $mirrors:literal, $shadows:literal, $tree:literal;)*) => {
-        $(
-            $(#[$doc])*
-            pub(super) struct $name;
+/// A kernel that can draw spheres and what it says.
+pub(super) struct Kernel<const CUBOIDS: bool, const TRIANGLES: bool, const MIRRORS: bool, const TREE: bool>;
 
-            impl Formulas for $name {}
-
-            impl Features for $name {
-                const CUBOIDS: bool = $cuboids && BUILT.cuboids;
-                const TRIANGLES: bool = $triangles && BUILT.triangles;
-                const MIRRORS: bool = $mirrors && BUILT.mirrors;
-                const SHADOWS: bool = $shadows && BUILT.shadows;
-                const TREE: bool = $tree && BUILT.tree;
-            }
-        )*
-    };
+impl<const CUBOIDS: bool, const TRIANGLES: bool, const MIRRORS: bool, const TREE: bool> Formulas
+    for Kernel<CUBOIDS, TRIANGLES, MIRRORS, TREE>
+{
 }
 
-kernels! {
-    // boxes, triangles, mirrors, shadows, tree
-    /// Spheres that mirror nothing.
-    Balls: false, false, false, true, false;
-    /// Spheres, some of them mirrors.
-    Mirrors: false, false, true, true, false;
-    /// All kinds, as many as masks have bits.
-    Solids: true, true, true, true, false;
-    /// Triangles and spheres that mirror nothing, any number.
-    Mesh: false, true, false, true, true;
-    /// All kinds, any number.
-    Everything: true, true, true, true, true;
+impl<const CUBOIDS: bool, const TRIANGLES: bool, const MIRRORS: bool, const TREE: bool> Features
+    for Kernel<CUBOIDS, TRIANGLES, MIRRORS, TREE>
+{
+    const CUBOIDS: bool = CUBOIDS && BUILT.cuboids;
+    const TRIANGLES: bool = TRIANGLES && BUILT.triangles;
+    const MIRRORS: bool = MIRRORS && BUILT.mirrors;
+    const SHADOWS: bool = BUILT.shadows;
+    const TREE: bool = TREE && BUILT.tree;
+
+    type Mirroring = Kernel<CUBOIDS, TRIANGLES, true, TREE>;
 }
+
+/// All kinds, as many as masks have bits.
+pub(super) type Solids = Kernel<true, true, true, false>;
+
+/// Triangles and spheres that mirror nothing, any number.
+#[cfg(feature = "accuracy")]
+pub(super) type Mesh = Kernel<false, true, false, true>;
+
+/// All kinds, any number.
+pub(super) type Everything = Kernel<true, true, true, true>;

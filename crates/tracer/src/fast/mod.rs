@@ -65,7 +65,7 @@ use rayfold_scene::Scene;
 
 use crate::parallel::{CHANNELS, bands};
 use crate::{Precision, RenderError, RenderOptions};
-use features::{Balls, Everything, Features, Mesh, Mirrors, Solids};
+use features::{BUILT, Everything, Features, Kernel, Solids};
 use geometry::{Geometry, Solid};
 use prepare::Prepared;
 use real::Real;
@@ -188,7 +188,12 @@ trait Kernels: Real {
 
 impl Kernels for f64 {
     fn draw(job: &Job<f64>, level: Level, band: Band) {
-        on!(level, simd => job.draw::<_, Everything>(simd, band));
+        // Scenes that need this are few: two kernels will do for them.
+        if BUILT.tree && job.prepared.needs.tree {
+            on!(level, simd => job.draw::<_, Everything>(simd, band));
+        } else {
+            on!(level, simd => job.draw::<_, Solids>(simd, band));
+        }
     }
 }
 
@@ -211,32 +216,47 @@ impl Kernels for f32 {
     }
 }
 
+/// With the kernel that has just what the scene has.
 impl Job<'_, f32> {
-    /// With the kernel that has just what the scene has.
     #[inline(always)]
     fn draw_by_kernel<S: Simd>(&self, simd: S, band: Band) {
-        let needs = self.prepared.needs;
-        match (needs.tree, needs.cuboids || needs.triangles, needs.mirrors) {
-            (true, _, false) if !needs.cuboids => simd.vectorize(
+        if BUILT.cuboids && self.prepared.needs.cuboids {
+            self.by_triangles::<S, true>(simd, band);
+        } else {
+            self.by_triangles::<S, false>(simd, band);
+        }
+    }
+
+    #[inline(always)]
+    fn by_triangles<S: Simd, const C: bool>(&self, simd: S, band: Band) {
+        if BUILT.triangles && self.prepared.needs.triangles {
+            self.by_mirrors::<S, C, true>(simd, band);
+        } else {
+            self.by_mirrors::<S, C, false>(simd, band);
+        }
+    }
+
+    #[inline(always)]
+    fn by_mirrors<S: Simd, const C: bool, const T: bool>(&self, simd: S, band: Band) {
+        if BUILT.mirrors && self.prepared.needs.mirrors {
+            self.by_tree::<S, C, T, true>(simd, band);
+        } else {
+            self.by_tree::<S, C, T, false>(simd, band);
+        }
+    }
+
+    #[inline(always)]
+    fn by_tree<S: Simd, const C: bool, const T: bool, const M: bool>(&self, simd: S, band: Band) {
+        if BUILT.tree && self.prepared.needs.tree {
+            simd.vectorize(
                 #[inline(always)]
-                || self.draw::<S, Mesh>(simd, band),
-            ),
-            (true, _, _) => simd.vectorize(
+                || self.draw::<S, Kernel<C, T, M, true>>(simd, band),
+            );
+        } else {
+            simd.vectorize(
                 #[inline(always)]
-                || self.draw::<S, Everything>(simd, band),
-            ),
-            (false, true, _) => simd.vectorize(
-                #[inline(always)]
-                || self.draw::<S, Solids>(simd, band),
-            ),
-            (false, false, true) => simd.vectorize(
-                #[inline(always)]
-                || self.draw::<S, Mirrors>(simd, band),
-            ),
-            (false, false, false) => simd.vectorize(
-                #[inline(always)]
-                || self.draw::<S, Balls>(simd, band),
-            ),
+                || self.draw::<S, Kernel<C, T, M, false>>(simd, band),
+            );
         }
     }
 }

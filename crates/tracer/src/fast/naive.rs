@@ -37,6 +37,8 @@ impl<F: Features> Features for Naive<F> {
     const MIRRORS: bool = F::MIRRORS;
     const SHADOWS: bool = F::SHADOWS;
     const TREE: bool = F::TREE;
+
+    type Mirroring = Naive<F::Mirroring>;
 }
 
 impl<F> Formulas for Naive<F> {

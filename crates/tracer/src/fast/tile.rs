@@ -62,9 +62,6 @@ struct Hits<E> {
     color: Columns<E>,
     /// For each packet with hits: where it begins, and the object that cannot be in its way, as a bit.
     packets: Vec<(usize, u64)>,
-    /// The box that the starts lie in.
-    low: [E; 3],
-    high: [E; 3],
 }
 
 /// Memory of a worker, used again for each of its tiles.
@@ -111,8 +108,6 @@ impl<E: Real> Scratch<E> {
                 diffuse: columns(),
                 color: columns(),
                 packets: Vec::with_capacity(PIXELS),
-                low: [E::narrow(0.0); 3],
-                high: [E::narrow(0.0); 3],
             },
             pixels: columns(),
             obstacles: Obstacles::default(),
@@ -190,7 +185,7 @@ pub(super) fn draw<S: Simd, E: Real, F: Features>(
         _ => Candidates { masks: Masks::split(tile.candidates, scene), list: None },
     };
     first_generation::<S, E, F>(simd, scene, tile, candidates, band, hits, (&mut *queue, &mut *next));
-    light_up::<S, E, F>(simd, scene, hits, obstacles);
+    light_up::<S, E, F::Mirroring>(simd, scene, hits, obstacles);
     if F::MIRRORS && next.count > 0 {
         core::mem::swap(&mut hits.color, pixels);
         let (mut queue, mut next) = (queue, next);
@@ -200,7 +195,7 @@ pub(super) fn draw<S: Simd, E: Real, F: Features>(
             next.count = 0;
             let after = (bounce < tile.bounces).then_some(&mut *next);
             later_generation::<S, E, F>(simd, scene, all, scene.background, hits, queue, after);
-            light_up::<S, E, F>(simd, scene, hits, obstacles);
+            light_up::<S, E, F::Mirroring>(simd, scene, hits, obstacles);
             for ray in 0..queue.count {
                 let pixel = queue.pixel.0[ray].to_index();
                 for (sum, color) in pixels.iter_mut().zip(&hits.color) {
@@ -225,45 +220,6 @@ fn fill(tile: Tile, band: &mut Band) {
     }
 }
 
-/// Begins a generation.
-#[inline(always)]
-fn clear<E: Real>(hits: &mut Hits<E>) {
-    hits.packets.clear();
-    hits.low = [E::narrow(E::FAR); 3];
-    hits.high = [E::narrow(-E::FAR); 3];
-}
-
-/// The box of the points of a packet, lane by lane until the generation is complete.
-struct Region<S: Simd, E: Real> {
-    low: Vec3<S, E>,
-    high: Vec3<S, E>,
-}
-
-impl<S: Simd, E: Real> Region<S, E> {
-    #[inline(always)]
-    fn new(simd: S) -> Self {
-        let far = constant::<S, E>(simd, E::FAR);
-        let near = constant::<S, E>(simd, -E::FAR);
-        Self { low: Vec3::<S, E>::new(far, far, far), high: Vec3::<S, E>::new(near, near, near) }
-    }
-
-    #[inline(always)]
-    fn include(&mut self, lanes: Mask<S, E>, point: Vec3<S, E>) {
-        let low = Vec3::select(lanes, point, self.low);
-        let high = Vec3::select(lanes, point, self.high);
-        self.low = Vec3::<S, E>::new(self.low.x.min(low.x), self.low.y.min(low.y), self.low.z.min(low.z));
-        self.high =
-            Vec3::<S, E>::new(self.high.x.max(high.x), self.high.y.max(high.y), self.high.z.max(high.z));
-    }
-
-    #[inline(always)]
-    fn close(self, hits: &mut Hits<E>) {
-        let Self { low, high } = self;
-        hits.low = [low.x.reduce_min(), low.y.reduce_min(), low.z.reduce_min()];
-        hits.high = [high.x.reduce_max(), high.y.reduce_max(), high.z.reduce_max()];
-    }
-}
-
 /// The rays of the tile's pixels.
 #[inline(always)]
 fn first_generation<S: Simd, E: Real, F: Features>(
@@ -285,8 +241,7 @@ fn first_generation<S: Simd, E: Real, F: Features>(
             let bottom = constant::<S, E>(simd, f64::from(tile.top + tile.height - 1));
             let last_row = constant::<S, E>(simd, f64::from(band.size.1 - 1));
             let background = band.background.map(|level| E::narrow(f64::from(level) / 255.0));
-            clear(hits);
-            let mut region = Region::new(simd);
+            hits.packets.clear();
             let mut at = 0;
             for top in (0..tile.height as usize).step_by(height) {
                 for left in (0..tile.width as usize).step_by(width) {
@@ -300,17 +255,7 @@ fn first_generation<S: Simd, E: Real, F: Features>(
                             let direction = Vec3::splat(simd, up).scale_add(j, along).normalize(simd);
                             let ray = Ray { origin: Vec3::zero(simd), direction };
                             let next = (None, Some(&mut *next));
-                            trace::<S, E, F, true>(
-                                simd,
-                                scene,
-                                ray,
-                                candidates,
-                                background,
-                                at,
-                                hits,
-                                &mut region,
-                                next,
-                            );
+                            trace::<S, E, F, true>(simd, scene, ray, candidates, background, at, hits, next);
                         }
                         Rays::Parallel { corner, pixel } => {
                             let pixel = splat::<S, E>(simd, pixel);
@@ -333,11 +278,8 @@ fn first_generation<S: Simd, E: Real, F: Features>(
                     at += Lanes::<S, E>::LEN;
                 }
             }
-            match scene.rays {
-                Rays::Pinhole { .. } => region.close(hits),
-                Rays::Parallel { .. } => {
-                    later_generation::<S, E, F>(simd, scene, candidates, background, hits, queue, Some(next));
-                }
+            if let Rays::Parallel { .. } = scene.rays {
+                later_generation::<S, E, F>(simd, scene, candidates, background, hits, queue, Some(next));
             }
         },
     );
@@ -366,27 +308,15 @@ fn later_generation<S: Simd, E: Real, F: Features>(
                 }
             }
             queue.pixel.0[last + 1..end].fill(E::narrow(-1.0));
-            clear(hits);
-            let mut region = Region::new(simd);
+            hits.packets.clear();
             for at in (0..queue.count).step_by(Lanes::<S, E>::LEN) {
                 let ray = Ray {
                     origin: Vec3::load(simd, &queue.origin, at),
                     direction: Vec3::load(simd, &queue.direction, at),
                 };
                 let queues = (Some(&*queue), next.as_deref_mut());
-                trace::<S, E, F, false>(
-                    simd,
-                    scene,
-                    ray,
-                    candidates,
-                    background,
-                    at,
-                    hits,
-                    &mut region,
-                    queues,
-                );
+                trace::<S, E, F, false>(simd, scene, ray, candidates, background, at, hits, queues);
             }
-            region.close(hits);
         },
     );
 }
@@ -407,7 +337,6 @@ fn trace<S: Simd, E: Real, F: Features, const EYE: bool>(
     background: [E; 3],
     at: usize,
     hits: &mut Hits<E>,
-    region: &mut Region<S, E>,
     (queue, next): (Option<&Queue<E>>, Option<&mut Queue<E>>),
 ) {
     let weight = match queue {
@@ -445,8 +374,14 @@ fn trace<S: Simd, E: Real, F: Features, const EYE: bool>(
         remaining &= !bits;
     }
     if F::SHADOWS && scene.needs.shadows {
-        region.include(hit, start);
-        start.store(&mut hits.start, at);
+        // Lanes without a hit start where the first hit does, and leave the region as it is.
+        let mut all = start;
+        if hit.any_false() {
+            let first = hit.to_bitmask().trailing_zeros() as usize;
+            let known = Vec3::splat(simd, [start.x[first], start.y[first], start.z[first]]);
+            all = Vec3::select(hit, start, known);
+        }
+        all.store(&mut hits.start, at);
     }
     normal.store(&mut hits.normal, at);
     weigh::<S, E, EYE>(diffuse, weight).store(&mut hits.diffuse, at);
@@ -540,8 +475,9 @@ fn light_up<S: Simd, E: Real, F: Features>(
             let Obstacles { of, seen } = obstacles;
             of.resize_with(scene.lights.len(), InTheWay::default);
             if F::SHADOWS && scene.needs.shadows {
+                let (low, high) = region(simd, hits);
                 for (light, of) in scene.lights.iter().zip(of.iter_mut()) {
-                    let beam = beam(light, hits.low, hits.high);
+                    let beam = beam(light, low, high);
                     if F::TREE && scene.tree.is_some() {
                         let InTheWay { list, is_listed, .. } = of;
                         *is_listed =
@@ -582,6 +518,24 @@ fn light_up<S: Simd, E: Real, F: Features>(
             }
         },
     );
+}
+
+/// The box of the points that wait for light; there is at least one.
+#[inline(always)]
+fn region<S: Simd, E: Real>(simd: S, hits: &Hits<E>) -> ([E; 3], [E; 3]) {
+    let far = constant::<S, E>(simd, E::FAR);
+    let near = constant::<S, E>(simd, -E::FAR);
+    let mut low = Vec3::<S, E>::new(far, far, far);
+    let mut high = Vec3::<S, E>::new(near, near, near);
+    for &(at, _) in &hits.packets {
+        let Vec3 { x, y, z } = Vec3::<S, E>::load(simd, &hits.start, at);
+        low = Vec3::<S, E>::new(low.x.min(x), low.y.min(y), low.z.min(z));
+        high = Vec3::<S, E>::new(high.x.max(x), high.y.max(y), high.z.max(z));
+    }
+    (
+        [low.x.reduce_min(), low.y.reduce_min(), low.z.reduce_min()],
+        [high.x.reduce_max(), high.y.reduce_max(), high.z.reduce_max()],
+    )
 }
 
 /// The shadow rays that start in a box, wider by the rounding errors.
