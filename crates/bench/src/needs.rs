@@ -274,8 +274,8 @@ fn report(rows: &[Row]) -> Result<String> {
         "# Only what a scene needs\n\n\
          Written by `cargo run -p rayfold-bench -- needs`. Instructions of a frame, preparations included, on one thread \
          and the AVX2 path, counted by `valgrind --tool=callgrind`: by the whole tracer, and by one that was built \
-         without a part that the scene does not use. *Beyond* is what the whole one executes more; `.ci/run` fails where \
-         it is over {MOST} % of a scene that is drawn in `f32`. For `f64`, which few scenes need, there are but two \
+         without a part that the scene does not use. *Beyond* is what the whole one executes more; the run fails \
+         where it is over {MOST} % of a scene that is drawn in `f32`. For `f64`, which few scenes need, there are but two \
          kernels: what its scenes pay is shown and not held. Every pair draws the same picture bit for bit, and a scene \
          that uses what a build leaves out is refused by it.\n\n\
          | built without | scenes | most beyond | of | most beyond in `f64` |\n| --- | --- | --- | --- | --- |\n"

@@ -20,10 +20,10 @@ pub(crate) struct Labels<'a> {
     pub(crate) y: &'a str,
 }
 
-const SIZE: (u32, u32) = (1100, 560);
+const SIZE: (u32, u32) = (900, 560);
 
-/// Columns of the part beside the legend.
-const CHART: u32 = 800;
+/// Columns beside a chart for its legend.
+const LEGEND: u32 = 280;
 
 /// Colours that those who see few colours tell apart (Okabe and Ito, 2008).
 const COLORS: [RGBColor; 7] = [
@@ -113,9 +113,9 @@ fn draw(path: &Path, labels: &Labels, series: &[Series]) -> Result<(), Box<dyn s
         // Whole decades, the first and the last of them with their names.
         0.8 * 10f64.powf((low.log10() - 0.2).floor())..1.25 * 10f64.powf((high.log10() + 0.2).ceil())
     };
-    let area = SVGBackend::new(path, SIZE).into_drawing_area();
+    let area = SVGBackend::new(path, (SIZE.0 + LEGEND, SIZE.1)).into_drawing_area();
     area.fill(&WHITE)?;
-    let (left, legend) = area.split_horizontally(CHART);
+    let (left, legend) = area.split_horizontally(SIZE.0);
     let mut chart = ChartBuilder::on(&left)
         .caption(labels.title, ("sans-serif", 20))
         .margin(12)
