@@ -23,8 +23,8 @@ const LENIENCE: f32 = 6.0;
 const SMOOTH: u32 = 24;
 /// How many of a colour's nearest others are tried.
 const TRIED: usize = 8;
-/// Pixels of a stripe, about. Fewer cost size: each stripe begins with an empty book.
-const STRIPE: usize = 150_000;
+/// Pixels of a stripe, at most. Fewer cost size: each stripe begins with an empty book.
+const STRIPE: usize = 160_000;
 
 /// What a pixel asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,7 +62,11 @@ pub(crate) fn in_stripes<R: Send>(
 ) -> (Block, Vec<R>) {
     let bits = block::bits(colours.len() + usize::from(clear.is_some()));
     let height = area.bottom - area.top;
-    let count = ((area.right - area.left) * height).div_ceil(STRIPE);
+    // An odd one out would be drawn while other threads wait.
+    let count = match ((area.right - area.left) * height).div_ceil(STRIPE) {
+        1 => 1,
+        many => many.next_multiple_of(2),
+    };
     let rows = height.div_ceil(count);
     let stripes = seen[area.top * width..area.bottom * width].par_chunks_mut(rows * width).enumerate();
     let drawn = stripes.map(|(number, seen)| {
