@@ -52,7 +52,8 @@ async fn a_render_process_killed_in_the_middle_is_made_good() {
             let mut stage = stage(|settings| settings.fates = Some(fates)).await;
             stage.upload("film", &film()).await;
             stage.until_gif_of("film", &film()).await;
-            // A manifest that was committed although nobody heard of it may be the last one that is needed.
+            // A manifest whose put took effect stands, whether or not anyone heard of it: the next attempt at the event
+            // finds its own commit, lists once more, and puts another only if something has come meanwhile.
             let again = prefix != "manifests/" || fate == Fate::KillBefore;
             let met = met.load(Ordering::SeqCst);
             assert!(met > usize::from(again), "{fate:?} at {prefix}: written {met} times");

@@ -1,7 +1,8 @@
 //! Where the function binaries are.
 //!
-//! They lie beside the program that runs them. Under `cargo run` they may be missing, or older than the sources, as Cargo
-//! builds only what it runs; so they are built then, which costs a moment when they are fresh.
+//! They lie beside the program that runs them. In the project's own `target/` they may be missing, or older than the
+//! sources, as Cargo builds only what it is asked for; so they are built then, which costs a moment when they are fresh.
+//! They are built with the whole workspace's features, as is what `cargo run` runs: both share one AWS SDK.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -22,7 +23,8 @@ impl Functions {
         Self { folder: folder.into() }
     }
 
-    /// Those in the folder that RAYFOLD_FUNCTIONS names, or beside this program, built when Cargo runs it.
+    /// Those in the folder that RAYFOLD_FUNCTIONS names, which are taken as they are, or beside this program, built anew
+    /// when it lies in the workspace it was built from.
     ///
     /// `say` hears what takes time, a line at a time.
     ///
@@ -41,8 +43,15 @@ impl Functions {
         let by_cargo = env::var_os("CARGO").is_some()
             && env::var("CARGO_PKG_NAME").is_ok_and(|name| name.starts_with("rayfold"));
         let in_workspace = workspace.canonicalize().is_ok_and(|workspace| program.starts_with(workspace));
-        if by_cargo || (in_workspace && functions.check().is_err()) {
-            build(workspace, folder, say)?;
+        if by_cargo || in_workspace {
+            match build(workspace, folder, say) {
+                Err(Error::Spawn { .. }) if functions.check().is_ok() => {
+                    say(
+                        "there is no cargo: the function binaries are used as they are, perhaps older than the sources",
+                    );
+                }
+                built => built?,
+            }
         }
         functions.check()?;
         Ok(functions)
@@ -74,7 +83,8 @@ fn build(workspace: &Path, folder: &Path, say: &mut dyn FnMut(&str)) -> Result<(
     say("building the function binaries");
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let status = Command::new(&cargo)
-        .args(["build", "--quiet", "-p", "rayfold-lambda", "--bins", "--profile", profile])
+        .args(["build", "--quiet", "--workspace", "--profile", profile])
+        .args(Function::ALL.iter().flat_map(|function| ["--bin", function.binary()]))
         .arg("--manifest-path")
         .arg(workspace.join("Cargo.toml"))
         .arg("--target-dir")

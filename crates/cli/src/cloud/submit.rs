@@ -31,6 +31,10 @@ use crate::wording::number;
 /// How long nothing may happen before the user is told that this is unusual.
 const UNUSUAL: Duration = Duration::from_secs(20);
 
+/// Bytes of a script's name that MinIO can draw: it keeps objects as files, whose names have at most 255 bytes, and a
+/// frame's has its script's version, too.
+const LONGEST_NAME_ON_MINIO: usize = 200;
+
 /// Render a folder of scripts in the cloud and download the animation
 ///
 /// Checks all scripts, makes scripts/ANIMATION/ in the bucket equal to the folder (uploading only what changed, deleting
@@ -83,7 +87,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         Err(faults) => anyhow::bail!("nothing was uploaded: {}", faults.count()),
     };
     plan.one_size()?;
-    let wanted = wanted(&input, &plan, &animation)?;
+    let wanted = wanted(&input, &plan, &animation, console)?;
     with_bucket(&args.bucket, async |store| {
         let versions = synchronise(store, &animation, &wanted, console).await?;
         if args.no_wait {
@@ -115,13 +119,24 @@ fn name_of(folder: &Path) -> anyhow::Result<Animation> {
 }
 
 /// What the bucket's folder should hold, by key.
-fn wanted(input: &Input, plan: &Plan, animation: &Animation) -> anyhow::Result<BTreeMap<String, Wanted>> {
+fn wanted(
+    input: &Input,
+    plan: &Plan,
+    animation: &Animation,
+    console: &Console,
+) -> anyhow::Result<BTreeMap<String, Wanted>> {
     let mut files = Vec::new();
     for path in input.scripts.iter().filter_map(|script| script.path()) {
         let name = path.file_name().and_then(|name| name.to_str());
         let name = name.with_context(|| format!("the name of {} is not UTF-8", path.display()))?;
         let name = ScriptName::new(name.trim_end_matches(".txt"))?;
         let key = animation.script(&name);
+        if name.as_str().len() > LONGEST_NAME_ON_MINIO {
+            console.note(format_args!(
+                "{name}.txt: on S3 it is drawn; on MinIO, which keeps objects as files, a name of more than \
+                 {LONGEST_NAME_ON_MINIO} bytes is too long for its frame"
+            ));
+        }
         // The pipeline refuses some names; say so now.
         key.parse::<rayfold_pipeline::keys::Key>()?;
         files.push((key, Content::File(path.to_path_buf())));

@@ -134,6 +134,8 @@ pub(super) struct Grounds {
     pub(super) seen: Mutex<BTreeSet<(Actor, Action, String)>>,
     /// Requests by actor.
     pub(super) requests: [AtomicU64; 3],
+    /// Requests of the functions by kind, in the order of [`Action`].
+    pub(super) kinds: [AtomicU64; 4],
     /// Bytes of objects that were read, by actor.
     pub(super) bytes: [AtomicU64; 3],
     /// What happened, line by line, for whoever replays a run.
@@ -156,6 +158,7 @@ impl Grounds {
             late_writes: AtomicU64::new(0),
             seen: Mutex::default(),
             requests: Default::default(),
+            kinds: Default::default(),
             bytes: Default::default(),
         })
     }
@@ -271,6 +274,9 @@ impl WorldStore {
         let grounds = &self.grounds;
         grounds.requests[self.actor as usize].fetch_add(1, Ordering::Relaxed);
         self.fate.requests.fetch_add(1, Ordering::Relaxed);
+        if self.actor != Actor::User {
+            grounds.kinds[effect.action() as usize].fetch_add(1, Ordering::Relaxed);
+        }
         let key = effect.key().to_owned();
         let folder = key.split_inclusive('/').next().unwrap_or_default().to_owned();
         lock(&grounds.seen).insert((self.actor, effect.action(), folder));

@@ -74,6 +74,8 @@ pub(super) struct Diary {
     pub(super) idle: Vec<u64>,
     /// Invocations by kind: render, assemble.
     pub(super) invocations: [u64; 2],
+    /// Time of the render function's invocations that was not drawing.
+    pub(super) beyond_drawing: Duration,
 }
 
 struct State {
@@ -250,6 +252,8 @@ impl Platform {
                 let actress = Actress { grounds, fate: fate.clone(), die, draw_ms: self.draw_ms };
                 lock(&self.diary).invocations[0] += 1;
                 let rendered = render_frame(&invocation, &actress, key).await?;
+                let stages = rendered.stages;
+                lock(&self.diary).beyond_drawing += stages.read + stages.put + stages.fold;
                 let draws_nothing = matches!(
                     rendered.outcome,
                     Outcome::Present | Outcome::Superseded | Outcome::Gone | Outcome::Settings

@@ -41,6 +41,10 @@ pub struct Scale {
 pub struct ScaleReport {
     /// Requests of the render function's invocations, divided by the frames.
     pub requests_a_frame: f64,
+    /// Requests of both functions by kind (GET, PUT, DELETE, LIST), divided by the frames.
+    pub kinds_a_frame: [f64; 4],
+    /// Mean time of the render function's invocations that was not drawing: requests and pauses.
+    pub beyond_drawing: Duration,
     /// Bytes that the render function read, divided by the frames.
     pub bytes_a_frame: f64,
     /// From the last result's put to the last claim's.
@@ -112,6 +116,11 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
         Expected::of(&bucket, &animation).check(&bucket, &animation)?;
     }
     let by_render = grounds.requests_of(Actor::Render);
+    let by_kind = [0, 1, 2, 3].map(|kind: usize| grounds.kinds[kind].load(Ordering::Relaxed) as f64);
+    let beyond_drawing = {
+        let diary = lock(&platform.diary);
+        diary.beyond_drawing / u32::try_from(diary.invocations[0]).unwrap_or(u32::MAX)
+    };
     let read_by_render = grounds.bytes[Actor::Render as usize].load(Ordering::Relaxed);
     let by_assemble = grounds.requests_of(Actor::Assemble);
     lock(&platform.diary).idle.clear();
@@ -130,6 +139,8 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
     let between = |from: u64, to: u64| Duration::from_micros(to.saturating_sub(from));
     Ok(ScaleReport {
         requests_a_frame: by_render as f64 / scale.frames as f64,
+        kinds_a_frame: by_kind.map(|requests| requests / scale.frames as f64),
+        beyond_drawing,
         bytes_a_frame: read_by_render as f64 / scale.frames as f64,
         tail: between(moments.last_result_us, moments.last_claim_us),
         claims: moments.claims,

@@ -51,6 +51,9 @@ where
     E: ProvideErrorMetadata + std::error::Error + Send + Sync + 'static,
 {
     match (error.code(), error.message()) {
+        (Some(code @ "XMinioInvalidObjectName"), _) => {
+            format!("{code}: MinIO keeps objects as files, whose names have at most 255 bytes").into()
+        }
         (Some(code), Some(message)) => format!("{code}: {message}").into(),
         (Some(code), None) => code.to_owned().into(),
         _ => {
