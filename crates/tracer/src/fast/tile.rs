@@ -357,17 +357,22 @@ fn trace<S: Simd, E: Real, F: Features, const EYE: bool>(
     let mut color = background;
     let mut mirror_bits = 0;
     let mut alone = u64::MAX;
+    // Without lights only mirrors need to know where and how a surface lies.
+    let is_lit = !scene.lights.is_empty();
     while remaining != 0 {
         let order = found.order[remaining.trailing_zeros() as usize];
         let entry = &scene.entries[order.to_index()];
         let same = hit & found.order.simd_eq(splat::<S, E>(simd, order));
         let bits = same.to_bitmask();
-        let surface = surface::<S, E, F, EYE>(simd, scene, entry, ray, found.distance);
-        start = Vec3::select(same, surface.start, start);
-        normal = Vec3::select(same, surface.normal, normal);
-        diffuse = Vec3::select(same, Vec3::splat(simd, entry.diffuse), diffuse);
+        let is_mirror = F::MIRRORS && entry.mirrors;
+        if is_mirror || is_lit {
+            let surface = surface::<S, E, F, EYE>(simd, scene, entry, ray, found.distance);
+            start = Vec3::select(same, surface.start, start);
+            normal = Vec3::select(same, surface.normal, normal);
+            diffuse = Vec3::select(same, Vec3::splat(simd, entry.diffuse), diffuse);
+        }
         color = Vec3::select(same, weigh::<S, E, EYE>(Vec3::splat(simd, entry.ambient), weight), color);
-        if F::MIRRORS && entry.mirrors {
+        if is_mirror {
             mirror_bits |= bits;
         }
         alone &= if bits == hit.to_bitmask() { own_shadow::<E, EYE>(scene, entry) } else { u64::MAX };
@@ -383,10 +388,12 @@ fn trace<S: Simd, E: Real, F: Features, const EYE: bool>(
         }
         all.store(&mut hits.start, at);
     }
-    normal.store(&mut hits.normal, at);
-    weigh::<S, E, EYE>(diffuse, weight).store(&mut hits.diffuse, at);
     color.store(&mut hits.color, at);
-    hits.packets.push((at, alone));
+    if is_lit {
+        normal.store(&mut hits.normal, at);
+        weigh::<S, E, EYE>(diffuse, weight).store(&mut hits.diffuse, at);
+        hits.packets.push((at, alone));
+    }
     if !F::MIRRORS || mirror_bits == 0 {
         return;
     }
@@ -469,7 +476,7 @@ fn light_up<S: Simd, E: Real, F: Features>(
     simd.vectorize(
         #[inline(always)]
         || {
-            if hits.packets.is_empty() || scene.lights.is_empty() {
+            if hits.packets.is_empty() {
                 return;
             }
             let Obstacles { of, seen } = obstacles;
