@@ -9,7 +9,7 @@ use crate::Folder;
 fn an_estimate_for_people() {
     Folder::new().rayfold("cost --frames 50 --ms 180").assert().code(0).stderr_eq("").stdout_eq(str![[r#"
 50 frames of 512x512, 180 ms each with 1,769 MB on x86_64
-Prices of us-east-1 on 2025-12-01, in USD, free allowances left out
+Prices of us-east-1 on 2026-03-14, in USD, free allowances left out
 
 Making it, once
   Lambda: invocations                        51       0.0000

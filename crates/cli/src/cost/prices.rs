@@ -9,7 +9,7 @@ pub(super) const BUILT_IN: &str = include_str!("../../../../infra/prices.json");
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Prices {
-    /// The day on which they were so, as `2025-12-01`.
+    /// The day on which they were so, as `2026-03-14`.
     pub(super) as_of: String,
     pub(super) region: String,
     pub(super) currency: String,
