@@ -154,6 +154,8 @@ impl Sights {
     }
 
     /// The tile's candidates, or none if they are too many.
+    // Out of line, so that it is the same code whatever kernels a build has.
+    #[inline(never)]
     pub(super) fn gather(&self, column: usize, row: usize, into: &mut Picked) -> bool {
         into.clear();
         let list = self.lists.list(row * self.columns + column);
@@ -305,6 +307,8 @@ impl LightBuffer {
     }
 
     /// What can stand in a beam's way; false if that is too much.
+    // Out of line, so that it is the same code whatever kernels a build has.
+    #[inline(never)]
     pub(super) fn gather(&self, beam: &Beam, seen: &mut Seen, into: &mut Picked) -> bool {
         into.clear();
         let grid = &*self.0;
