@@ -375,7 +375,9 @@ fn trace<S: Simd, E: Real, F: Features, const EYE: bool>(
         if is_mirror {
             mirror_bits |= bits;
         }
-        alone &= if bits == hit.to_bitmask() { own_shadow::<E, EYE>(scene, entry) } else { u64::MAX };
+        if is_lit {
+            alone &= if bits == hit.to_bitmask() { own_shadow::<E, EYE>(scene, entry) } else { u64::MAX };
+        }
         remaining &= !bits;
     }
     if F::SHADOWS && scene.needs.shadows {
