@@ -16,7 +16,7 @@ Making it, once
   Lambda: rendering                 15.548 GB-s       0.0003
   Lambda: assembling                 5.248 GB-s       0.0001
   S3: puts and lists                        303       0.0015
-  S3: gets                                  200       0.0001
+  S3: gets                                  250       0.0001
   Logs                                 0.000 GB       0.0000
   Traces                                  2.550       0.0000
   Downloading the GIF once             0.001 GB       0.0001
