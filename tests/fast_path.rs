@@ -119,6 +119,8 @@ fn widths_with_fused_multiply_add_agree_bit_for_bit_and_others_but_for_isolated_
             for (name, level) in levels() {
                 let other = draw(&scene, RenderOptions { level: Some(level), ..options });
                 if name == "SSE4.2" {
+                    let share = off(&best, &other);
+                    assert!(share <= 2.0 * ISOLATED, "{name} {precision:?}: {share}");
                     differ += off_by_more_than(1, &best, &other) as f64;
                     pixels += best.pixels().len() as f64;
                 } else {
