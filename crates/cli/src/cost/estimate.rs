@@ -9,11 +9,11 @@ use super::prices::Prices;
 
 /// Requests a frame while it is made, of the kind that is billed as PUT, COPY, POST or LIST: the upload, the look for
 /// a result, the result, and the listings, manifests and claims of a fold, of which many frames share one. Measured with
-/// the upload: 3.5 to 5.6 (`docs/reports/simulation.md`, `pipeline.md`).
+/// the upload, at 50 frames and more: 3.5 to 5.2 (`docs/reports/simulation.md`, `pipeline.md`).
 const PUTS_AND_LISTS_A_FRAME: f64 = 6.0;
 
 /// The same, of the kind that is billed as GET: the script, the manifest before and after the pause, and the assembler's
-/// reading of the frame. Measured: 4.3 to 4.7 in the simulation.
+/// reading of the frame. Measured: 4.2 to 4.7.
 const GETS_A_FRAME: f64 = 5.0;
 
 /// Keys in a page of a listing.
