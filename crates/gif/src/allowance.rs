@@ -90,33 +90,46 @@ impl Allowance {
         self.share > 0.01 && self.difference > 0.01
     }
 
-    /// The error from which still pixels of the next frame may be drawn anew.
-    pub(crate) fn least_error(&self, still: &Still) -> f32 {
+    /// Sets aside what the next frame may use, before the frame before it has paid.
+    pub(crate) fn lend(&mut self, still: &Still) -> Loan {
         let pixels = still.pixels as f64;
-        let mut share = self.share * pixels * AHEAD;
-        let mut difference = self.difference * pixels * AHEAD;
+        let most = [self.share * pixels * AHEAD, self.difference * pixels * AHEAD];
+        let (mut asked, mut least_error) = ([0.0; 2], 0.0);
         for at in (0..STEPS).rev() {
             let count = still.errors[at] as f64;
-            share -= count;
-            difference -= count * visible(from(at + 1));
-            if share < 0.0 || difference < 0.0 {
-                return from(at + 1);
+            let more = [asked[0] + count, asked[1] + count * visible(from(at + 1))];
+            if more[0] > most[0] || more[1] > most[1] {
+                least_error = from(at + 1);
+                break;
             }
+            asked = more;
         }
-        0.0
+        let [share, difference] = asked.map(|sum| sum / pixels.max(1.0));
+        self.share -= share;
+        self.difference -= difference;
+        Loan { pixels, share, difference, least_error }
     }
 
-    /// Takes off what was used, and adds what a frame of which a part `changed` gives.
-    pub(crate) fn pay(&mut self, still: &Still, redrawn: &[Redrawn], changed: f64) {
+    /// Gives back what was not used, and adds what a frame of which a part `changed` gives.
+    pub(crate) fn pay(&mut self, loan: &Loan, redrawn: &[Redrawn], changed: f64) {
         let more = (changed * FOR_CHANGES).min(1.0);
-        self.share += EACH_FRAME.pixels * more;
-        self.difference += EACH_FRAME.difference * more;
-        if still.pixels > 0 {
-            let pixels = still.pixels as f64;
-            self.share -= redrawn.iter().map(|r| r.pixels).sum::<u64>() as f64 / pixels;
-            self.difference -= redrawn.iter().map(|r| r.difference).sum::<f64>() / pixels;
-        }
+        let pixels = loan.pixels.max(1.0);
+        self.share += EACH_FRAME.pixels * more + loan.share
+            - redrawn.iter().map(|r| r.pixels).sum::<u64>() as f64 / pixels;
+        self.difference += EACH_FRAME.difference * more + loan.difference
+            - redrawn.iter().map(|r| r.difference).sum::<f64>() / pixels;
     }
+}
+
+/// What a frame may use.
+#[derive(Debug)]
+pub(crate) struct Loan {
+    /// That stay.
+    pixels: f64,
+    share: f64,
+    difference: f64,
+    /// The error from which pixels that stay may be drawn anew.
+    pub(crate) least_error: f32,
 }
 
 /// The CIE 1976 difference of a squared error of which L\*a\*b\* makes up half.
@@ -151,7 +164,7 @@ mod tests {
     fn the_largest_errors_come_first_and_no_more_than_allowed() {
         let mut still = Still::none();
         (0..1_000).for_each(|k| still.count_wrong(1, 2.0 + k as f32 * 0.01));
-        let least = Allowance::new().least_error(&still);
+        let least = Allowance::new().lend(&still).least_error;
         let drawn = (0..1_000).filter(|&k| 2.0 + k as f32 * 0.01 >= least).count();
         let most = 1_000.0 * AHEAD * AT_FIRST.pixels;
         assert!((100..=most as usize).contains(&drawn), "{drawn} of 1000 from {least}");
@@ -161,17 +174,25 @@ mod tests {
     fn in_the_long_run_no_more_is_drawn_than_granted() {
         let mut allowance = Allowance::new();
         let (frames, mut sum) = (200, 0.0);
+        let mut unpaid: Option<(Loan, Redrawn)> = None;
         for frame in 0..frames {
             let errors = (0..1_000_u32).map(|k| 2.0 + (k * 37 + frame * 101) as f32 % 97.0);
             let mut still = Still::none();
-            errors.clone().for_each(|error| still.count_wrong(1, error));
-            let least = allowance.least_error(&still);
+            if allowance.is_left() {
+                errors.clone().for_each(|error| still.count_wrong(1, error));
+            } else {
+                still.count(1_000);
+            }
+            let loan = allowance.lend(&still);
             let mut redrawn = Redrawn::default();
-            errors
-                .filter(|&error| allowance.is_left() && error >= least)
-                .for_each(|error| redrawn.count(error));
+            if still.errors.iter().any(|&count| count > 0) {
+                errors.filter(|&error| error >= loan.least_error).for_each(|error| redrawn.count(error));
+            }
             sum += redrawn.difference / 1_000.0;
-            allowance.pay(&still, &[redrawn], 1.0);
+            // As a frame pays only when the next one has its loan.
+            if let Some((loan, redrawn)) = unpaid.replace((loan, redrawn)) {
+                allowance.pay(&loan, &[redrawn], 1.0);
+            }
         }
         let granted = AT_FIRST.difference * AHEAD + EACH_FRAME.difference * f64::from(frames);
         assert!(sum <= granted && sum > 0.5 * granted, "{sum} of {granted}");
@@ -184,7 +205,22 @@ mod tests {
         let mut allowance = Allowance::new();
         let mut all = Redrawn::default();
         (0..100).for_each(|_| all.count(50.0));
-        allowance.pay(&still, &[all], 1.0);
-        assert!(allowance.least_error(&still) > 50.0);
+        let loan = allowance.lend(&still);
+        allowance.pay(&loan, &[all], 1.0);
+        assert!(allowance.lend(&still).least_error > 50.0);
+    }
+
+    #[test]
+    fn what_was_not_used_comes_back_at_once() {
+        let mut still = Still::none();
+        (0..100).for_each(|k| still.count_wrong(1, if k < 20 { 50.0 } else { 3.0 }));
+        let mut allowance = Allowance::new();
+        let first = allowance.lend(&still);
+        let meanwhile = allowance.lend(&still);
+        allowance.pay(&first, &[], 0.0);
+        allowance.pay(&meanwhile, &[], 0.0);
+        let later = allowance.lend(&still);
+        assert!(meanwhile.least_error > first.least_error);
+        assert_eq!(later.least_error, first.least_error);
     }
 }

@@ -117,7 +117,7 @@ impl<W: Write> Encoder<W> {
         Ok(Self { settings, timeline, pushed: 0, written: 0, duration_cs: 0, stage: Stage::Empty(writer) })
     }
 
-    /// Adds the next frame.
+    /// Adds the next frame, and writes the one before it.
     ///
     /// # Errors
     ///
@@ -147,11 +147,10 @@ impl<W: Write> Encoder<W> {
             Stage::Running(running) => running,
             Stage::Failed => return Err(self.failed_before()),
         };
-        let block = running.quantiser.quantise(frame, delay_cs);
-        write(&mut running.file, block).map_err(|source| Error::Write { frame: self.written + 1, source })?;
+        if let Some(block) = running.quantiser.push(frame, delay_cs) {
+            self.write(&mut running.file, block)?;
+        }
         self.stage = Stage::Running(running);
-        self.written += 1;
-        self.duration_cs += u64::from(delay_cs);
         Ok(())
     }
 
@@ -161,11 +160,15 @@ impl<W: Write> Encoder<W> {
     ///
     /// [`Error::NoFrames`], [`Error::Write`].
     pub fn finish(mut self) -> Result<Summary, Error> {
-        let Running { size, file, .. } = match std::mem::replace(&mut self.stage, Stage::Failed) {
-            Stage::Empty(_) => return Err(Error::NoFrames),
-            Stage::Running(running) => *running,
-            Stage::Failed => return Err(self.failed_before()),
-        };
+        let Running { size, mut file, mut quantiser } =
+            match std::mem::replace(&mut self.stage, Stage::Failed) {
+                Stage::Empty(_) => return Err(Error::NoFrames),
+                Stage::Running(running) => *running,
+                Stage::Failed => return Err(self.failed_before()),
+            };
+        if let Some(block) = quantiser.finish() {
+            self.write(&mut file, block)?;
+        }
         let end = || {
             let mut counting = file.into_inner().map_err(into_io)?;
             counting.inner.flush()?;
@@ -174,6 +177,14 @@ impl<W: Write> Encoder<W> {
         let Self { pushed, written, duration_cs, .. } = self;
         let bytes = end().map_err(|source| Error::Write { frame: written, source })?;
         Ok(Summary { frames: written, dropped: pushed - written, size, duration_cs, bytes })
+    }
+
+    fn write(&mut self, file: &mut gif::Encoder<Counting<W>>, block: Block) -> Result<(), Error> {
+        let delay_cs = block.delay_cs;
+        write(file, block).map_err(|source| Error::Write { frame: self.written + 1, source })?;
+        self.written += 1;
+        self.duration_cs += u64::from(delay_cs);
+        Ok(())
     }
 
     fn failed_before(&self) -> Error {

@@ -8,14 +8,14 @@ use crate::stripe;
 pub(crate) struct FewColours {
     pub(crate) colours: Vec<[u8; 3]>,
     /// Number + 1 of a colour where its hash puts it, 0 where there is none.
-    slots: [u16; SLOTS],
+    slots: Box<[u16; SLOTS]>,
 }
 
 const SLOTS: usize = 1024;
 
 impl FewColours {
     fn new() -> Self {
-        Self { colours: Vec::with_capacity(256), slots: [0; SLOTS] }
+        Self { colours: Vec::with_capacity(256), slots: Box::new([0; SLOTS]) }
     }
 
     /// The number of a colour, or the slot to put it in.

@@ -7,7 +7,8 @@
 //!
 //! - Every frame is there, in order, for its time: also one that equals its predecessor. Only above 50 frames a second
 //!   are frames dropped, and the [`Summary`] says how many.
-//! - Memory does not grow with the number of frames: one frame, its predecessor, what a viewer sees, and a block.
+//! - Memory does not grow with the number of frames: two of them, what a viewer sees, and a block. [`Encoder::push`]
+//!   writes the frame before the one that it takes.
 //! - The bytes depend on frames and settings alone, not on threads or time. Work is spread over the rayon pool that
 //!   [`Encoder::push`] is called in, by fork and join only: a pool of one thread is enough, inside or outside.
 //! - A frame with at most 256 colours is kept exactly.
@@ -34,6 +35,7 @@ mod encoder;
 mod exact;
 mod histogram;
 mod ink;
+mod look;
 mod lzw;
 mod palette;
 mod quantise;

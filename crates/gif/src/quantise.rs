@@ -1,285 +1,205 @@
 //! A frame and what a viewer sees before it, to the block that turns the one into the other.
 //!
-//! Tiles whose pixels are seen about as well as they could be drawn are left alone, and so are pixels that are as in the
-//! frame before, unless they are seen wrong and the [allowance](crate::allowance) has room. For the others a palette is
-//! made, and each colour has its [ink](crate::ink); the [stripes](crate::stripe) choose the indices.
+//! Two frames are worked on at once: while one is drawn, the next is prepared. To [look](crate::look) at it is the step
+//! between them; then a palette is made of the colours that need drawing, and each colour has its [ink](crate::ink),
+//! while the [stripes](crate::stripe) choose the indices of the frame before.
 
 use image::RgbImage;
-use rayon::prelude::*;
 
-use crate::allowance::{Allowance, Still};
+use crate::allowance::{Allowance, Loan, Redrawn};
 use crate::block::{Area, Block};
-use crate::colour::{self, Near};
-use crate::exact;
+use crate::exact::{self, FewColours};
 use crate::histogram::{Histogram, MOST_BINS};
 use crate::ink::{self, Ink};
+use crate::look::{Before, Need, Needs};
 use crate::palette::Palette;
-use crate::stripe::{self, Inks, Need, Row, Stripe};
+use crate::stripe::{self, Inks, Row, Stripe};
 
 /// Parts of a frame whose colours are counted side by side.
 const PARTS: usize = 2;
-/// Width and height of what is drawn or left as a whole: single pixels drawn among others that are left cost as much
-/// as if all were drawn.
-const TILE: usize = 8;
-/// [Level error](colour::level_error) beyond that of a drawn pixel, in the mean of a tile, up to which the tile is left.
-const TOLERATED: f32 = 12.0;
-/// The level error of a pixel above which its tile is drawn in any case: almost three levels.
-const GLARING: f32 = 50.0;
-/// The level error up to which a pixel that changes may be left in a tile that is drawn.
-const SEEN_RIGHT: f32 = 2.0;
-/// The squared error (see [`colour`]) above which a pixel that stays asks for a better colour.
-const SEEN_WRONG: f32 = 2.0;
 
 /// Turns frames into blocks, one after the other.
 #[derive(Debug)]
 pub(crate) struct Quantiser {
-    last: Option<Last>,
-    histograms: Vec<Histogram>,
-    needs: Vec<Need>,
-    /// Of the pixels of each tile that stay and are seen wrong.
-    tile_errors: Vec<f32>,
+    waiting: Option<Waiting>,
+    /// What a viewer sees after the last block.
+    seen: RgbImage,
     allowance: Allowance,
-    /// Mean level error of what the last palette drew.
+    /// Used for each frame anew.
+    parts: Vec<Histogram>,
+    spare: Option<(Needs, Histogram)>,
+    /// Mean level error of what the last palette draws.
     drawn_error: f32,
 }
 
+/// A frame that is ready to be drawn.
 #[derive(Debug)]
-struct Last {
-    /// The frame before.
+struct Waiting {
     frame: RgbImage,
-    /// What a viewer sees of it.
-    seen: RgbImage,
+    delay_cs: u16,
+    /// Whether there is none before it.
+    first: bool,
+    needs: Needs,
+    histogram: Histogram,
+    plan: Plan,
+}
+
+/// How a frame is to be drawn.
+#[derive(Debug)]
+enum Plan {
+    /// Without loss.
+    Exactly(FewColours),
+    With(Paint),
+}
+
+#[derive(Debug)]
+struct Paint {
+    /// `None` for the first frame.
+    loan: Option<Loan>,
+    /// The part of the frame that is drawn because it changed.
+    changed: f64,
+    /// `None` if nothing is to be drawn.
+    area: Option<Area>,
+    palette: Palette,
+    of_bins: Vec<Ink>,
+    /// Mean level error of what is drawn.
+    error: f32,
 }
 
 impl Quantiser {
     pub(crate) fn new() -> Self {
-        let histograms = (0..PARTS).map(|_| Histogram::new(MOST_BINS)).collect();
         Self {
-            last: None,
-            histograms,
-            needs: Vec::new(),
-            tile_errors: Vec::new(),
+            waiting: None,
+            seen: RgbImage::default(),
             allowance: Allowance::new(),
+            parts: (1..PARTS).map(|_| Histogram::new(MOST_BINS)).collect(),
+            spare: None,
             drawn_error: 0.0,
         }
     }
 
-    /// The block that shows `frame` after all those given before.
-    pub(crate) fn quantise(&mut self, frame: RgbImage, delay_cs: u16) -> Block {
-        let width = frame.width() as usize;
-        let pixels = frame.as_raw().as_chunks::<3>().0;
-        let (before, mut seen) = match self.last.take() {
-            Some(Last { frame, seen }) => (Some(frame), seen),
-            None => (None, RgbImage::new(frame.width(), frame.height())),
-        };
-        let canvas = seen.as_chunks_mut::<3>().0;
-        let block = match exact::few_colours(pixels) {
-            Some(colours) => exact::draw(pixels, width, before.is_none(), canvas, colours, delay_cs),
-            None => {
-                let before = before.as_ref().map(|frame| frame.as_raw().as_chunks::<3>().0);
-                self.draw(pixels, before, canvas, width, delay_cs)
+    /// Takes the next frame, and gives the block of the one before it.
+    pub(crate) fn push(&mut self, frame: RgbImage, delay_cs: u16) -> Option<Block> {
+        let (width, pixels) = (frame.width() as usize, frame.as_raw().as_chunks::<3>().0);
+        let spare = self.spare.take();
+        let (mut needs, mut histogram) =
+            spare.unwrap_or_else(|| (Needs::default(), Histogram::new(MOST_BINS)));
+        let first = self.waiting.is_none();
+        if first {
+            self.seen = RgbImage::new(frame.width(), frame.height());
+        }
+        let few = exact::few_colours(pixels);
+        let mut loan = None;
+        match &self.waiting {
+            Some(before) if few.is_none() => {
+                let (frame, seen) = (before.frame.as_raw(), self.seen.as_raw());
+                let before = Before {
+                    frame: frame.as_chunks().0,
+                    needs: &before.needs.pixels,
+                    seen: seen.as_chunks().0,
+                    error: self.drawn_error,
+                };
+                let still = needs.look(pixels, width, before, self.allowance.is_left());
+                loan = Some(self.allowance.lend(&still));
             }
+            _ => needs.want_all(width, pixels.len()),
+        }
+        let before = self.waiting.take();
+        let (seen, allowance, parts) = (&mut self.seen, &mut self.allowance, &mut self.parts);
+        let draw = || before.map(|before| before.draw(seen, allowance));
+        let prepare = || match few {
+            Some(colours) => Plan::Exactly(colours),
+            None => Plan::With(Paint::new(pixels, width, loan, &mut needs, &mut histogram, parts)),
         };
-        self.last = Some(Last { frame, seen });
-        block
+        let (plan, drawn) = rayon::join(prepare, draw);
+        if let Plan::With(Paint { area: Some(_), error, .. }) = plan {
+            self.drawn_error = error;
+        }
+        self.waiting = Some(Waiting { frame, delay_cs, first, needs, histogram, plan });
+        drawn.map(|(block, spare)| {
+            self.spare = Some(spare);
+            block
+        })
     }
 
-    fn draw(
-        &mut self,
+    /// The block of the last frame.
+    pub(crate) fn finish(&mut self) -> Option<Block> {
+        self.waiting.take().map(|last| last.draw(&mut self.seen, &mut self.allowance).0)
+    }
+}
+
+impl Paint {
+    fn new(
         pixels: &[[u8; 3]],
-        before: Option<&[[u8; 3]]>,
-        seen: &mut [[u8; 3]],
         width: usize,
-        delay_cs: u16,
-    ) -> Block {
-        let still = self.look(pixels, before, seen, width);
-        let least = self.allowance.least_error(&still);
-        let changed = self.count(pixels, width, least);
-        let Some(area) = Area::around(&self.needs, width, |need| matches!(need, Need::Draw | Need::Better))
-        else {
-            return Block::nothing(delay_cs);
+        loan: Option<Loan>,
+        needs: &mut Needs,
+        histogram: &mut Histogram,
+        parts: &mut [Histogram],
+    ) -> Self {
+        let least = loan.as_ref().map_or(0.0, |loan| loan.least_error);
+        let changed = needs.count(pixels, least, histogram, parts) as f64 / pixels.len() as f64;
+        let area = Area::around(&needs.pixels, width, |need| matches!(need, Need::Draw | Need::Better));
+        let palette = match area {
+            Some(_) => Palette::of_bins(histogram, if loan.is_none() { 256 } else { 255 }),
+            None => Palette::new(Vec::new()),
         };
-        let histogram = &self.histograms[0];
-        let palette = Palette::of_bins(histogram, if before.is_some() { 255 } else { 256 });
         let of_bins = Ink::of_bins(histogram, &palette);
-        self.drawn_error = ink::mean_level_error(histogram, &of_bins, &palette);
-        let clear = before.map(|_| palette.colours.len() as u8);
-        let inks = Inks { palette: &palette, of_bins: &of_bins, histogram, clear };
-        let needs = &self.needs;
-        let (block, redrawn) =
-            stripe::in_stripes(area, width, seen, &palette.colours, clear, delay_cs, |writer, top, seen| {
-                let mut stripe = Stripe::new(inks, writer);
-                for (y, seen) in (top..).zip(seen.chunks_exact_mut(width)) {
-                    let part = y * width + area.left..y * width + area.right;
-                    stripe.draw(Row {
-                        columns: area.left..area.right,
-                        y,
-                        pixels: &pixels[part.clone()],
-                        above: &pixels
-                            [if y == 0 { part.clone() } else { part.start - width..part.end - width }],
-                        needs: &needs[part],
-                        seen: &mut seen[area.left..area.right],
-                    });
+        let error = ink::mean_level_error(histogram, &of_bins, &palette);
+        Self { loan, changed, area, palette, of_bins, error }
+    }
+}
+
+impl Waiting {
+    /// Gives the block, and what can be used again.
+    fn draw(self, seen: &mut RgbImage, allowance: &mut Allowance) -> (Block, (Needs, Histogram)) {
+        let Self { frame, delay_cs, first, needs, histogram, plan } = self;
+        let (width, pixels) = (frame.width() as usize, frame.as_raw().as_chunks::<3>().0);
+        let seen = seen.as_chunks_mut::<3>().0;
+        let block = match plan {
+            Plan::Exactly(colours) => exact::draw(pixels, width, first, seen, colours, delay_cs),
+            Plan::With(paint) => {
+                let clear = (!first).then_some(paint.palette.colours.len() as u8);
+                let inks =
+                    Inks { palette: &paint.palette, of_bins: &paint.of_bins, histogram: &histogram, clear };
+                let (block, redrawn) = match paint.area {
+                    None => (Block::nothing(delay_cs), Vec::new()),
+                    Some(area) => draw(pixels, width, area, &needs.pixels, seen, inks, delay_cs),
+                };
+                if let Some(loan) = &paint.loan {
+                    allowance.pay(loan, &redrawn, paint.changed);
                 }
-                stripe.redrawn()
+                block
+            }
+        };
+        (block, (needs, histogram))
+    }
+}
+
+fn draw(
+    pixels: &[[u8; 3]],
+    width: usize,
+    area: Area,
+    needs: &[Need],
+    seen: &mut [[u8; 3]],
+    inks: Inks<'_>,
+    delay_cs: u16,
+) -> (Block, Vec<Redrawn>) {
+    let colours = &inks.palette.colours;
+    stripe::in_stripes(area, width, seen, colours, inks.clear, delay_cs, |writer, top, seen| {
+        let mut stripe = Stripe::new(inks, writer);
+        for (y, seen) in (top..).zip(seen.chunks_exact_mut(width)) {
+            let part = y * width + area.left..y * width + area.right;
+            let above = if y == 0 { part.clone() } else { part.start - width..part.end - width };
+            stripe.draw(Row {
+                columns: area.left..area.right,
+                y,
+                pixels: &pixels[part.clone()],
+                above: &pixels[above],
+                needs: &needs[part],
+                seen: &mut seen[area.left..area.right],
             });
-        self.allowance.pay(&still, &redrawn, changed as f64 / pixels.len() as f64);
-        block
-    }
-
-    /// Notes what each pixel needs.
-    fn look(
-        &mut self,
-        pixels: &[[u8; 3]],
-        before: Option<&[[u8; 3]]>,
-        seen: &[[u8; 3]],
-        width: usize,
-    ) -> Still {
-        self.needs.resize(pixels.len(), Need::Draw);
-        let Some(before) = before else { return Still::none() };
-        let refining = self.allowance.is_left();
-        let drawn_error = self.drawn_error;
-        let near = Near::new();
-        self.tile_errors.resize(width.div_ceil(TILE) * pixels.len().div_ceil(TILE * width), 0.0);
-        let rows = self
-            .needs
-            .par_chunks_mut(TILE * width)
-            .zip(self.tile_errors.par_chunks_mut(width.div_ceil(TILE)));
-        let rows = rows.enumerate();
-        let looked = rows.fold(Still::none, |mut still, (number, (needs, errors))| {
-            let part = number * TILE * width..number * TILE * width + needs.len();
-            let [pixels, before, seen] = [pixels, before, seen].map(|frame| &frame[part.clone()]);
-            if !refining && pixels == before {
-                needs.fill(Need::Nothing);
-                still.count(needs.len());
-                return still;
-            }
-            for left in (0..width).step_by(TILE) {
-                let columns = left..(left + TILE).min(width);
-                let mut tile = Tile::new(refining.then_some(near), drawn_error);
-                for y in 0..needs.len() / width {
-                    let row = y * width + columns.start..y * width + columns.end;
-                    let frames = [pixels, before, seen].map(|frame| &frame[row.clone()]);
-                    tile.look(frames, &mut needs[row], &mut still);
-                }
-                still.count_wrong(tile.wrong, tile.wrong_error());
-                errors[left / TILE] = tile.wrong_error();
-                if tile.may_be_left() {
-                    for y in 0..needs.len() / width {
-                        for need in &mut needs[y * width + columns.start..y * width + columns.end] {
-                            if matches!(need, Need::Draw | Need::Free) {
-                                *need = Need::Nothing;
-                            }
-                        }
-                    }
-                }
-            }
-            still
-        });
-        looked.reduce(Still::none, Still::join)
-    }
-
-    /// Counts the colours that are to be drawn, those of still pixels only from an error of their tile on. Gives the number of pixels
-    /// that are to be drawn because they changed.
-    fn count(&mut self, pixels: &[[u8; 3]], width: usize, least: f32) -> u64 {
-        let part = pixels.len().div_ceil(PARTS);
-        let (columns, tile_errors) = (width.div_ceil(TILE), &self.tile_errors);
-        let parts = self.histograms.par_iter_mut().zip(self.needs.par_chunks_mut(part)).enumerate();
-        let changed = parts.map(|(number, (histogram, needs))| {
-            histogram.clear();
-            let mut changed = 0;
-            let (mut last, mut run) = ([0; 3], 0);
-            for (at, need) in (number * part..).zip(needs) {
-                match need {
-                    Need::Nothing | Need::Free => continue,
-                    Need::Better if tile_errors[at / width / TILE * columns + at % width / TILE] < least => {
-                        *need = Need::Nothing;
-                        continue;
-                    }
-                    Need::Better => (),
-                    Need::Draw => changed += 1,
-                }
-                if pixels[at] != last {
-                    histogram.add(last, run);
-                    (last, run) = (pixels[at], 0);
-                }
-                run += 1;
-            }
-            histogram.add(last, run);
-            changed
-        });
-        let changed = changed.sum();
-        if let [all, others @ ..] = &mut self.histograms[..] {
-            // Small frames have fewer parts.
-            for other in &others[..pixels.len().div_ceil(part) - 1] {
-                all.absorb(other);
-            }
-            all.sort();
         }
-        changed
-    }
-}
-
-/// What is known of a tile's pixels.
-#[derive(Debug)]
-struct Tile {
-    /// Given where pixels that stay may be drawn better.
-    refine: Option<Near>,
-    drawn_error: f32,
-    pixels: usize,
-    /// Level error beyond that of a drawn pixel, of all that changed, and the largest level error of one.
-    excess: f32,
-    worst: f32,
-    /// Pixels that stay and are seen wrong, and their errors.
-    wrong: u64,
-    sum_wrong: f32,
-}
-
-impl Tile {
-    fn new(refine: Option<Near>, drawn_error: f32) -> Self {
-        Self { refine, drawn_error, pixels: 0, excess: 0.0, worst: 0.0, wrong: 0, sum_wrong: 0.0 }
-    }
-
-    /// Notes what the pixels of a row need: `frames` are the frame, that before it and what is seen.
-    fn look(&mut self, frames: [&[[u8; 3]]; 3], needs: &mut [Need], still: &mut Still) {
-        let [pixels, before, seen] = frames;
-        self.pixels += pixels.len();
-        if self.refine.is_none() && pixels == before {
-            needs.fill(Need::Nothing);
-            still.count(needs.len());
-            return;
-        }
-        for (((&now, &before), &seen), need) in pixels.iter().zip(before).zip(seen).zip(needs) {
-            *need = if now == before {
-                let error =
-                    if now == seen { 0.0 } else { self.refine.map_or(0.0, |near| near.error(now, seen)) };
-                if error > SEEN_WRONG {
-                    self.wrong += 1;
-                    self.sum_wrong += error;
-                    Need::Better
-                } else {
-                    still.count(1);
-                    Need::Nothing
-                }
-            } else {
-                let error = colour::level_error(now, seen) as f32;
-                self.excess += (error - self.drawn_error).max(0.0);
-                self.worst = self.worst.max(error);
-                match error {
-                    0.0 => Need::Nothing,
-                    error if error > SEEN_RIGHT => Need::Draw,
-                    _ => Need::Free,
-                }
-            };
-        }
-    }
-
-    /// The mean error of pixels that stay and are seen wrong.
-    fn wrong_error(&self) -> f32 {
-        self.sum_wrong / self.wrong.max(1) as f32
-    }
-
-    fn may_be_left(&self) -> bool {
-        self.excess <= TOLERATED * self.pixels as f32 && self.worst <= GLARING
-    }
+        stripe.redrawn()
+    })
 }

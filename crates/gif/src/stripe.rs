@@ -13,6 +13,7 @@ use crate::block::{self, Area, Block};
 use crate::colour::{self, Near};
 use crate::histogram::Histogram;
 use crate::ink::{Dye, Ink};
+use crate::look::Need;
 use crate::lzw::{Part, Writer};
 use crate::palette::Palette;
 
@@ -25,19 +26,6 @@ const SMOOTH: u32 = 24;
 const TRIED: usize = 8;
 /// Pixels of a stripe, at most. Fewer cost size: each stripe begins with an empty book.
 const STRIPE: usize = 160_000;
-
-/// What a pixel asks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Need {
-    /// To be left alone.
-    Nothing,
-    /// Nothing, but may be drawn if that is no worse.
-    Free,
-    /// It stays as it was but is seen wrong: to be drawn if that is much better.
-    Better,
-    /// To be drawn.
-    Draw,
-}
 
 /// What a frame is drawn with.
 #[derive(Debug, Clone, Copy)]
