@@ -170,6 +170,55 @@ fn the_five_scenes_are_as_in_double_precision_at_any_size() {
 }
 
 #[test]
+fn surfaces_that_single_precision_cannot_tell_apart_are_drawn_in_double() {
+    const NOTE: &str = "-1 -1 {z} 1 -1 {z} 0 1 {z}";
+    const SLANT: &str = "-1 -1 {x} 1 -1 {z} 0 1 {y}";
+    let red = "0.5 0 0  0 0 0";
+    let (near, far) = (Precision::F64, Precision::F32);
+    let chosen = |objects: &str| {
+        let view = "Screen 320 240\nCamera 0 0 5  0 0 -1  0 1 0  1  -0.4 -0.3  0.4 0.3\n";
+        let script = format!("{view}{objects}\nIlight 0.8 0.8 0.8  1 -1 -0.5\nTrace\n");
+        let script = parse("near.txt", script.as_bytes(), &Limits::default()).script.unwrap();
+        rayfold_tracer::precision(&script.frame(0).unwrap())
+    };
+    let at = |shape: &str, x: f64, y: f64, z: f64| {
+        let place = |name: &str, value: f64| (name.to_owned(), format!("{value:?}"));
+        [place("{x}", x), place("{y}", y), place("{z}", z)]
+            .iter()
+            .fold(shape.to_owned(), |text, (name, value)| text.replace(name, value))
+    };
+    for (gap, expected) in [(1e-7, near), (1e-5, far), (0.0, far)] {
+        let green = "0 0.5 0  0 0 0";
+        let pairs = [
+            ("in a plane of the axes", at(NOTE, 0.0, 0.0, 0.0), at(NOTE, 0.0, 0.0, gap)),
+            ("slanted", at(SLANT, 0.1, 0.4, 0.2), at(SLANT, 0.1 + gap, 0.4 + gap, 0.2 + gap)),
+        ];
+        for (name, one, other) in pairs {
+            let objects = format!("Triangle {one} {red}\nTriangle {other} {green}");
+            assert_eq!(chosen(&objects), expected, "{name}, {gap} apart");
+            let objects = format!("Triangle {one} {red}\nTriangle {other} {red}");
+            assert_eq!(chosen(&objects), far, "{name}, {gap} apart, of one colour");
+            // The same among many, found down a tree.
+            let balls: String = (0..100).map(|k| format!("Sphere 0.01 {k} 3 -9 {red}\n")).collect();
+            let objects = format!("Triangle {one} {red}\n{balls}Triangle {other} {green}");
+            assert_eq!(chosen(&objects), expected, "{name}, {gap} apart, among many");
+        }
+        let objects = format!("Sphere 1  0 0 0 {red}\nSphere {:?}  0 0 0 {green}", 1.0 + gap);
+        assert_eq!(chosen(&objects), expected, "spheres, {gap} apart");
+    }
+    for (height, expected) in [(1e-5, near), (1e-2, far)] {
+        let objects =
+            format!("Box -2 -2 -1  2 2 0 {red}\nTriangle -1 -1 {height:?}  1 -1 0  0 1 0  0 0.5 0  0 0 0");
+        assert_eq!(chosen(&objects), expected, "on a box, one corner raised by {height}");
+    }
+    // Neighbours that share an edge, or lie apart in one plane, are not in each other's way.
+    for other in ["1 -1 0  3 1 0  0 1 1e-7", "2 -1 1e-7  4 -1 1e-7  3 1 1e-7"] {
+        let objects = format!("Triangle -1 -1 0  1 -1 0  0 1 0 {red}\nTriangle {other} 0 0.5 0  0 0 0");
+        assert_eq!(chosen(&objects), far, "{other}");
+    }
+}
+
+#[test]
 fn tiles_trees_and_threads_cannot_be_seen() {
     for scene in Dice::new("tiles").scenes() {
         for precision in [Precision::F32, Precision::F64] {

@@ -33,6 +33,7 @@ const KINDS: &[Kind] = &[
     ("objects of all scales", of_all_scales),
     ("faces in one plane", coplanar),
     ("faces almost in one plane", almost_coplanar),
+    ("slanted faces and spheres almost in one place", almost_coincident),
     ("an eye within objects", from_within),
     ("mirrors face to face", mirrors),
     ("needles", needles),
@@ -277,6 +278,26 @@ fn almost_coplanar(rng: &mut Rng) -> Result<Scene> {
     let mut objects = stack(rng, gap)?;
     if rng.bool() {
         objects.push(sphere(rng, 1.0, DVec3::new(0.0, 1.5, -1.0))?);
+    }
+    let eye = DVec3::new(within(rng, -2.0, 2.0), within(rng, -2.0, 4.0), 6.0);
+    picture(rng, objects, eye, DVec3::ZERO)
+}
+
+fn almost_coincident(rng: &mut Rng) -> Result<Scene> {
+    let gap = power(rng, -12.0, -2.0);
+    let normal = direction(rng);
+    let (u, v) = normal.any_orthonormal_pair();
+    let mut objects = Vec::new();
+    for layer in 0..rng.usize(2..12) {
+        let corner = |rng: &mut Rng| within(rng, -2.0, 2.0) * u + within(rng, -2.0, 2.0) * v;
+        let vertices = [corner(rng), corner(rng), corner(rng)].map(|p| p + gap * layer as f64 * normal);
+        objects.push(triangle(rng, vertices)?);
+    }
+    let (center, radius) = (point(rng, 1.0), within(rng, 0.3, 1.0));
+    for layer in 0..rng.usize(1..4) {
+        let surface = matte(rng)?;
+        let center = center + direction(rng) * gap * rng.f64();
+        objects.push(Object::Sphere(Sphere::new(radius + gap * layer as f64, center, surface)?));
     }
     let eye = DVec3::new(within(rng, -2.0, 2.0), within(rng, -2.0, 4.0), 6.0);
     picture(rng, objects, eye, DVec3::ZERO)

@@ -8,6 +8,7 @@ use glam::DVec3;
 use rayfold_scene::model::unit;
 use rayfold_scene::{Camera, Light, Object, Scene, Screen};
 
+use super::tree::{Branches, group};
 use crate::RenderError;
 use crate::parallel::map;
 use crate::reference::power;
@@ -60,7 +61,10 @@ pub(super) struct Sun {
 #[derive(Clone, Debug)]
 pub(super) struct Geometry {
     pub(super) view: View,
+    /// In the order of the script, or in that of `branches`.
     pub(super) solids: Vec<Solid>,
+    /// How a tree groups the solids, if they are to be found down a tree.
+    pub(super) branches: Option<Branches>,
     pub(super) suns: Vec<Sun>,
     /// A length of the scene times this is a length in here.
     pub(super) scale: f64,
@@ -69,9 +73,11 @@ pub(super) struct Geometry {
 }
 
 impl Geometry {
+    /// `tree` says whether to look for objects down a tree, if it matters.
+    ///
     /// # Errors
     /// When the scene is so large that its size is not a number.
-    pub(super) fn new(scene: &Scene) -> Result<Self, RenderError> {
+    pub(super) fn new(scene: &Scene, tree: Option<bool>) -> Result<Self, RenderError> {
         let center = match &scene.camera {
             Camera::Pinhole(pinhole) => pinhole.eye(),
             Camera::Orthographic => middle(scene.screen),
@@ -91,11 +97,13 @@ impl Geometry {
         let shapes = map(&scene.objects, |object| shape(object, place, center, scale));
         let solids = shapes.into_iter().enumerate();
         let solids = solids.filter_map(|(order, shape)| Some(Solid { shape: shape?, order: order as u32 }));
+        let mut solids: Vec<Solid> = solids.collect();
+        let branches = group(&mut solids, tree);
         let suns = scene
             .lights
             .iter()
             .map(|Light::Directional(light)| Sun { towards: -unit(light.direction()), color: light.color() });
-        Ok(Self { view, solids: solids.collect(), suns: suns.collect(), scale, center })
+        Ok(Self { view, solids, branches, suns: suns.collect(), scale, center })
     }
 }
 

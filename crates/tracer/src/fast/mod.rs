@@ -44,6 +44,7 @@ macro_rules! on {
     };
 }
 
+mod coincidence;
 mod features;
 mod geometry;
 mod intersect;
@@ -84,7 +85,7 @@ const MANY: usize = 512;
 /// # Errors
 /// Those of [`crate::render`].
 pub(crate) fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    let geometry = if has_kernels(options) { Geometry::new(scene).ok() } else { None };
+    let geometry = if has_kernels(options) { Geometry::new(scene, options.tree).ok() } else { None };
     let precision = |geometry| Some((geometry, precision::resolve(options, geometry, scene)?));
     match geometry.as_ref().and_then(precision) {
         Some((geometry, Precision::F64)) => draw(scene, geometry, options, f64::draw),
@@ -107,7 +108,7 @@ fn has_kernels(_: &RenderOptions) -> bool {
 
 /// The precision that [`Precision::Auto`] stands for in a scene.
 pub(crate) fn precision(scene: &Scene) -> Precision {
-    let geometry = Geometry::new(scene).ok();
+    let geometry = Geometry::new(scene, None).ok();
     let resolved =
         geometry.and_then(|geometry| precision::resolve(&RenderOptions::default(), &geometry, scene));
     resolved.unwrap_or(Precision::F64)
@@ -119,7 +120,7 @@ pub(crate) fn precision(scene: &Scene) -> Precision {
 /// Those of [`crate::render`].
 #[cfg(feature = "accuracy")]
 pub(crate) fn render_naive(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    draw(scene, &Geometry::new(scene)?, options, naive::draw)
+    draw(scene, &Geometry::new(scene, options.tree)?, options, naive::draw)
 }
 
 /// Draws a scene, bands of tiles side by side, each by `kernel`.

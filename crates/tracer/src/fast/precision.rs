@@ -3,12 +3,12 @@
 //! Bounds on the rounding errors of the `f32` kernels are set against the size of a pixel and of a level: what moves an
 //! outline or a shadow by less than a small part of a pixel, or a colour by less than a part of a level, cannot be seen.
 //! Triangles and boxes need no bound of their own: their errors are relative to the distance of what is seen, as those
-//! of the directions are. Planes along the axes are met in their order, whatever the rounding, if they are not so near
-//! to each other that they become one. What the kernels' numbers cannot hold at all is known here too.
+//! of the directions are. Which of two surfaces comes first is known, whatever the rounding, if they do not
+//! all but [coincide](super::coincidence). What the kernels' numbers cannot hold at all is known here too.
 
-use glam::DVec3;
 use rayfold_scene::{Light, Scene};
 
+use super::coincidence::surfaces_blur;
 use super::geometry::{Geometry, Shape, Solid, View};
 use super::real::Real;
 use crate::{Precision, RenderOptions};
@@ -33,12 +33,6 @@ const BRIGHTEST: f64 = 1e3;
 
 /// The size of a pixel, as an angle, for an image of one.
 const ONE_PIXEL: f64 = 1e-3;
-
-/// Planes nearer than this to each other, in roundoffs of their coordinates, may be met at one distance.
-const ONE_PLANE: f64 = 6.0;
-
-/// Planes nearer than this to each other, relative to their coordinates, are meant to be one.
-const MEANT: f64 = 1e-13;
 
 /// What a kind of number can hold.
 struct Range {
@@ -166,52 +160,5 @@ fn is_enough(geometry: &Geometry, scene: &Scene, colors: &Colors) -> bool {
         // Seen in parallel, what is far away is as large as what is near.
         _ => !parallel || POINT * roundoff * solid.magnitude() <= INVISIBLE * pixel,
     };
-    let mirrored = scene.objects.iter().any(|object| object.material().mirror() != DVec3::ZERO);
-    geometry.solids.iter().all(is_fine) && !(0..3).any(|axis| planes_blur(geometry, axis, mirrored))
-}
-
-/// Whether faces that lie one behind the other along an axis, all but in one plane, become one in single precision.
-fn planes_blur(geometry: &Geometry, axis: usize, mirrored: bool) -> bool {
-    let mut faces: Vec<(f64, DVec3, DVec3)> = Vec::new();
-    for solid in &geometry.solids {
-        let (min, max) = solid.bounds();
-        match solid.shape {
-            Shape::Sphere { .. } => continue,
-            Shape::Cuboid { .. } if min[axis] != max[axis] => faces.push((max[axis], min, max)),
-            Shape::Triangle { .. } if min[axis] != max[axis] => continue,
-            Shape::Cuboid { .. } | Shape::Triangle { .. } => {}
-        }
-        faces.push((min[axis], min, max));
-    }
-    faces.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    let across = [(axis + 1) % 3, (axis + 2) % 3];
-    // The box of the faces that are taken for one plane, and of those before it that are too near.
-    let (mut here, mut near) = (None, None);
-    let mut at = f64::NEG_INFINITY;
-    for (coordinate, min, max) in faces {
-        let apart = coordinate - at;
-        // A mirrored ray starts anywhere in the scene.
-        let largest = if mirrored { 1.0 } else { coordinate.abs() };
-        if apart > MEANT * coordinate.abs() {
-            near =
-                if apart <= ONE_PLANE * <f32 as Real>::ROUNDOFF * largest { join(near, here) } else { None };
-            here = None;
-        }
-        at = coordinate;
-        here = join(here, Some((min, max)));
-        let overlap =
-            |(low, high): (DVec3, DVec3)| across.iter().all(|&k| min[k] <= high[k] && low[k] <= max[k]);
-        if near.is_some_and(overlap) {
-            return true;
-        }
-    }
-    false
-}
-
-/// The box of two boxes.
-fn join(a: Option<(DVec3, DVec3)>, b: Option<(DVec3, DVec3)>) -> Option<(DVec3, DVec3)> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some((a.0.min(b.0), a.1.max(b.1))),
-        _ => a.or(b),
-    }
+    geometry.solids.iter().all(is_fine) && !surfaces_blur(geometry, scene, pixel)
 }

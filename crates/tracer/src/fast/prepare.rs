@@ -10,7 +10,7 @@ use super::features::Needs;
 use super::geometry::{Geometry, Shape, Solid, Sun, View};
 use super::lists::{LISTED, LightBuffer, Outline, Sights};
 use super::real::Real;
-use super::tree::{self, Tree};
+use super::tree::{Tree, stump};
 use crate::RenderError;
 use crate::parallel::map;
 
@@ -167,8 +167,7 @@ pub(super) struct Prepared<E> {
 pub(super) const MASKED: usize = 64;
 
 impl<E: Real> Prepared<E> {
-    /// `tree` says whether to look for objects down a tree, if it matters; what masks cannot hold then is one leaf.
-    /// Tiles have the size of `side`.
+    /// What masks cannot hold is one leaf if `tree` says that there shall be none. Tiles have the size of `side`.
     ///
     /// # Errors
     /// When the build leaves out what the scene has.
@@ -179,24 +178,19 @@ impl<E: Real> Prepared<E> {
         side: (u32, u32),
     ) -> Result<Self, RenderError> {
         let size = (scene.screen.width(), scene.screen.height());
-        let count = geometry.solids.len();
-        let search = match tree {
-            _ if count == 0 => Search::Masks,
-            None if (MASKED + 1..=LISTED).contains(&count) => Search::Lists,
-            None | Some(false) if count <= MASKED => Search::Masks,
+        let stump = (geometry.branches.is_some() && tree == Some(false)).then(|| stump(&geometry.solids));
+        let (solids, branches) = match &stump {
+            Some((solids, branches)) => (solids, Some(branches)),
+            None => (&geometry.solids, geometry.branches.as_ref()),
+        };
+        let count = solids.len();
+        let search = match (branches, tree) {
+            (None, _) => Search::Masks,
+            (Some(_), None) if count <= LISTED => Search::Lists,
             _ => Search::Tree,
         };
         let mut needs = Needs { tree: search != Search::Masks, ..Needs::default() };
         needs.check()?;
-        let planted = match search {
-            Search::Masks => None,
-            _ if tree == Some(false) => Some(tree::stump(&geometry.solids)),
-            _ => Some(tree::plant(&geometry.solids)),
-        };
-        let (solids, branches) = match &planted {
-            Some((solids, branches)) => (solids, Some(branches)),
-            None => (&geometry.solids, None),
-        };
         let mut entries: Vec<Entry<E>> = map(&scene.objects, entry);
         let mut sorted = Sorted { balls: vec![], boxes: vec![], facets: vec![] };
         for solid in solids {

@@ -40,7 +40,7 @@ pub fn nearest_hits(
     rays: &[(DVec3, DVec3)],
     options: &RenderOptions,
 ) -> Result<Vec<Option<Found>>, RenderError> {
-    let geometry = Geometry::new(scene)?;
+    let geometry = Geometry::new(scene, options.tree)?;
     match resolve(options, &geometry, scene) {
         Some(Precision::F64) => probe::<f64>(scene, &geometry, rays, options, |batch, level, out| {
             on!(level, simd => batch.nearest(simd, out));

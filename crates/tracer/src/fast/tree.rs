@@ -12,7 +12,7 @@ use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
 
 use super::geometry::Solid;
-use super::prepare::{BOUNDS, Entry, Kind};
+use super::prepare::{BOUNDS, Entry, Kind, MASKED};
 use super::real::Real;
 use crate::parallel::map;
 
@@ -62,9 +62,42 @@ pub(super) struct Tree<E> {
     pub(super) nodes: Vec<Node<E>>,
 }
 
-/// A tree's shape: for each node its first child or solid and its number of solids, which are of one kind; children come
-/// after their parents.
-pub(super) struct Branches(Vec<(u32, u32)>);
+/// A tree's shape: children come after their parents.
+#[derive(Clone, Debug)]
+pub(super) struct Branches(Vec<Branch>);
+
+/// A node before it is rounded.
+#[derive(Clone, Copy, Debug)]
+struct Branch {
+    /// The first child, next to which stands the second, or the first solid.
+    first: u32,
+    /// Solids, which are of one kind; 0 for a node with children.
+    count: u32,
+    /// The box around all that is in it.
+    bounds: (DVec3, DVec3),
+}
+
+/// What is in a branch.
+pub(super) enum Part {
+    Solids(Range<usize>),
+    Children(usize, usize),
+}
+
+impl Branches {
+    pub(super) fn part(&self, at: usize) -> Part {
+        let Branch { first, count, .. } = self.0[at];
+        let first = first as usize;
+        if count == 0 {
+            Part::Children(first, first + 1)
+        } else {
+            Part::Solids(first..first + count as usize)
+        }
+    }
+
+    pub(super) fn bounds(&self, at: usize) -> (DVec3, DVec3) {
+        self.0[at].bounds
+    }
+}
 
 struct Bounds(Aabb);
 
@@ -74,17 +107,24 @@ impl Boundable for Bounds {
     }
 }
 
+/// Brings solids into the order of a tree's leaves and gives its shape, if there are more than masks can hold or `tree`
+/// asks for it.
+pub(super) fn group(solids: &mut Vec<Solid>, tree: Option<bool>) -> Option<Branches> {
+    let is_needed = solids.len() > MASKED || tree == Some(true) && !solids.is_empty();
+    is_needed.then(|| plant(solids))
+}
+
 /// All solids in one leaf a kind.
 pub(super) fn stump(solids: &[Solid]) -> (Vec<Solid>, Branches) {
     let mut solids = solids.to_vec();
     solids.sort_by_key(Solid::kind_rank);
-    let mut branches = vec![(0, 0)];
+    let mut branches = vec![Branch::EMPTY];
     leaf(&mut branches, 0, &solids, 0);
-    (solids, Branches(branches))
+    let branches = Branches::bounded(branches, &solids);
+    (solids, branches)
 }
 
-/// Groups the solids: in the order of the leaves, and their shape. There is at least one.
-pub(super) fn plant(solids: &[Solid]) -> (Vec<Solid>, Branches) {
+fn plant(solids: &mut Vec<Solid>) -> Branches {
     let bounds = map(solids, |solid| {
         let (min, max) = solid.bounds();
         Bounds(Aabb { min: Vec3A::from(min.as_vec3()), max: Vec3A::from(max.as_vec3()) })
@@ -93,7 +133,7 @@ pub(super) fn plant(solids: &[Solid]) -> (Vec<Solid>, Branches) {
     let grown = build_bvh2(&bounds, params, &mut Default::default());
     // Depth first, children side by side and after their parent.
     let mut branches = Vec::with_capacity(grown.nodes.len());
-    branches.push((0, 0));
+    branches.push(Branch::EMPTY);
     let mut order: Vec<Solid> = Vec::with_capacity(solids.len());
     let mut pending = vec![(0usize, 0usize)];
     while let Some((node, at)) = pending.pop() {
@@ -101,8 +141,8 @@ pub(super) fn plant(solids: &[Solid]) -> (Vec<Solid>, Branches) {
         let first = node.first_index as usize;
         if node.prim_count == 0 {
             let children = branches.len();
-            branches[at] = (children as u32, 0);
-            branches.extend([(0, 0); 2]);
+            branches[at].first = children as u32;
+            branches.extend([Branch::EMPTY; 2]);
             pending.extend([(first + 1, children + 1), (first, children)]);
         } else {
             let from = order.len();
@@ -112,47 +152,59 @@ pub(super) fn plant(solids: &[Solid]) -> (Vec<Solid>, Branches) {
             leaf(&mut branches, at, &order[from..], from);
         }
     }
-    (order, Branches(branches))
+    *solids = order;
+    Branches::bounded(branches, solids)
+}
+
+impl Branch {
+    const EMPTY: Self = Self { first: 0, count: 0, bounds: (DVec3::INFINITY, DVec3::NEG_INFINITY) };
+}
+
+impl Branches {
+    /// With the boxes worked out.
+    fn bounded(mut branches: Vec<Branch>, solids: &[Solid]) -> Self {
+        for at in (0..branches.len()).rev() {
+            let Branch { first, count, bounds } = branches[at];
+            let first = first as usize;
+            branches[at].bounds = if count == 0 {
+                [branches[first].bounds, branches[first + 1].bounds].into_iter().fold(bounds, join)
+            } else {
+                solids[first..first + count as usize].iter().map(Solid::bounds).fold(bounds, join)
+            };
+        }
+        Self(branches)
+    }
 }
 
 /// Makes a leaf of solids that are sorted by kind, and more where they are of several; `from` is the place of the first.
-fn leaf(branches: &mut Vec<(u32, u32)>, at: usize, solids: &[Solid], from: usize) {
+fn leaf(branches: &mut Vec<Branch>, at: usize, solids: &[Solid], from: usize) {
     let kind = solids[0].kind_rank();
     let alike = solids.partition_point(|solid| solid.kind_rank() == kind);
     if alike == solids.len() {
-        branches[at] = (from as u32, alike as u32);
+        branches[at] = Branch { first: from as u32, count: alike as u32, ..Branch::EMPTY };
         return;
     }
     let children = branches.len();
-    branches[at] = (children as u32, 0);
-    branches.extend([(from as u32, alike as u32), (0, 0)]);
+    branches[at].first = children as u32;
+    let these = Branch { first: from as u32, count: alike as u32, ..Branch::EMPTY };
+    branches.extend([these, Branch::EMPTY]);
     leaf(branches, children + 1, &solids[alike..], from + alike);
 }
 
 impl<E: Real> Tree<E> {
-    /// `solids` are in the order of [`plant`].
+    /// `solids` are in the order of [`group`].
     pub(super) fn new(branches: &Branches, solids: &[Solid], entries: &[Entry<E>]) -> Self {
         let branches = &branches.0;
-        let mut bounds = vec![(DVec3::INFINITY, DVec3::NEG_INFINITY); branches.len()];
-        for (at, &(first, count)) in branches.iter().enumerate().rev() {
-            let first = first as usize;
-            let within = if count == 0 {
-                [bounds[first], bounds[first + 1]].into_iter().fold(bounds[at], join)
-            } else {
-                solids[first..first + count as usize].iter().map(Solid::bounds).fold(bounds[at], join)
-            };
-            bounds[at] = within;
-        }
         // A ray's origin is rounded relative to the scene's size, which is 1, wherever the node lies.
         let slack = BOUNDS * E::ROUNDOFF;
         // Children change places so that the first comes first along the axis on which they lie farthest apart.
         let mut place: Vec<u32> = (0..branches.len() as u32).collect();
         let mut axes = vec![0; branches.len()];
-        for (at, &(first, count)) in branches.iter().enumerate() {
+        for (at, &Branch { first, count, .. }) in branches.iter().enumerate() {
             if count == 0 {
                 let first = first as usize;
-                let middle = |(min, max): (DVec3, DVec3)| min + max;
-                let apart = middle(bounds[first + 1]) - middle(bounds[first]);
+                let middle = |branch: Branch| branch.bounds.0 + branch.bounds.1;
+                let apart = middle(branches[first + 1]) - middle(branches[first]);
                 axes[at] = apart.abs().max_position() as u32;
                 if apart[axes[at] as usize] < 0.0 {
                     place.swap(first, first + 1);
@@ -160,7 +212,7 @@ impl<E: Real> Tree<E> {
             }
         }
         let node = |&from: &u32| {
-            let ((first, count), (min, max)) = (branches[from as usize], bounds[from as usize]);
+            let Branch { first, count, bounds: (min, max) } = branches[from as usize];
             let (first, content) = if count == 0 {
                 (first, axes[from as usize])
             } else {
