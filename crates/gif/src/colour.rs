@@ -90,6 +90,12 @@ pub(crate) fn level_error(a: [u8; 3], b: [u8; 3]) -> u32 {
     2 * square(r) + 3 * square(g) + square(b)
 }
 
+/// Squared distance of levels: never more than that of points.
+pub(crate) fn levels_apart(a: [u8; 3], b: [u8; 3]) -> u32 {
+    let square = |k: usize| u32::from(a[k].abs_diff(b[k])) * u32::from(a[k].abs_diff(b[k]));
+    square(0) + square(1) + square(2)
+}
+
 /// For each of 16 x 16 x 16 cells of sRGB the quadratic form that [`error`] is there: the coefficients of r², g², b²,
 /// rg, rb and gb.
 static METRIC: LazyLock<Box<[[f32; 6]; 4096]>> = LazyLock::new(|| {
@@ -153,11 +159,15 @@ fn interpolate(table: &[f32], at: f32) -> f32 {
 /// The `n`th root of a number in (0, 1], by Newton's method.
 fn root(x: f64, n: i32) -> f64 {
     let mut y = 1.0;
-    for _ in 0..64 {
+    loop {
         let power = (1..n).fold(1.0, |product, _| product * y);
-        y -= (y - x / power) / f64::from(n);
+        // From above it comes nearer with each step, until it cannot.
+        let next = y - (y - x / power) / f64::from(n);
+        if next >= y {
+            return y;
+        }
+        y = next;
     }
-    y
 }
 
 #[cfg(test)]

@@ -10,11 +10,16 @@ const EMPTY: u32 = u32::MAX;
 /// Counts of colours.
 #[derive(Debug)]
 pub(crate) struct Histogram {
+    /// Of the low bits of a level, how many do not tell bins apart.
     shift: u32,
+    /// A power of two of them, at least twice as many as there are bins.
     slots: Vec<Slot>,
     most_bins: usize,
     bins: Vec<Bin>,
 }
+
+/// Few enough to be at hand.
+const FIRST_SLOTS: usize = 1 << 12;
 
 #[derive(Debug, Clone, Copy)]
 struct Slot {
@@ -22,42 +27,55 @@ struct Slot {
     bin: u32,
 }
 
+const FREE: Slot = Slot { key: EMPTY, bin: 0 };
+
 /// A colour, or a cell of neighbouring ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Bin {
+    /// The darkest colour of the cell.
     key: u32,
     /// Pixels counted.
     pub(crate) count: u32,
-    /// Sum of their levels.
-    pub(crate) sum: [u64; 3],
+    /// By how much their levels are above those of `key`, all together.
+    above: [u64; 3],
 }
 
 impl Bin {
     /// Mean levels.
     pub(crate) fn mean(&self) -> [f32; 3] {
-        let mean = |k: usize| (self.sum[k] as f64 / f64::from(self.count)) as f32;
-        [mean(0), mean(1), mean(2)]
+        let [_, r, g, b] = self.key.to_be_bytes();
+        let mean = |level: u8, above: u64| match above {
+            0 => f32::from(level),
+            above => (f64::from(level) + above as f64 / f64::from(self.count)) as f32,
+        };
+        [mean(r, self.above[0]), mean(g, self.above[1]), mean(b, self.above[2])]
+    }
+
+    /// The same with another cell's key.
+    fn moved(mut self, key: u32) -> Self {
+        let (from, to) = (self.key.to_be_bytes(), key.to_be_bytes());
+        for k in 0..3 {
+            self.above[k] += u64::from(from[k + 1] - to[k + 1]) * u64::from(self.count);
+        }
+        self.key = key;
+        self
     }
 }
 
 impl Histogram {
     /// For at most 2^16 bins, a power of two.
     pub(crate) fn new(most_bins: usize) -> Self {
-        Self {
-            shift: 0,
-            slots: vec![Slot { key: EMPTY, bin: 0 }; most_bins * 2],
-            most_bins,
-            bins: Vec::new(),
-        }
+        Self { shift: 0, slots: vec![FREE; FIRST_SLOTS], most_bins, bins: Vec::new() }
     }
 
     pub(crate) fn clear(&mut self) {
         self.shift = 0;
-        self.slots.fill(Slot { key: EMPTY, bin: 0 });
+        self.slots.truncate(FIRST_SLOTS);
+        self.slots.fill(FREE);
         self.bins.clear();
     }
 
-    /// The bins in order of first appearance, or of colour after [`sort`](Self::sort).
+    /// The bins in order of first appearance.
     pub(crate) fn bins(&self) -> &[Bin] {
         &self.bins
     }
@@ -73,43 +91,41 @@ impl Histogram {
             self.coarsen();
         }
         for bin in &other.bins {
-            let [_, r, g, b] = bin.key.to_be_bytes();
-            self.merge(Bin { key: self.key([r, g, b]), ..*bin });
-        }
-    }
-
-    /// Puts the bins in order of colour, so that the order of counting leaves no trace.
-    pub(crate) fn sort(&mut self) {
-        self.bins.sort_unstable_by_key(|bin| bin.key);
-        for number in 0..self.bins.len() {
-            let at = self.slot(self.bins[number].key);
-            self.slots[at].bin = number as u32;
+            self.merge(*bin);
         }
     }
 
     /// Counts pixels of one colour.
+    #[inline]
     pub(crate) fn add(&mut self, rgb: [u8; 3], count: u32) {
-        if count == 0 {
-            return;
+        let key = key(rgb);
+        if self.shift == 0 {
+            let slot = self.slots[self.slot(key)];
+            if slot.key == key {
+                self.bins[slot.bin as usize].count += count;
+                return;
+            }
         }
-        let sum = |k: usize| u64::from(rgb[k]) * u64::from(count);
-        self.merge(Bin { key: self.key(rgb), count, sum: [sum(0), sum(1), sum(2)] });
+        if count > 0 {
+            self.merge(Bin { key, count, above: [0; 3] });
+        }
     }
 
     /// The bin that holds a colour that was counted.
+    #[inline]
     pub(crate) fn find(&self, rgb: [u8; 3]) -> Option<usize> {
-        let key = self.key(rgb);
+        let key = self.cell(key(rgb));
         let slot = self.slots[self.slot(key)];
         (slot.key == key).then_some(slot.bin as usize)
     }
 
-    fn key(&self, rgb: [u8; 3]) -> u32 {
-        let key = u32::from(rgb[0]) << 16 | u32::from(rgb[1]) << 8 | u32::from(rgb[2]);
+    /// The key of the cell of a key.
+    fn cell(&self, key: u32) -> u32 {
         let low = 0xFF >> (8 - self.shift);
         key & !(low << 16 | low << 8 | low)
     }
 
-    /// Where a key is, or would be put.
+    /// Where a cell's key is, or would be put.
     fn slot(&self, key: u32) -> usize {
         let last = self.slots.len() - 1;
         let mut at = (key.wrapping_mul(0x9E37_79B1) >> 15) as usize & last;
@@ -120,11 +136,12 @@ impl Histogram {
     }
 
     fn merge(&mut self, bin: Bin) {
+        let bin = bin.moved(self.cell(bin.key));
         let at = self.slot(bin.key);
         if self.slots[at].key == bin.key {
             let known = &mut self.bins[self.slots[at].bin as usize];
             known.count += bin.count;
-            for (sum, more) in known.sum.iter_mut().zip(bin.sum) {
+            for (sum, more) in known.above.iter_mut().zip(bin.above) {
                 *sum += more;
             }
             return;
@@ -133,17 +150,32 @@ impl Histogram {
         self.bins.push(bin);
         if self.bins.len() > self.most_bins {
             self.coarsen();
+        } else if self.bins.len() * 2 > self.slots.len() {
+            self.enlarge();
         }
     }
 
     fn coarsen(&mut self) {
         self.shift += 1;
-        self.slots.fill(Slot { key: EMPTY, bin: 0 });
+        self.slots.fill(FREE);
         for bin in std::mem::take(&mut self.bins) {
-            let [_, r, g, b] = bin.key.to_be_bytes();
-            self.merge(Bin { key: self.key([r, g, b]), ..bin });
+            self.merge(bin);
         }
     }
+
+    fn enlarge(&mut self) {
+        let slots = (self.slots.len() * 4).min(self.most_bins * 2);
+        self.slots.fill(FREE);
+        self.slots.resize(slots, FREE);
+        for (number, bin) in (0..).zip(&self.bins) {
+            let at = self.slot(bin.key);
+            self.slots[at] = Slot { key: bin.key, bin: number };
+        }
+    }
+}
+
+fn key([r, g, b]: [u8; 3]) -> u32 {
+    u32::from_be_bytes([0, r, g, b])
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::colour::{self, DIMENSIONS, Point};
 use crate::histogram::Histogram;
-use crate::palette::Palette;
+use crate::palette::{Guesses, Palette};
 
 /// The squared error of the nearest colour at which that of a neighbourhood's mean counts as much as that of its pixels.
 /// Smaller values dither more, and cost size and PSNR.
@@ -43,16 +43,13 @@ pub(crate) struct Dye {
 
 impl Ink {
     /// One for each bin.
-    pub(crate) fn of_bins(histogram: &Histogram, palette: &Palette) -> Vec<Self> {
-        let chunks = histogram.bins().par_chunks(1024).flat_map_iter(|bins| {
-            let mut guess = 0;
-            bins.iter().map(move |bin| {
-                let ink = Self::of(&colour::point(bin.mean()), palette, guess);
-                guess = ink.plain.index;
-                ink
-            })
+    pub(crate) fn of_bins(histogram: &Histogram, palette: &Palette, guesses: &Guesses) -> Vec<Self> {
+        let bins = histogram.bins().par_iter().enumerate().with_min_len(512);
+        let inks = bins.map(|(number, bin)| {
+            let mean = bin.mean();
+            Self::of(&colour::point(mean), palette, guesses.of(number, mean))
         });
-        chunks.collect()
+        inks.collect()
     }
 
     fn of(target: &Point, palette: &Palette, guess: u8) -> Self {
@@ -70,7 +67,12 @@ impl Ink {
         for at in 0..2 {
             let mut least = pixels + blend * off;
             let mut found = None;
+            // `part` is above 0 only for colours nearer to `m`; in the first round that is `plain`.
+            let reach = if at == 0 { 4.0 * (1.0 + blend) * (1.0 + blend) * pixels } else { f32::INFINITY };
             for neighbour in palette.neighbours(index).iter().take(TRIED) {
+                if neighbour.apart > reach {
+                    break;
+                }
                 let c = &palette.points[usize::from(neighbour.index)];
                 let (mut along, mut apart, mut error) = (0.0, 0.0, 0.0);
                 for k in 0..DIMENSIONS {

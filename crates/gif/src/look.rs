@@ -130,7 +130,6 @@ impl Needs {
         for other in &others[..pixels.len().div_ceil(part) - 1] {
             all.absorb(other);
         }
-        all.sort();
         changed
     }
 }

@@ -17,6 +17,8 @@ struct Book {
     /// Parent, index and code of each string in 12, 8 and 12 bits, where the hash of the first two puts it.
     slots: Box<[u32; SLOTS]>,
     next: u16,
+    /// Whether a string has longer ones.
+    grown: Box<[bool; MOST_CODES as usize]>,
 }
 
 impl Book {
@@ -51,8 +53,17 @@ pub(crate) struct Writer {
 impl Writer {
     /// For indices below 2^`bits`, of 2 to 8 bits.
     pub(crate) fn new(bits: u8) -> Self {
-        let book = Book { slots: Box::new([EMPTY; SLOTS]), next: (1 << bits) + 2 };
+        let book = Book {
+            slots: Box::new([EMPTY; SLOTS]),
+            next: (1 << bits) + 2,
+            grown: Box::new([false; MOST_CODES as usize]),
+        };
         Self { bits, book, string: None, width: u32::from(bits) + 1, codes: Codes::default() }
+    }
+
+    /// Whether the string goes on with any index.
+    pub(crate) fn is_known(&self) -> bool {
+        self.string.is_none_or(|string| self.book.grown[usize::from(string)])
     }
 
     /// Whether the string goes on with this index: it costs nothing yet.
@@ -84,10 +95,12 @@ impl Writer {
                 self.end_string(string);
                 self.book.slots[at] =
                     u32::from(string) << 20 | u32::from(index) << 12 | u32::from(self.book.next);
+                self.book.grown[usize::from(string)] = true;
                 self.book.next += 1;
                 if self.book.next == MOST_CODES {
                     self.codes.put(1 << self.bits, self.width);
                     self.book.slots.fill(EMPTY);
+                    self.book.grown.fill(false);
                     self.book.next = (1 << self.bits) + 2;
                     self.width = u32::from(self.bits) + 1;
                 }

@@ -36,50 +36,80 @@ impl From<&Bin> for Sample {
 pub(crate) struct Palette {
     pub(crate) colours: Vec<[u8; 3]>,
     pub(crate) points: Vec<Point>,
-    neighbours: Vec<Vec<Neighbour>>,
+    neighbours: Neighbours,
 }
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Neighbour {
     pub(crate) index: u8,
-    /// Squared distance.
+    /// Squared distance, rounded down a little.
     pub(crate) apart: f32,
+}
+
+/// About where each bin of a histogram is in a palette.
+#[derive(Debug)]
+pub(crate) struct Guesses {
+    /// The bins, if they are not those of the histogram itself.
+    coarse: Option<Histogram>,
+    indices: Vec<u8>,
+}
+
+impl Guesses {
+    /// An index near a bin, by its number and its mean colour.
+    pub(crate) fn of(&self, number: usize, mean: [f32; 3]) -> u8 {
+        let at = match &self.coarse {
+            None => Some(number),
+            Some(coarse) => coarse.find(mean.map(|level| level as u8)),
+        };
+        at.and_then(|at| self.indices.get(at)).copied().unwrap_or(0)
+    }
 }
 
 impl Palette {
     /// Colours as they are, at most 256.
     pub(crate) fn new(colours: Vec<[u8; 3]>) -> Self {
         let points = colours.iter().map(|&rgb| colour::point_of(rgb)).collect::<Vec<_>>();
-        let neighbours = neighbours(&points);
+        let neighbours = Neighbours::of(&points);
         Self { colours, points, neighbours }
     }
 
     /// The colours of the bins if there are at most `size`, else so many that fit them well.
-    pub(crate) fn of_bins(histogram: &Histogram, size: usize) -> Self {
-        let samples = histogram.bins().iter().map(Sample::from).collect::<Vec<_>>();
-        if histogram.is_exact() && samples.len() <= size {
-            let mut colours = samples.iter().map(|s| s.rgb.map(|level| level as u8)).collect::<Vec<_>>();
+    pub(crate) fn of_bins(histogram: &Histogram, size: usize) -> (Self, Guesses) {
+        let bins = histogram.bins();
+        let samples = |bins: &[Bin]| bins.iter().map(Sample::from).collect::<Vec<_>>();
+        if histogram.is_exact() && bins.len() <= size {
+            let mut colours = bins.iter().map(|bin| bin.mean().map(|level| level as u8)).collect::<Vec<_>>();
             colours.sort_unstable();
-            return Self::new(colours);
+            return (Self::new(colours), Guesses { coarse: None, indices: Vec::new() });
         }
-        if samples.len() <= SAMPLES {
-            return Self::of(&samples, size);
+        if bins.len() <= SAMPLES {
+            let (palette, indices) = Self::of(&samples(bins), size);
+            return (palette, Guesses { coarse: None, indices });
         }
         let mut coarse = Histogram::new(SAMPLES);
         coarse.absorb(histogram);
-        Self::of(&coarse.bins().iter().map(Sample::from).collect::<Vec<_>>(), size)
+        let (palette, indices) = Self::of(&samples(coarse.bins()), size);
+        (palette, Guesses { coarse: Some(coarse), indices })
     }
 
-    /// At most `size` colours that fit the samples well, of which there is at least one.
-    fn of(samples: &[Sample], size: usize) -> Self {
+    /// At most `size` colours that fit the samples well, of which there is at least one; and for each sample one near it.
+    fn of(samples: &[Sample], size: usize) -> (Self, Vec<u8>) {
         let mut owners = split(samples, size);
+        let mut near: Option<Neighbours> = None;
         for _ in 0..ROUNDS {
             let centres = centres(samples, &mut owners);
             let points = centres.iter().map(|&rgb| colour::point(rgb)).collect::<Vec<_>>();
-            let near = neighbours(&points);
+            let near = match &mut near {
+                // Centres move little: which of them are near hardly changes.
+                Some(near) if near.points == points.len() => {
+                    near.measure(&points);
+                    near
+                }
+                near => near.insert(Neighbours::of(&points)),
+            };
             let mut moved = 0;
             for (sample, owner) in samples.iter().zip(&mut owners) {
-                let nearest = nearest(&points, &near, &sample.point, *owner);
+                let nearest = near.nearest(&points, &sample.point, *owner);
                 moved += usize::from(nearest != *owner);
                 *owner = nearest;
             }
@@ -87,87 +117,116 @@ impl Palette {
                 break;
             }
         }
-        let mut colours = centres(samples, &mut owners)
-            .into_iter()
-            .map(|rgb| rgb.map(|level| level.round() as u8))
-            .collect::<Vec<_>>();
+        let centres =
+            centres(samples, &mut owners).into_iter().map(|rgb| rgb.map(|level| level.round() as u8));
+        let centres = centres.collect::<Vec<_>>();
+        let mut colours = centres.clone();
         colours.sort_unstable();
         colours.dedup();
-        Self::new(colours)
+        let places =
+            centres.iter().map(|rgb| colours.binary_search(rgb).unwrap_or(0) as u8).collect::<Vec<_>>();
+        let indices = owners.into_iter().map(|owner| places[usize::from(owner)]).collect();
+        (Self::new(colours), indices)
     }
 
     /// The nearest colour; `guess` is where to start looking.
     pub(crate) fn nearest(&self, point: &Point, guess: u8) -> u8 {
-        nearest(&self.points, &self.neighbours, point, guess)
+        self.neighbours.nearest(&self.points, point, guess)
     }
 
     /// The nearest others of a colour, nearest first.
     pub(crate) fn neighbours(&self, index: u8) -> &[Neighbour] {
-        &self.neighbours[usize::from(index)]
+        self.neighbours.at(index)
     }
 }
 
-fn neighbours(points: &[Point]) -> Vec<Vec<Neighbour>> {
-    // Coordinate by coordinate, and to the end: several distances are worked out at once.
-    let mut columns = [[0.0_f32; 256]; DIMENSIONS];
-    for (index, point) in points.iter().enumerate() {
-        for (column, &at) in columns.iter_mut().zip(point) {
-            column[index] = at;
-        }
-    }
-    let of = |own: usize| {
-        let mut apart = [0.0_f32; 256];
-        for (column, at) in columns.iter().zip(points[own]) {
-            for (sum, other) in apart.iter_mut().zip(column) {
-                *sum += (at - other) * (at - other);
-            }
-        }
-        apart[own] = f32::INFINITY;
-        let mut near: Vec<Neighbour> = Vec::with_capacity(NEIGHBOURS + 1);
-        let mut farthest = f32::INFINITY;
-        for (index, &apart) in apart[..points.len()].iter().enumerate() {
-            if apart >= farthest || index == own {
-                continue;
-            }
-            let at = near.iter().rposition(|n| n.apart <= apart).map_or(0, |before| before + 1);
-            near.insert(at, Neighbour { index: index as u8, apart });
-            if near.len() >= NEIGHBOURS {
-                near.truncate(NEIGHBOURS);
-                farthest = near[NEIGHBOURS - 1].apart;
-            }
-        }
-        near
-    };
-    (0..points.len()).map(of).collect()
+/// For each point its nearest others, nearest first.
+#[derive(Debug, Clone)]
+struct Neighbours {
+    points: usize,
+    /// Of each point.
+    each: usize,
+    all: Vec<Neighbour>,
 }
 
-fn nearest(points: &[Point], neighbours: &[Vec<Neighbour>], point: &Point, guess: u8) -> u8 {
-    let from_guess = colour::error(point, &points[usize::from(guess)]);
-    let (mut best, mut least) = (guess, from_guess);
-    let near = &neighbours[usize::from(guess)];
-    for neighbour in near {
-        // Triangle inequality: a colour twice as far from the guess as the point is cannot be nearer to it.
-        if neighbour.apart >= 4.0 * from_guess {
+impl Neighbours {
+    fn of(points: &[Point]) -> Self {
+        // Coordinate by coordinate, and to the end: several distances are worked out at once.
+        let mut columns = [[0.0_f32; 256]; DIMENSIONS];
+        for (index, point) in points.iter().enumerate() {
+            for (column, &at) in columns.iter_mut().zip(point) {
+                column[index] = at;
+            }
+        }
+        let each = points.len().saturating_sub(1).min(NEIGHBOURS);
+        let mut all = Vec::with_capacity(each * points.len());
+        for (own, point) in points.iter().enumerate() {
+            let mut apart = [0.0_f32; 256];
+            for (column, at) in columns.iter().zip(point) {
+                for (sum, other) in apart.iter_mut().zip(column) {
+                    *sum += (at - other) * (at - other);
+                }
+            }
+            // Numbers above 0 have the order of their bits, the last of which are the index instead.
+            let mut near = [u32::MAX; NEIGHBOURS];
+            for (index, apart) in (0..).zip(&apart[..points.len()]) {
+                let key = apart.to_bits() & !0xFF | index;
+                if key < near[NEIGHBOURS - 1] && index != own as u32 {
+                    let mut at = NEIGHBOURS - 1;
+                    while at > 0 && near[at - 1] > key {
+                        near[at] = near[at - 1];
+                        at -= 1;
+                    }
+                    near[at] = key;
+                }
+            }
+            let neighbour = |&key: &u32| Neighbour { index: key as u8, apart: f32::from_bits(key & !0xFF) };
+            all.extend(near[..each].iter().map(neighbour));
+        }
+        Self { points: points.len(), each, all }
+    }
+
+    fn at(&self, index: u8) -> &[Neighbour] {
+        &self.all[usize::from(index) * self.each..][..self.each]
+    }
+
+    /// Works out distances anew, and puts the neighbours in order again.
+    fn measure(&mut self, points: &[Point]) {
+        for (own, near) in points.iter().zip(self.all.chunks_exact_mut(self.each.max(1))) {
+            for neighbour in near.iter_mut() {
+                neighbour.apart = colour::error(own, &points[usize::from(neighbour.index)]);
+            }
+            near.sort_unstable_by(|a, b| a.apart.total_cmp(&b.apart).then(a.index.cmp(&b.index)));
+        }
+    }
+
+    fn nearest(&self, points: &[Point], point: &Point, guess: u8) -> u8 {
+        let from_guess = colour::error(point, &points[usize::from(guess)]);
+        let (mut best, mut least) = (guess, from_guess);
+        for neighbour in self.at(guess) {
+            // Triangle inequality: a colour twice as far from the guess as the point is cannot be nearer to it.
+            if neighbour.apart >= 4.0 * from_guess {
+                return best;
+            }
+            let error = colour::error(point, &points[usize::from(neighbour.index)]);
+            if error < least {
+                (best, least) = (neighbour.index, error);
+            }
+        }
+        if self.each + 1 == points.len() {
             return best;
         }
-        let error = colour::error(point, &points[usize::from(neighbour.index)]);
-        if error < least {
-            (best, least) = (neighbour.index, error);
+        if best != guess {
+            return self.nearest(points, point, best);
         }
-    }
-    if near.len() + 1 == points.len() {
-        return best;
-    }
-    if best != guess {
-        return nearest(points, neighbours, point, best);
-    }
-    for (index, other) in points.iter().enumerate() {
-        let error = colour::error(point, other);
-        if error < least {
-            (best, least) = (index as u8, error);
+        for (index, other) in points.iter().enumerate() {
+            let error = colour::error(point, other);
+            if error < least {
+                (best, least) = (index as u8, error);
+            }
         }
+        best
     }
-    best
 }
 
 /// Mean colours of the clusters; owners are renumbered so that no cluster is empty.
@@ -296,7 +355,7 @@ mod tests {
     #[test]
     fn few_colours_are_all_kept() {
         let colours = (0..200).map(|k| [k, k / 2, 255 - k]).collect::<Vec<_>>();
-        assert_eq!(Palette::of(&samples(colours.iter().copied()), 255).colours, colours);
+        assert_eq!(Palette::of(&samples(colours.iter().copied()), 255).0.colours, colours);
     }
 
     #[test]
@@ -305,7 +364,7 @@ mod tests {
             let [a, b, c, _] = k.wrapping_mul(2_654_435_761).to_be_bytes();
             [a, b, c]
         };
-        let palette = Palette::of(&samples((0..5_000).map(scatter)), 256);
+        let (palette, _) = Palette::of(&samples((0..5_000).map(scatter)), 256);
         assert_eq!(palette.colours.len(), 256);
         for k in 5_000..6_000 {
             let point = colour::point_of(scatter(k));

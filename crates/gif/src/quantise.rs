@@ -140,11 +140,8 @@ impl Paint {
         let least = loan.as_ref().map_or(0.0, |loan| loan.least_error);
         let changed = needs.count(pixels, least, histogram, parts) as f64 / pixels.len() as f64;
         let area = Area::around(&needs.pixels, width, |need| matches!(need, Need::Draw | Need::Better));
-        let palette = match area {
-            Some(_) => Palette::of_bins(histogram, if loan.is_none() { 256 } else { 255 }),
-            None => Palette::new(Vec::new()),
-        };
-        let of_bins = Ink::of_bins(histogram, &palette);
+        let (palette, guesses) = Palette::of_bins(histogram, if loan.is_none() { 256 } else { 255 });
+        let of_bins = Ink::of_bins(histogram, &palette, &guesses);
         let error = ink::mean_level_error(histogram, &of_bins, &palette);
         Self { loan, changed, area, palette, of_bins, error }
     }

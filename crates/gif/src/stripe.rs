@@ -155,8 +155,12 @@ impl<'a> Stripe<'a> {
     fn drawn(&mut self, now: [u8; 3], need: Need, seen: [u8; 3], ink: &Ink, best: Dye) -> u8 {
         let Dye { index: best, error: least } = best;
         if let Some(clear) = self.inks.clear {
-            let shown = self.near.error(now, seen);
             let lenience = if need == Need::Better { least } else { LENIENCE };
+            // Levels alone are part of the error, and often enough to say.
+            let shown = match colour::levels_apart(now, seen) as f32 {
+                levels if levels > least + lenience => levels,
+                _ => self.near.error(now, seen),
+            };
             if least >= shown || shown <= least + lenience && self.writer.extend(clear) {
                 if least >= shown {
                     self.writer.put(clear);
@@ -165,6 +169,10 @@ impl<'a> Stripe<'a> {
             }
         }
         if self.writer.extend(best) {
+            return best;
+        }
+        if !self.writer.is_known() {
+            self.writer.put(best);
             return best;
         }
         let mut found = (best, least + LENIENCE);
