@@ -8,6 +8,7 @@ use anyhow::Context;
 use image::{DynamicImage, ImageFormat, ImageReader, Rgb, RgbImage};
 use rayfold_gif::{Encoder, Error, Settings};
 
+use crate::ahead;
 use crate::console::Console;
 use crate::interrupt;
 use crate::outcome::{Outcome, Usage};
@@ -19,6 +20,9 @@ use crate::wording::number;
 
 /// Files at fault that are named, at most.
 const MOST_TOLD: usize = 20;
+
+/// Memory that images ahead of the encoder may take, in bytes: two of 1920 x 1080.
+const AHEAD: u64 = 14 << 20;
 
 /// Turn images into an animated GIF
 ///
@@ -59,26 +63,35 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let mut encoder =
         Encoder::new(&mut out, settings).map_err(|error| Usage(format!("--fps {}: {error}", args.fps)))?;
     let mut progress = Progress::start(console, "frames", args.frames.len() as u64);
-    let mut next = args.frames.first().map(|frame| read(frame));
-    for (frame, done) in args.frames.iter().zip(1..) {
+    let window = window(&args.frames)?;
+    let (mut frames, mut done) = (args.frames.iter(), 0);
+    let take = |image| {
         anyhow::ensure!(!interrupt::stopping(), "interrupted");
-        let image = next.take().context("an image for each frame")??;
-        let mut pushed = Ok(());
-        rayon::in_place_scope(|scope| {
-            scope.spawn(|_| pushed = encoder.push(image));
-            // Beside it, and all on this thread: memory that is given back is kept for the thread that asked for it, so
-            // images read by several would take up to half as much again.
-            next = args.frames.get(done).map(|frame| read(frame));
-        });
-        pushed.map_err(|error| explain(error, frame, path))?;
-        progress.set(console, done as u64);
-    }
+        let frame = frames.next().context("a file for each image")?;
+        encoder.push(image).map_err(|error| explain(error, frame, path))?;
+        done += 1;
+        progress.set(console, done);
+        Ok(())
+    };
+    // On a thread of the pool: it need not wait for another one to encode.
+    rayon::scope(|_| ahead::in_order(args.frames.iter(), window, |frame| read(frame), take))?;
     let summary = encoder.finish().map_err(|error| explain(error, path, path))?;
     let took = progress.finish();
     let failed = |source| OutputError::Io { path: path.clone(), source };
     out.into_inner().map_err(|error| failed(error.into_error()))?.finish(true)?;
     tell(path, &summary, args.fps, took, console);
     Ok(Outcome::Done)
+}
+
+/// How many images may be read before the encoder takes them.
+fn window(frames: &[PathBuf]) -> anyhow::Result<usize> {
+    let first = frames.first().context("at least one frame")?;
+    let dimensions = open(first)?.into_dimensions();
+    let (width, height) =
+        dimensions.map_err(|error| anyhow::anyhow!("cannot read {}: {error}", first.display()))?;
+    let most = rayon::current_num_threads() + 2;
+    let images = AHEAD / (3 * u64::from(width) * u64::from(height)).max(1);
+    Ok(usize::try_from(images).unwrap_or(most).clamp(1, most))
 }
 
 /// Names the file that is at fault.

@@ -6,6 +6,7 @@
 
 use std::process::ExitCode;
 
+mod ahead;
 mod app;
 mod check;
 mod cloud;

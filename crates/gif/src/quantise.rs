@@ -80,6 +80,11 @@ impl Quantiser {
 
     /// Takes the next frame, and gives the block of the one before it.
     pub(crate) fn push(&mut self, frame: RgbImage, delay_cs: u16) -> Option<Block> {
+        // All of it in the pool: each part by itself would have to get in.
+        rayon::scope(|_| self.step(frame, delay_cs))
+    }
+
+    fn step(&mut self, frame: RgbImage, delay_cs: u16) -> Option<Block> {
         let (width, pixels) = (frame.width() as usize, frame.as_raw().as_chunks::<3>().0);
         let spare = self.spare.take();
         let (mut needs, mut histogram) =
@@ -124,7 +129,8 @@ impl Quantiser {
 
     /// The block of the last frame.
     pub(crate) fn finish(&mut self) -> Option<Block> {
-        self.waiting.take().map(|last| last.draw(&mut self.seen, &mut self.allowance).0)
+        let last = self.waiting.take()?;
+        rayon::scope(|_| Some(last.draw(&mut self.seen, &mut self.allowance).0))
     }
 }
 

@@ -1,7 +1,7 @@
 //! `rayfold render`: scripts to an animation, to one image, or to many, on this machine.
 //!
 //! Everything is checked before the first frame is drawn, and nothing is written when a script has an error. Frames
-//! are drawn ahead of the encoder within a bound ([`ahead`]), so that memory does not grow with their number.
+//! are drawn ahead of the encoder within a bound ([`crate::ahead`]), so that memory does not grow with their number.
 
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
@@ -14,6 +14,7 @@ use rayfold_gif::{Encoder, Settings, Summary};
 use rayfold_scene::{AnimationSettings, Limits, Screen};
 use rayfold_tracer::{Precision, RenderOptions};
 
+use crate::ahead;
 use crate::console::Console;
 use crate::input::Input;
 use crate::interrupt;
@@ -24,7 +25,6 @@ use crate::progress::Progress;
 use crate::threads::Threads;
 use crate::wording::{Size, number};
 
-mod ahead;
 pub(crate) mod target;
 
 use target::{Format, Pattern, Target};

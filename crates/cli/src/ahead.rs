@@ -1,14 +1,20 @@
-//! Rendering ahead of whoever takes the frames in order.
+//! Making frames ahead of whoever takes them in order.
 //!
-//! Frames are drawn side by side on the rayon pool while the caller's thread takes the finished ones in order. How many
-//! may be drawn or waiting at once is bounded, so that memory does not grow with the number of frames, however slow the
-//! taker is.
+//! Frames are made side by side on the rayon pool while the caller's thread takes the finished ones in order; if that is
+//! one of the pool, it makes frames as well while it has none to take. How many may be made or waiting at once is
+//! bounded, so that memory does not grow with the number of frames, however slow the taker is.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, TryRecvError};
+use std::time::Duration;
+
+use rayon::Yield;
 
 use crate::interrupt;
+
+/// How long a thread of the pool sleeps when there is nothing to do: meanwhile others may bring work.
+const NAP: Duration = Duration::from_millis(1);
 
 /// Has `work` done on every item of `items`, at most `window` at once, and gives the results to `take` in order.
 ///
@@ -51,7 +57,7 @@ pub(crate) fn in_order<I: Send, T: Send>(
                 if started == taken {
                     return Ok(());
                 }
-                let (index, result) = receiver.recv()?;
+                let (index, result) = next(&receiver)?;
                 waiting.insert(index, result?);
             }
         };
@@ -61,6 +67,24 @@ pub(crate) fn in_order<I: Send, T: Send>(
         }
         result
     })
+}
+
+/// Waits for what is sent, and works meanwhile on what the pool has to do, if this is a thread of it.
+fn next<T>(receiver: &Receiver<T>) -> anyhow::Result<T> {
+    loop {
+        match receiver.try_recv() {
+            Err(TryRecvError::Empty) => {}
+            received => return Ok(received?),
+        }
+        match rayon::yield_now() {
+            None => return Ok(receiver.recv()?),
+            Some(Yield::Executed) => {}
+            Some(Yield::Idle) => match receiver.recv_timeout(NAP) {
+                Err(RecvTimeoutError::Timeout) => {}
+                received => return Ok(received?),
+            },
+        }
+    }
 }
 
 #[cfg(test)]
@@ -91,6 +115,21 @@ mod tests {
         .unwrap();
         assert_eq!(taken, (0..100).collect::<Vec<_>>());
         assert!(most.into_inner() <= 5);
+    }
+
+    #[test]
+    fn a_pool_of_one_thread_that_takes_as_well_is_enough() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let taken = pool.install(|| {
+            let mut taken = Vec::new();
+            let take = |n| {
+                taken.push(n);
+                Ok(())
+            };
+            in_order(0..20, 3, Ok, take).unwrap();
+            taken
+        });
+        assert_eq!(taken, (0..20).collect::<Vec<_>>());
     }
 
     #[test]
