@@ -80,7 +80,7 @@ pub fn nearest(objects: &[Object], origin: DVec3, direction: DVec3) -> Option<Hi
 }
 
 /// The scene with the eye at the origin: what is seen then has coordinates as small as it is near, wherever all of it
-/// lies. As it is, where it cannot be moved.
+/// lies. As it is, where it cannot be moved, or where rounding would take the eye through a sphere's surface.
 fn recentred(scene: &Scene) -> Cow<'_, Scene> {
     moved_to_eye(scene).map_or(Cow::Borrowed(scene), Cow::Owned)
 }
@@ -91,7 +91,9 @@ fn moved_to_eye(scene: &Scene) -> Option<Scene> {
     let mut moved = scene.clone();
     let objects = scene.objects.iter().map(|object| match object {
         Object::Sphere(s) => {
-            Sphere::new(s.radius(), place(s.center()), *s.material()).ok().map(Object::Sphere)
+            let placed = Sphere::new(s.radius(), place(s.center()), *s.material()).ok()?;
+            let side = |eye, sphere| power(eye, sphere, 1.0).partial_cmp(&0.0);
+            (side(p.eye(), s) == side(DVec3::ZERO, &placed)).then_some(Object::Sphere(placed))
         }
         Object::Cuboid(c) => Cuboid::new(c.corners().map(place), *c.material()).ok().map(Object::Cuboid),
         // Rounding would give it an area.
@@ -152,6 +154,7 @@ pub(crate) fn levels(color: DVec3) -> [u8; CHANNELS] {
 mod tests {
     use std::sync::atomic::AtomicBool;
 
+    use glam::DVec2;
     use rayfold_scene::{DirectionalLight, Material, Screen};
 
     use super::*;
@@ -202,6 +205,23 @@ mod tests {
         let mirror = |z: f64| sphere(1.0, z, material(1.0, 0.0, 1.0));
         let scene = one_pixel(vec![mirror(-2.0), mirror(2.0)], None);
         assert_eq!(color(&scene, 0, 0), DVec3::splat(6.0));
+    }
+
+    #[test]
+    fn an_eye_next_to_a_surface_stays_on_its_side() {
+        // 1e-16 and 8e-16 from the surface of a sphere whose centre cannot be told from the eye without rounding.
+        let eye = DVec3::new(-0.4922580368599684, -0.3291578856127372, -0.45973944677895595);
+        let ball = |radius: f64| {
+            let center = DVec3::new(eye.x, 5.269517229842112, eye.z);
+            Object::Sphere(Sphere::new(radius, center, material(0.5, 0.0, 0.0)).unwrap())
+        };
+        for (radius, inside) in [(5.598675115454849, true), (5.598675115454848, false)] {
+            let mut scene = one_pixel(vec![ball(radius)], None);
+            let half = DVec2::splat(0.1);
+            let away = Pinhole::new(eye, DVec3::NEG_Y, DVec3::Z, 1.0, -half, half).unwrap();
+            scene.camera = Camera::Pinhole(away);
+            assert_eq!(color(&scene, 0, 0) == DVec3::splat(0.5), inside, "{radius}");
+        }
     }
 
     #[test]
