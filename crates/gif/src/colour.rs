@@ -68,6 +68,11 @@ impl Near {
         Self(&METRIC)
     }
 
+    /// Works out beforehand what the first one needs.
+    pub(crate) fn prepare() {
+        LazyLock::force(&METRIC);
+    }
+
     pub(crate) fn error(self, a: [u8; 3], b: [u8; 3]) -> f32 {
         let metric =
             &self.0[usize::from(a[0] >> 4) << 8 | usize::from(a[1] >> 4) << 4 | usize::from(a[2] >> 4)];

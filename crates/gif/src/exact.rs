@@ -1,7 +1,9 @@
 //! Frames of at most 256 colours, which lose nothing.
 
+use rayon::prelude::*;
+
 use crate::block::{Area, Block};
-use crate::stripe;
+use crate::stripe::{self, Sheet};
 
 /// Colours, at most 256, and their numbers in order of appearance.
 #[derive(Debug)]
@@ -12,6 +14,8 @@ pub(crate) struct FewColours {
 }
 
 const SLOTS: usize = 1024;
+/// Parts of a frame that are looked at side by side.
+const PARTS: usize = 2;
 
 impl FewColours {
     fn new() -> Self {
@@ -64,22 +68,32 @@ pub(crate) fn draw(
     width: usize,
     first: bool,
     seen: &mut [[u8; 3]],
-    frame_colours: FewColours,
+    frame_colours: &FewColours,
     delay_cs: u16,
 ) -> Block {
-    let mut drawn = FewColours::new();
     let mut wrong = vec![false; pixels.len()];
-    let mut last = None;
-    for ((now, seen), wrong) in pixels.iter().zip(&*seen).zip(&mut wrong) {
-        *wrong = now != seen;
-        if *wrong && last != Some(now) {
-            last = Some(now);
-            // There is room: all are colours of the frame.
-            drawn.add(*now);
+    let part = pixels.len().div_ceil(PARTS);
+    let parts = wrong.par_chunks_mut(part).zip(pixels.par_chunks(part)).zip(seen.par_chunks(part));
+    let drawn = parts.map(|((wrong, pixels), seen)| {
+        let mut drawn = FewColours::new();
+        let mut last = None;
+        for ((now, seen), wrong) in pixels.iter().zip(seen).zip(wrong) {
+            *wrong = now != seen;
+            if *wrong && last != Some(now) {
+                last = Some(now);
+                // There is room: all are colours of the frame.
+                drawn.add(*now);
+            }
         }
+        drawn
+    });
+    let mut parts = drawn.collect::<Vec<_>>().into_iter();
+    let mut drawn = parts.next().unwrap_or_else(FewColours::new);
+    for rgb in parts.flat_map(|part| part.colours) {
+        drawn.add(rgb);
     }
     let (colours, clear) = match u8::try_from(drawn.colours.len()) {
-        Ok(clear) if !first => (drawn, Some(clear)),
+        Ok(clear) if !first => (&drawn, Some(clear)),
         _ => (frame_colours, None),
     };
     let area = match clear {
@@ -87,37 +101,31 @@ pub(crate) fn draw(
         None => Some(Area::whole(width, pixels.len())),
     };
     let Some(area) = area else { return Block::nothing(delay_cs) };
-    let (block, _) = stripe::in_stripes(
-        area,
-        width,
-        seen,
-        &colours.colours,
-        clear,
-        delay_cs,
-        |writer, first_row, seen| {
-            let mut last = ([0; 3], colours.find([0; 3]).ok());
-            for (y, seen) in (first_row..).zip(seen.chunks_exact_mut(width)) {
-                for x in area.left..area.right {
-                    let now = pixels[y * width + x];
-                    if last.0 != now {
-                        last = (now, colours.find(now).ok());
-                    }
-                    // What is seen right may be drawn or left, whichever LZW knows.
-                    let right = clear.filter(|_| now == seen[x]);
-                    let index = last.1;
-                    match (right, index) {
-                        (None, index) => writer.put(index.unwrap_or(0)),
-                        (Some(clear), Some(index)) => {
-                            if !writer.extend(clear) && !writer.extend(index) {
-                                writer.put(clear);
-                            }
-                        }
-                        (Some(clear), None) => writer.put(clear),
-                    }
-                    seen[x] = now;
+    let sheet =
+        Sheet { area, width, colours: &colours.colours, clear, delay_cs, meant: colours.colours.len() };
+    let (block, _) = stripe::in_stripes(sheet, seen, |writer, first_row, seen| {
+        let mut last = ([0; 3], colours.find([0; 3]).ok());
+        for (y, seen) in (first_row..).zip(seen.chunks_exact_mut(width)) {
+            for x in area.left..area.right {
+                let now = pixels[y * width + x];
+                if last.0 != now {
+                    last = (now, colours.find(now).ok());
                 }
+                // What is seen right may be drawn or left, whichever LZW knows.
+                let right = clear.filter(|_| now == seen[x]);
+                let index = last.1;
+                match (right, index) {
+                    (None, index) => writer.put(index.unwrap_or(0)),
+                    (Some(clear), Some(index)) => {
+                        if !writer.extend(clear) && !writer.extend(index) {
+                            writer.put(clear);
+                        }
+                    }
+                    (Some(clear), None) => writer.put(clear),
+                }
+                seen[x] = now;
             }
-        },
-    );
+        }
+    });
     block
 }

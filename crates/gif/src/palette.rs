@@ -6,6 +6,8 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
+use rayon::prelude::*;
+
 use crate::colour::{self, DIMENSIONS, Point};
 use crate::histogram::{Bin, Histogram};
 
@@ -76,7 +78,7 @@ impl Palette {
     /// The colours of the bins if there are at most `size`, else so many that fit them well.
     pub(crate) fn of_bins(histogram: &Histogram, size: usize) -> (Self, Guesses) {
         let bins = histogram.bins();
-        let samples = |bins: &[Bin]| bins.iter().map(Sample::from).collect::<Vec<_>>();
+        let samples = |bins: &[Bin]| bins.par_iter().with_min_len(1024).map(Sample::from).collect::<Vec<_>>();
         if histogram.is_exact() && bins.len() <= size {
             let mut colours = bins.iter().map(|bin| bin.mean().map(|level| level as u8)).collect::<Vec<_>>();
             colours.sort_unstable();
@@ -107,12 +109,13 @@ impl Palette {
                 }
                 near => near.insert(Neighbours::of(&points)),
             };
-            let mut moved = 0;
-            for (sample, owner) in samples.iter().zip(&mut owners) {
-                let nearest = near.nearest(&points, &sample.point, *owner);
-                moved += usize::from(nearest != *owner);
-                *owner = nearest;
-            }
+            let owned = samples.par_iter().zip(&mut owners).with_min_len(1024);
+            let moved = owned.map(|(sample, owner)| {
+                let before = *owner;
+                *owner = near.nearest(&points, &sample.point, before);
+                usize::from(*owner != before)
+            });
+            let moved = moved.sum::<usize>();
             if moved * 200 < samples.len() {
                 break;
             }
@@ -159,8 +162,7 @@ impl Neighbours {
             }
         }
         let each = points.len().saturating_sub(1).min(NEIGHBOURS);
-        let mut all = Vec::with_capacity(each * points.len());
-        for (own, point) in points.iter().enumerate() {
+        let near = points.par_iter().enumerate().with_min_len(64).map(|(own, point)| {
             let mut apart = [0.0_f32; 256];
             for (column, at) in columns.iter().zip(point) {
                 for (sum, other) in apart.iter_mut().zip(column) {
@@ -180,9 +182,11 @@ impl Neighbours {
                     near[at] = key;
                 }
             }
-            let neighbour = |&key: &u32| Neighbour { index: key as u8, apart: f32::from_bits(key & !0xFF) };
-            all.extend(near[..each].iter().map(neighbour));
-        }
+            near
+        });
+        let neighbour = |key: u32| Neighbour { index: key as u8, apart: f32::from_bits(key & !0xFF) };
+        let near = near.collect::<Vec<_>>();
+        let all = near.iter().flat_map(|near| &near[..each]).map(|&key| neighbour(key)).collect();
         Self { points: points.len(), each, all }
     }
 

@@ -8,12 +8,13 @@ use image::RgbImage;
 
 use crate::allowance::{Allowance, Loan, Redrawn};
 use crate::block::{Area, Block};
+use crate::colour::Near;
 use crate::exact::{self, FewColours};
 use crate::histogram::{Histogram, MOST_BINS};
 use crate::ink::{self, Ink};
 use crate::look::{Before, Need, Needs};
 use crate::palette::Palette;
-use crate::stripe::{self, Inks, Row, Stripe};
+use crate::stripe::{self, Inks, Row, Sheet, Stripe};
 
 /// Parts of a frame whose colours are counted side by side.
 const PARTS: usize = 2;
@@ -86,51 +87,91 @@ impl Quantiser {
 
     fn step(&mut self, frame: RgbImage, delay_cs: u16) -> Option<Block> {
         let (width, pixels) = (frame.width() as usize, frame.as_raw().as_chunks::<3>().0);
-        let spare = self.spare.take();
-        let (mut needs, mut histogram) =
-            spare.unwrap_or_else(|| (Needs::default(), Histogram::new(MOST_BINS)));
-        let first = self.waiting.is_none();
+        let before = self.waiting.take();
+        let first = before.is_none();
         if first {
             self.seen = RgbImage::new(frame.width(), frame.height());
         }
-        let few = exact::few_colours(pixels);
-        let mut loan = None;
-        match &self.waiting {
-            Some(before) if few.is_none() => {
-                let (frame, seen) = (before.frame.as_raw(), self.seen.as_raw());
-                let before = Before {
-                    frame: frame.as_chunks().0,
-                    needs: &before.needs.pixels,
-                    seen: seen.as_chunks().0,
-                    error: self.drawn_error,
-                };
-                let still = needs.look(pixels, width, before, self.allowance.is_left());
-                loan = Some(self.allowance.lend(&still));
-            }
-            _ => needs.want_all(width, pixels.len()),
-        }
-        let before = self.waiting.take();
+        let spare = self.spare.take();
+        let (mut needs, mut histogram) =
+            spare.unwrap_or_else(|| (Needs::default(), Histogram::new(MOST_BINS)));
+
         let (seen, allowance, parts) = (&mut self.seen, &mut self.allowance, &mut self.parts);
-        let draw = || before.map(|before| before.draw(seen, allowance));
-        let prepare = || match few {
-            Some(colours) => Plan::Exactly(colours),
-            None => Plan::With(Paint::new(pixels, width, loan, &mut needs, &mut histogram, parts)),
+        let error = self.drawn_error;
+        let mut look = |seen: &RgbImage, needs: &mut Needs| {
+            let few = exact::few_colours(pixels);
+            let before = before.as_ref().filter(|_| few.is_none()).map(|before| Before {
+                frame: before.frame.as_raw().as_chunks().0,
+                needs: &before.needs.pixels,
+                seen: seen.as_raw().as_chunks().0,
+                error,
+            });
+            let loan = match before {
+                Some(before) => {
+                    let still = needs.look(pixels, width, before, allowance.is_left());
+                    Some(allowance.lend(&still))
+                }
+                None => {
+                    needs.want_all(width, pixels.len());
+                    None
+                }
+            };
+            (few, loan)
         };
-        let (plan, drawn) = rayon::join(prepare, draw);
+        let (plan, drawn) = match &before {
+            // What will be seen is the frame itself.
+            Some(before) if matches!(before.plan, Plan::Exactly(_)) => {
+                let plan = || {
+                    let looked = look(&before.frame, &mut needs);
+                    Plan::new(pixels, width, looked, &mut needs, &mut histogram, parts)
+                };
+                let (plan, drawn) = rayon::join(plan, || before.draw(seen));
+                (plan, Some(drawn))
+            }
+            before => {
+                let looked = look(seen, &mut needs);
+                let plan = || Plan::new(pixels, width, looked, &mut needs, &mut histogram, parts);
+                rayon::join(plan, || match before {
+                    Some(before) => Some(before.draw(seen)),
+                    None => {
+                        Near::prepare();
+                        None
+                    }
+                })
+            }
+        };
         if let Plan::With(Paint { area: Some(_), error, .. }) = plan {
             self.drawn_error = error;
         }
         self.waiting = Some(Waiting { frame, delay_cs, first, needs, histogram, plan });
-        drawn.map(|(block, spare)| {
-            self.spare = Some(spare);
-            block
-        })
+        let (before, (block, redrawn)) = (before?, drawn?);
+        if let Plan::With(Paint { loan: Some(loan), changed, .. }) = &before.plan {
+            self.allowance.pay(loan, &redrawn, *changed);
+        }
+        self.spare = Some((before.needs, before.histogram));
+        Some(block)
     }
 
     /// The block of the last frame.
     pub(crate) fn finish(&mut self) -> Option<Block> {
         let last = self.waiting.take()?;
-        rayon::scope(|_| Some(last.draw(&mut self.seen, &mut self.allowance).0))
+        rayon::scope(|_| Some(last.draw(&mut self.seen).0))
+    }
+}
+
+impl Plan {
+    fn new(
+        pixels: &[[u8; 3]],
+        width: usize,
+        (few, loan): (Option<FewColours>, Option<Loan>),
+        needs: &mut Needs,
+        histogram: &mut Histogram,
+        parts: &mut [Histogram],
+    ) -> Self {
+        match few {
+            Some(colours) => Self::Exactly(colours),
+            None => Self::With(Paint::new(pixels, width, loan, needs, histogram, parts)),
+        }
     }
 }
 
@@ -154,28 +195,21 @@ impl Paint {
 }
 
 impl Waiting {
-    /// Gives the block, and what can be used again.
-    fn draw(self, seen: &mut RgbImage, allowance: &mut Allowance) -> (Block, (Needs, Histogram)) {
-        let Self { frame, delay_cs, first, needs, histogram, plan } = self;
-        let (width, pixels) = (frame.width() as usize, frame.as_raw().as_chunks::<3>().0);
+    /// Gives the block, and what was drawn anew.
+    fn draw(&self, seen: &mut RgbImage) -> (Block, Vec<Redrawn>) {
+        let (width, pixels) = (self.frame.width() as usize, self.frame.as_raw().as_chunks::<3>().0);
         let seen = seen.as_chunks_mut::<3>().0;
-        let block = match plan {
-            Plan::Exactly(colours) => exact::draw(pixels, width, first, seen, colours, delay_cs),
-            Plan::With(paint) => {
-                let clear = (!first).then_some(paint.palette.colours.len() as u8);
-                let inks =
-                    Inks { palette: &paint.palette, of_bins: &paint.of_bins, histogram: &histogram, clear };
-                let (block, redrawn) = match paint.area {
-                    None => (Block::nothing(delay_cs), Vec::new()),
-                    Some(area) => draw(pixels, width, area, &needs.pixels, seen, inks, delay_cs),
-                };
-                if let Some(loan) = &paint.loan {
-                    allowance.pay(loan, &redrawn, paint.changed);
-                }
-                block
+        match &self.plan {
+            Plan::Exactly(colours) => {
+                (exact::draw(pixels, width, self.first, seen, colours, self.delay_cs), Vec::new())
             }
-        };
-        (block, (needs, histogram))
+            Plan::With(Paint { area: None, .. }) => (Block::nothing(self.delay_cs), Vec::new()),
+            Plan::With(Paint { area: Some(area), palette, of_bins, .. }) => {
+                let clear = (!self.first).then_some(palette.colours.len() as u8);
+                let inks = Inks { palette, of_bins, histogram: &self.histogram, clear };
+                draw(pixels, width, *area, &self.needs.pixels, seen, inks, self.delay_cs)
+            }
+        }
     }
 }
 
@@ -189,7 +223,9 @@ fn draw(
     delay_cs: u16,
 ) -> (Block, Vec<Redrawn>) {
     let colours = &inks.palette.colours;
-    stripe::in_stripes(area, width, seen, colours, inks.clear, delay_cs, |writer, top, seen| {
+    let sheet =
+        Sheet { area, width, colours, clear: inks.clear, delay_cs, meant: inks.histogram.bins().len() };
+    stripe::in_stripes(sheet, seen, |writer, top, seen| {
         let mut stripe = Stripe::new(inks, writer);
         for (y, seen) in (top..).zip(seen.chunks_exact_mut(width)) {
             let part = y * width + area.left..y * width + area.right;

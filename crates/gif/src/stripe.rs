@@ -26,6 +26,11 @@ const SMOOTH: u32 = 24;
 const TRIED: usize = 8;
 /// Pixels of a stripe, at most. Fewer cost size: each stripe begins with an empty book.
 const STRIPE: usize = 160_000;
+/// Smaller ones are not worth a thread.
+const LEAST_STRIPE: usize = 30_000;
+/// From how many colours on a book is soon full, so that two or four stripes cost nothing.
+const SOME_COLOURS: usize = 1024;
+const MANY_COLOURS: usize = 4096;
 
 /// What a frame is drawn with.
 #[derive(Debug, Clone, Copy)]
@@ -37,23 +42,40 @@ pub(crate) struct Inks<'a> {
     pub(crate) clear: Option<u8>,
 }
 
-/// Runs `draw` on stripes of whole rows of `area`, side by side: with a writer, the first row and what is seen from it
+/// What a block is drawn on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sheet<'a> {
+    pub(crate) area: Area,
+    /// Of the whole frame.
+    pub(crate) width: usize,
+    /// The palette, and the index that leaves a pixel as it is.
+    pub(crate) colours: &'a [[u8; 3]],
+    pub(crate) clear: Option<u8>,
+    pub(crate) delay_cs: u16,
+    /// Of how many colours the pixels are before they are drawn.
+    pub(crate) meant: usize,
+}
+
+/// Runs `draw` on stripes of whole rows of a sheet, side by side: with a writer, the first row and what is seen from it
 /// on. Gives the block and the results.
 pub(crate) fn in_stripes<R: Send>(
-    area: Area,
-    width: usize,
+    sheet: Sheet<'_>,
     seen: &mut [[u8; 3]],
-    colours: &[[u8; 3]],
-    clear: Option<u8>,
-    delay_cs: u16,
     draw: impl Fn(&mut Writer, usize, &mut [[u8; 3]]) -> R + Sync,
 ) -> (Block, Vec<R>) {
+    let Sheet { area, width, colours, clear, delay_cs, meant } = sheet;
     let bits = block::bits(colours.len() + usize::from(clear.is_some()));
     let height = area.bottom - area.top;
+    let pixels = (area.right - area.left) * height;
+    let least = match meant {
+        0..SOME_COLOURS => 1,
+        SOME_COLOURS..MANY_COLOURS => 2,
+        _ => 4,
+    };
     // An odd one out would be drawn while other threads wait.
-    let count = match ((area.right - area.left) * height).div_ceil(STRIPE) {
-        1 => 1,
-        many => many.next_multiple_of(2),
+    let count = match pixels.div_ceil(STRIPE) {
+        1 => least.min((pixels / LEAST_STRIPE).max(1)),
+        many => many.next_multiple_of(2).max(least),
     };
     let rows = height.div_ceil(count);
     let stripes = seen[area.top * width..area.bottom * width].par_chunks_mut(rows * width).enumerate();
