@@ -219,6 +219,22 @@ fn surfaces_that_single_precision_cannot_tell_apart_are_drawn_in_double() {
 }
 
 #[test]
+fn a_surface_is_not_in_the_shadow_of_what_touches_it_with_a_corner() {
+    // Column 0 and row 24 show a corner of the triangle, which lies on the box.
+    let script = "Screen 33 33\nCamera 8 0 0  -1 0 0  0 1 0  1  -0.5 -0.5  0.5 0.5\nIlight 0.5 0.5 0.5  -1 -1 -1\n\
+                  Box 4 2 -1  3 -3 3  0 0 0.2  0.4 0.6 0.1\nTriangle 0 -4 0  4 -1 2  -1 -3 -1  0.2 0.1 0.2  0.4 0.2 0.4\n\
+                  Trace\n";
+    let scene = parse("corner.txt", script.as_bytes(), &Limits::default()).script.unwrap().frame(0).unwrap();
+    let expected = rayfold_tracer::reference::render(&scene, &RenderOptions::default()).unwrap();
+    for precision in [Precision::F32, Precision::F64] {
+        for tile in [(4, 4), (16, 16), (64, 4)] {
+            let drawn = draw(&scene, RenderOptions { precision, tile: Some(tile), ..Default::default() });
+            assert_eq!(drawn.get_pixel(0, 24), expected.get_pixel(0, 24), "{precision:?}, tiles of {tile:?}");
+        }
+    }
+}
+
+#[test]
 fn tiles_trees_and_threads_cannot_be_seen() {
     for scene in Dice::new("tiles").scenes() {
         for precision in [Precision::F32, Precision::F64] {

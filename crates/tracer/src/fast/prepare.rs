@@ -27,6 +27,10 @@ pub(super) const BOUNDS: f64 = 16.0;
 /// Below this many roundoffs the sine of the angle between a ray and a triangle's plane is noise.
 pub(super) const GRAZING: f64 = 4.0;
 
+/// Below this many roundoffs the sine of the angle between the light and a triangle's plane is noise: both directions are
+/// rounded. Such a triangle has no shadow; taken for one that has, its sides would bound a line without ends.
+const EDGE_ON: f64 = 16.0;
+
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sphere<E> {
     pub(super) center: [E; 3],
@@ -378,20 +382,21 @@ fn light<E: Real>(sun: &Sun, sorted: &Sorted, search: Search) -> Light<E> {
 fn shade<E: Real>(vertices: [DVec3; 3], normal: DVec3, towards: DVec3) -> Shade<E> {
     let facing = normal.dot(towards);
     let sign = facing.signum();
-    if facing.abs() <= GRAZING * E::ROUNDOFF {
+    if facing.abs() <= EDGE_ON * E::ROUNDOFF {
         return Shade {
             sides: [([E::narrow(0.0); 3], E::narrow(-1.0)); 3],
             depth: ([E::narrow(0.0); 3], E::narrow(-1.0)),
         };
     }
     let [a, b, c] = vertices;
-    let reach = vertices.iter().map(|v| l1(*v)).fold(0.0, f64::max);
+    let reach = vertices.iter().map(|v| v.length()).fold(0.0, f64::max);
     let side = |p: DVec3, q: DVec3| {
         // Relative to the nearer end, so that the constant is as small as the edge is near.
         let slope = towards.cross(q - p) * sign;
         let anchor = if p.length() < q.length() { p } else { q };
         let start = slope.dot(-anchor);
-        let slack = 2.0 * SIDE * E::ROUNDOFF * l1(slope) * reach;
+        // Less than the offset of what starts at the triangle's edge: that is not in its shadow.
+        let slack = SIDE * E::ROUNDOFF * slope.length() * reach;
         (point(slope), E::narrow(start + slack))
     };
     let height = normal.dot(nearest_vertex(vertices));
