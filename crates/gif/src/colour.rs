@@ -74,18 +74,40 @@ impl Near {
     }
 
     pub(crate) fn error(self, a: [u8; 3], b: [u8; 3]) -> f32 {
-        let metric =
-            &self.0[usize::from(a[0] >> 4) << 8 | usize::from(a[1] >> 4) << 4 | usize::from(a[2] >> 4)];
-        // By hand: mapped arrays are several times slower here.
-        let r = f32::from(a[0]) - f32::from(b[0]);
-        let g = f32::from(a[1]) - f32::from(b[1]);
-        let b = f32::from(a[2]) - f32::from(b[2]);
-        metric[0] * r * r
-            + metric[1] * g * g
-            + metric[2] * b * b
-            + r * (metric[3] * g + metric[4] * b)
-            + metric[5] * g * b
+        self.around(a).error(levels(a), levels(b))
     }
+
+    /// What holds near one colour.
+    pub(crate) fn around(self, [r, g, b]: [u8; 3]) -> Form {
+        Form(&self.0[usize::from(r >> 4) << 8 | usize::from(g >> 4) << 4 | usize::from(b >> 4)])
+    }
+}
+
+/// A quadratic form of differences of levels.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Form(&'static [f32; 6]);
+
+// By hand throughout: mapped arrays are several times slower here.
+impl Form {
+    pub(crate) fn error(self, a: [f32; 3], b: [f32; 3]) -> f32 {
+        let (r, g, b) = (a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+        let form = self.0;
+        r * (form[0] * r + form[3] * g + form[4] * b) + g * (form[1] * g + form[5] * b) + form[2] * b * b
+    }
+
+    /// The errors of several colours, given channel by channel.
+    pub(crate) fn errors<const N: usize>(self, a: [f32; 3], b: &[[f32; N]; 3]) -> [f32; N] {
+        let mut errors = [0.0; N];
+        for (k, error) in errors.iter_mut().enumerate() {
+            *error = self.error(a, [b[0][k], b[1][k], b[2][k]]);
+        }
+        errors
+    }
+}
+
+/// The levels of a colour as numbers to reckon with.
+pub(crate) fn levels(rgb: [u8; 3]) -> [f32; 3] {
+    [f32::from(rgb[0]), f32::from(rgb[1]), f32::from(rgb[2])]
 }
 
 /// Squared difference of levels, weighted by how bright the channels are: 6 where all levels are off by one.
@@ -93,12 +115,6 @@ pub(crate) fn level_error(a: [u8; 3], b: [u8; 3]) -> u32 {
     let (r, g, b) = (a[0].abs_diff(b[0]), a[1].abs_diff(b[1]), a[2].abs_diff(b[2]));
     let square = |d: u8| u32::from(d) * u32::from(d);
     2 * square(r) + 3 * square(g) + square(b)
-}
-
-/// Squared distance of levels: never more than that of points.
-pub(crate) fn levels_apart(a: [u8; 3], b: [u8; 3]) -> u32 {
-    let square = |k: usize| u32::from(a[k].abs_diff(b[k])) * u32::from(a[k].abs_diff(b[k]));
-    square(0) + square(1) + square(2)
 }
 
 /// For each of 16 x 16 x 16 cells of sRGB the quadratic form that [`error`] is there: the coefficients of r², g², b²,

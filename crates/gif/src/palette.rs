@@ -33,12 +33,38 @@ impl From<&Bin> for Sample {
     }
 }
 
+/// How many of a colour's nearest others may be drawn in its place.
+const AROUND: usize = 8;
+
 /// Colours to draw with; for each its point and its nearest others.
 #[derive(Debug, Clone)]
 pub(crate) struct Palette {
     pub(crate) colours: Vec<[u8; 3]>,
     pub(crate) points: Vec<Point>,
+    /// What may be drawn in the place of each.
+    pub(crate) around: Vec<Around>,
     neighbours: Neighbours,
+}
+
+/// A colour's nearest others, channel by channel.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Around {
+    pub(crate) indices: [u8; AROUND],
+    /// Far from everything where there are fewer.
+    pub(crate) levels: [[f32; AROUND]; 3],
+}
+
+impl Around {
+    fn of(near: &[Neighbour], colours: &[[u8; 3]]) -> Self {
+        let mut around = Self { indices: [0; AROUND], levels: [[1e9; AROUND]; 3] };
+        for (at, neighbour) in near.iter().take(AROUND).enumerate() {
+            around.indices[at] = neighbour.index;
+            for (channel, &level) in around.levels.iter_mut().zip(&colours[usize::from(neighbour.index)]) {
+                channel[at] = f32::from(level);
+            }
+        }
+        around
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -72,7 +98,8 @@ impl Palette {
     pub(crate) fn new(colours: Vec<[u8; 3]>) -> Self {
         let points = colours.iter().map(|&rgb| colour::point_of(rgb)).collect::<Vec<_>>();
         let neighbours = Neighbours::of(&points);
-        Self { colours, points, neighbours }
+        let around = (0..colours.len()).map(|at| Around::of(neighbours.at(at as u8), &colours)).collect();
+        Self { colours, points, around, neighbours }
     }
 
     /// The colours of the bins if there are at most `size`, else so many that fit them well.
@@ -135,11 +162,6 @@ impl Palette {
     /// The nearest colour; `guess` is where to start looking.
     pub(crate) fn nearest(&self, point: &Point, guess: u8) -> u8 {
         self.neighbours.nearest(&self.points, point, guess)
-    }
-
-    /// The nearest others of a colour, nearest first.
-    pub(crate) fn neighbours(&self, index: u8) -> &[Neighbour] {
-        self.neighbours.at(index)
     }
 }
 

@@ -231,8 +231,6 @@ fn draw(
             let part = y * width + area.left..y * width + area.right;
             let above = if y == 0 { part.clone() } else { part.start - width..part.end - width };
             stripe.draw(Row {
-                columns: area.left..area.right,
-                y,
                 pixels: &pixels[part.clone()],
                 above: &pixels[above],
                 needs: &needs[part],

@@ -1,10 +1,12 @@
 //! Indices of rows of pixels, chosen as LZW reads them.
 //!
 //! LZW writes a string of indices that it has met before as one code. So where the best index would end such a string
-//! and another one, nearly as good, would not, the other is taken. Frames are worked on in stripes of rows side by side,
-//! each a part of the image's data of its own.
-
-use std::ops::Range;
+//! and another one, nearly as good, would not, the other is taken. What is amiss then, and what the palette has no colour
+//! for, the pixels to the right and below make good in part: the more, the farther off the palette's colours are, and
+//! only where the surroundings are smooth enough for the mean to be seen. Mostly that only tips the choice of what
+//! continues a string; a colour that is not the nearest begins a new one only when that saves much. So gradients are mixed
+//! for few bytes, and errors do not add up. Frames are worked on in stripes of rows side by side, each a part of the
+//! image's data of its own.
 
 use rayon::prelude::*;
 
@@ -12,18 +14,30 @@ use crate::allowance::Redrawn;
 use crate::block::{self, Area, Block};
 use crate::colour::{self, Near};
 use crate::histogram::Histogram;
-use crate::ink::{Dye, Ink};
+use crate::ink::Ink;
 use crate::look::Need;
 use crate::lzw::{Part, Writer};
 use crate::palette::Palette;
 
 /// How much more squared error (see [`colour`](crate::colour)) an index may have that makes the file smaller.
 const LENIENCE: f32 = 6.0;
-/// The level error against the pixels to the left and above, together, up to which the surroundings are smooth, so that
-/// a pattern is seen as its mean.
-const SMOOTH: u32 = 24;
-/// How many of a colour's nearest others are tried.
-const TRIED: usize = 8;
+/// The level error against the pixels to the left and above, together, up to which the surroundings are smooth; more by
+/// `SMOOTH_BY_ERROR` for each unit of the nearest colour's squared error.
+const SMOOTH: f32 = 24.0;
+const SMOOTH_BY_ERROR: f32 = 0.6;
+/// The squared error of the nearest colour up to which a pixel makes nothing good.
+const SMALL: f32 = 2.0;
+/// The part of what is amiss that a pixel makes good, for each unit of error beyond that, and at most.
+const MADE_GOOD: f32 = 0.015;
+const MOST_MADE_GOOD: f32 = 0.8;
+/// The part that is handed on, half of it to the right, half down; and how many levels at most.
+const HANDED_ON: f32 = 0.8;
+const MOST_AMISS: f32 = 24.0;
+/// How much squared error a colour that is not the nearest must save to begin a new string.
+const FRESH: f32 = 30.0;
+/// How much more squared error than it has by itself the nearest colour may have, with what is amiss, to be taken without
+/// a look at others if it continues the string.
+const AT_ONCE: f32 = 3.0;
 /// Pixels of a stripe, at most. Fewer cost size: each stripe begins with an empty book.
 const STRIPE: usize = 160_000;
 /// Smaller ones are not worth a thread.
@@ -95,12 +109,12 @@ pub(crate) struct Stripe<'a> {
     writer: &'a mut Writer,
     redrawn: Redrawn,
     near: Near,
+    /// What the pixels above hand down to each of the row.
+    handed_down: Vec<[f32; 3]>,
 }
 
 /// Part of a row: what is meant, what it needs, and what a viewer sees.
 pub(crate) struct Row<'a> {
-    pub(crate) columns: Range<usize>,
-    pub(crate) y: usize,
     pub(crate) pixels: &'a [[u8; 3]],
     /// What is meant in the row above.
     pub(crate) above: &'a [[u8; 3]],
@@ -110,7 +124,7 @@ pub(crate) struct Row<'a> {
 
 impl<'a> Stripe<'a> {
     pub(crate) fn new(inks: Inks<'a>, writer: &'a mut Writer) -> Self {
-        Self { inks, writer, redrawn: Redrawn::default(), near: Near::new() }
+        Self { inks, writer, redrawn: Redrawn::default(), near: Near::new(), handed_down: Vec::new() }
     }
 
     /// What all rows together drew anew.
@@ -122,9 +136,13 @@ impl<'a> Stripe<'a> {
         let clear = self.inks.clear;
         let mut previous = None;
         let mut last = ([0; 3], None);
-        for (k, x) in row.columns.enumerate() {
-            let (now, need) = (row.pixels[k], row.needs[k]);
-            let seen = row.seen[k];
+        self.handed_down.resize(row.pixels.len(), [0.0; 3]);
+        let mut handed_on = [0.0; 3];
+        for k in 0..row.pixels.len() {
+            let (now, need, seen) = (row.pixels[k], row.needs[k], row.seen[k]);
+            let above = self.handed_down[k];
+            let amiss = [handed_on[0] + above[0], handed_on[1] + above[1], handed_on[2] + above[2]];
+            handed_on = [0.0; 3];
             let index = match need {
                 Need::Nothing => {
                     let clear = clear.unwrap_or(0);
@@ -135,19 +153,30 @@ impl<'a> Stripe<'a> {
                 Need::Better | Need::Draw => {
                     if last.0 != now || last.1.is_none() {
                         let bin = self.inks.histogram.find(now).unwrap_or(0);
-                        last = (now, Some(&self.inks.of_bins[bin]));
+                        last = (now, Some(self.inks.of_bins[bin]));
                     }
                     let Some(ink) = last.1 else { continue };
-                    let smooth = colour::level_error(now, row.pixels[k.saturating_sub(1)])
-                        + colour::level_error(now, row.above[k])
-                        <= SMOOTH;
-                    let best = if smooth { ink.at(x, row.y) } else { ink.plain };
-                    self.drawn(now, need, seen, ink, best)
+                    let levels = colour::levels(now);
+                    if ink.error > SMALL && row.is_smooth(k, ink.error) {
+                        let part = ((ink.error - SMALL) * MADE_GOOD).min(MOST_MADE_GOOD);
+                        let target = [
+                            levels[0] + part * amiss[0],
+                            levels[1] + part * amiss[1],
+                            levels[2] + part * amiss[2],
+                        ];
+                        let index = self.drawn(now, target, need, seen, ink, FRESH);
+                        let shown = if Some(index) == clear { seen } else { self.colour(index) };
+                        handed_on = hand_on(amiss, levels, colour::levels(shown));
+                        index
+                    } else {
+                        self.drawn(now, levels, need, seen, ink, f32::INFINITY)
+                    }
                 }
             };
+            self.handed_down[k] = handed_on;
             previous = Some(index);
             if Some(index) != clear {
-                let colour = self.inks.palette.colours[usize::from(index)];
+                let colour = self.colour(index);
                 if need == Need::Better {
                     self.redrawn.count(self.near.error(seen, colour));
                 }
@@ -164,7 +193,8 @@ impl<'a> Stripe<'a> {
         }
         let index = match previous.filter(|&index| index != clear) {
             Some(index)
-                if self.writer.continues(index) && self.error(now, index) <= self.near.error(now, seen) =>
+                if self.writer.continues(index)
+                    && self.near.error(now, self.colour(index)) <= self.near.error(now, seen) =>
             {
                 index
             }
@@ -174,55 +204,132 @@ impl<'a> Stripe<'a> {
         index
     }
 
-    fn drawn(&mut self, now: [u8; 3], need: Need, seen: [u8; 3], ink: &Ink, best: Dye) -> u8 {
-        let Dye { index: best, error: least } = best;
+    /// The index for a pixel. `target` is what is meant with what is amiss around it; a colour that is not the nearest
+    /// begins a string only when that saves more error than `fresh`.
+    fn drawn(
+        &mut self,
+        now: [u8; 3],
+        target: [f32; 3],
+        need: Need,
+        seen: [u8; 3],
+        ink: Ink,
+        fresh: f32,
+    ) -> u8 {
+        let form = self.near.around(now);
+        let nearest = form.error(target, colour::levels(self.colour(ink.index)));
         if let Some(clear) = self.inks.clear {
-            let lenience = if need == Need::Better { least } else { LENIENCE };
-            // Levels alone are part of the error, and often enough to say.
-            let shown = match colour::levels_apart(now, seen) as f32 {
-                levels if levels > least + lenience => levels,
-                _ => self.near.error(now, seen),
-            };
-            if least >= shown || shown <= least + lenience && self.writer.extend(clear) {
-                if least >= shown {
+            let shown = form.error(target, colour::levels(seen));
+            let lenience = if need == Need::Better { nearest } else { LENIENCE };
+            if nearest >= shown || shown <= nearest + lenience && self.writer.extend(clear) {
+                if nearest >= shown {
                     self.writer.put(clear);
                 }
                 return clear;
             }
         }
-        if self.writer.extend(best) {
-            return best;
+        if nearest <= ink.error + AT_ONCE && self.writer.extend(ink.index) {
+            return ink.index;
+        }
+        let around = &self.inks.palette.around[usize::from(ink.index)];
+        let errors = form.errors(target, &around.levels);
+        let mut best = (ink.index, nearest);
+        if nearest > fresh {
+            for (&index, &error) in around.indices.iter().zip(&errors) {
+                if error < best.1 {
+                    best = (index, error);
+                }
+            }
+            if nearest - best.1 < fresh {
+                best = (ink.index, nearest);
+            }
+        }
+        if self.writer.extend(best.0) {
+            return best.0;
         }
         if !self.writer.is_known() {
-            self.writer.put(best);
-            return best;
+            self.writer.put(best.0);
+            return best.0;
         }
-        let mut found = (best, least + LENIENCE);
-        let reach = ink.reach(found.1);
-        if best != ink.plain.index {
-            self.consider(now, ink.plain.index, &mut found);
+        let mut found = (best.0, best.1 + LENIENCE);
+        if nearest < found.1 && self.writer.continues(ink.index) {
+            found = (ink.index, nearest);
         }
-        for neighbour in self.inks.palette.neighbours(ink.plain.index).iter().take(TRIED) {
-            if neighbour.apart > reach {
-                break;
+        for (&index, &error) in around.indices.iter().zip(&errors) {
+            if error < found.1 && self.writer.continues(index) {
+                found = (index, error);
             }
-            self.consider(now, neighbour.index, &mut found);
         }
         self.writer.put(found.0);
         found.0
     }
 
-    /// Prefers an index that the string goes on with if its error is less.
-    fn consider(&self, now: [u8; 3], index: u8, found: &mut (u8, f32)) {
-        if self.writer.continues(index) {
-            let error = self.error(now, index);
-            if error < found.1 {
-                *found = (index, error);
-            }
+    fn colour(&self, index: u8) -> [u8; 3] {
+        self.inks.palette.colours[usize::from(index)]
+    }
+}
+
+impl Row<'_> {
+    /// Whether a pixel whose nearest colour has an error is so much like those around that their mean is seen.
+    fn is_smooth(&self, k: usize, error: f32) -> bool {
+        let (now, left) = (self.pixels[k], self.pixels[k.saturating_sub(1)]);
+        let step = colour::level_error(now, left) + colour::level_error(now, self.above[k]);
+        step as f32 <= SMOOTH + SMOOTH_BY_ERROR * error
+    }
+}
+
+/// What each of two pixels is handed by one with what was amiss before, what is meant and what is shown.
+fn hand_on(amiss: [f32; 3], meant: [f32; 3], shown: [f32; 3]) -> [f32; 3] {
+    let channel =
+        |k: usize| (amiss[k] + meant[k] - shown[k]).clamp(-MOST_AMISS, MOST_AMISS) * (0.5 * HANDED_ON);
+    [channel(0), channel(1), channel(2)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::histogram::MOST_BINS;
+
+    const SIDE: usize = 64;
+
+    /// What is seen of a square of one colour.
+    fn drawn(rgb: [u8; 3], colours: &[[u8; 3]]) -> Vec<[u8; 3]> {
+        let mut histogram = Histogram::new(MOST_BINS);
+        histogram.add(rgb, 1);
+        let palette = Palette::new(colours.to_vec());
+        let point = colour::point_of(rgb);
+        let index = palette.nearest(&point, 0);
+        let error = colour::error(&point, &palette.points[usize::from(index)]);
+        let of_bins = [Ink { index, error }];
+        let inks = Inks { palette: &palette, of_bins: &of_bins, histogram: &histogram, clear: None };
+        let mut writer = Writer::new(8);
+        let mut stripe = Stripe::new(inks, &mut writer);
+        let mut seen = vec![[0; 3]; SIDE * SIDE];
+        for seen in seen.chunks_mut(SIDE) {
+            let (pixels, needs) = ([rgb; SIDE], [Need::Draw; SIDE]);
+            stripe.draw(Row { pixels: &pixels, above: &pixels, needs: &needs, seen });
+        }
+        seen
+    }
+
+    fn mean(seen: &[[u8; 3]]) -> [f32; 3] {
+        [0, 1, 2].map(|c| seen.iter().map(|rgb| f32::from(rgb[c])).sum::<f32>() / seen.len() as f32)
+    }
+
+    #[test]
+    fn half_way_is_mixed_and_near_a_colour_is_not() {
+        let colours = [[100; 3], [120; 3]];
+        for (level, least, most) in
+            [(100, 100.0, 100.0), (101, 100.0, 100.0), (110, 108.0, 112.0), (120, 120.0, 120.0)]
+        {
+            let [r, g, b] = mean(&drawn([level; 3], &colours));
+            assert!(r == g && g == b && (least..=most).contains(&r), "{level}: {r}");
         }
     }
 
-    fn error(&self, now: [u8; 3], index: u8) -> f32 {
-        self.near.error(now, self.inks.palette.colours[usize::from(index)])
+    #[test]
+    fn three_colours_mend_the_mean() {
+        let target = [109, 109, 100];
+        let found = mean(&drawn(target, &[[100, 100, 100], [130, 100, 100], [100, 130, 100]]));
+        assert!((0..3).all(|c| (found[c] - f32::from(target[c])).abs() < 4.0), "{found:?}");
     }
 }
