@@ -22,6 +22,8 @@ const FOR_CHANGES: f64 = 8.0;
 /// How much more may be asked for than is left: of what is asked for a part is drawn, and only that is taken off. One
 /// large improvement costs fewer bytes than many small ones.
 const AHEAD: f64 = 5.0;
+/// The part of what is asked for that is set aside until it is known what was drawn.
+const LENT: f64 = 0.5;
 /// Steps of error in an octave, as a power of two.
 const FINENESS: u32 = 3;
 const STEPS: usize = 128;
@@ -104,7 +106,7 @@ impl Allowance {
             }
             asked = more;
         }
-        let [share, difference] = asked.map(|sum| sum / pixels.max(1.0));
+        let [share, difference] = asked.map(|sum| LENT * sum / pixels.max(1.0));
         self.share -= share;
         self.difference -= difference;
         Loan { pixels, share, difference, least_error }

@@ -1,14 +1,15 @@
 //! What of a frame needs to be drawn.
 //!
 //! A frame is looked at before the one before it is drawn, so that both can be worked on at once. Where that one is left
-//! alone, what a viewer will see is known; where it is drawn, that it will be drawn as well as the rest is assumed, and
-//! the next look finds what was not.
+//! alone, what a viewer will see is known; where it is drawn, that each colour will be drawn with the palette's nearest
+//! is assumed, and the next look finds what was not.
 
 use rayon::prelude::*;
 
 use crate::allowance::Still;
 use crate::colour::{self, Near};
 use crate::histogram::Histogram;
+use crate::ink::Ink;
 
 /// Width and height of what is drawn or left as a whole: single pixels drawn among others that are left cost as much
 /// as if all were drawn.
@@ -44,6 +45,8 @@ pub(crate) struct Before<'a> {
     pub(crate) seen: &'a [[u8; 3]],
     /// Mean level error of what will be drawn.
     pub(crate) error: f32,
+    /// What will be drawn with which squared error; `None`: all of it with none.
+    pub(crate) inks: Option<(&'a Histogram, &'a [Ink])>,
 }
 
 /// What pixels need, row by row.
@@ -135,6 +138,12 @@ impl Needs {
 }
 
 impl<'a> Before<'a> {
+    /// The squared error with which a colour will be drawn.
+    fn error_of(&self, rgb: [u8; 3]) -> f32 {
+        let ink = self.inks.and_then(|(histogram, inks)| inks.get(histogram.find(rgb)?));
+        ink.map_or(0.0, |ink| ink.plain.error)
+    }
+
     fn part(self, start: usize, count: usize) -> Self {
         let range = start..start + count;
         Self {
@@ -142,6 +151,7 @@ impl<'a> Before<'a> {
             needs: &self.needs[range.clone()],
             seen: &self.seen[range],
             error: self.error,
+            inks: self.inks,
         }
     }
 }
@@ -216,6 +226,7 @@ impl Tile {
             *need = if now == was {
                 let error = match self.refine {
                     Some(near) if left && now != seen => near.error(now, seen),
+                    Some(_) if !left => before.error_of(now),
                     _ => 0.0,
                 };
                 if error > SEEN_WRONG {

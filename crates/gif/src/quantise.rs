@@ -105,6 +105,10 @@ impl Quantiser {
                 needs: &before.needs.pixels,
                 seen: seen.as_raw().as_chunks().0,
                 error,
+                inks: match &before.plan {
+                    Plan::Exactly(_) => None,
+                    Plan::With(paint) => Some((&before.histogram, &paint.of_bins)),
+                },
             });
             let loan = match before {
                 Some(before) => {
