@@ -141,7 +141,7 @@ impl<'a> Before<'a> {
     /// The squared error with which a colour will be drawn.
     fn error_of(&self, rgb: [u8; 3]) -> f32 {
         let ink = self.inks.and_then(|(histogram, inks)| inks.get(histogram.find(rgb)?));
-        ink.map_or(0.0, |ink| ink.plain.error)
+        ink.map_or(0.0, |ink| ink.error)
     }
 
     fn part(self, start: usize, count: usize) -> Self {
