@@ -22,13 +22,14 @@ pub(crate) fn map<T: Sync, U: Send>(items: &[T], f: impl Fn(&T) -> U + Send + Sy
     if items.len() < SHARED { items.iter().map(f).collect() } else { items.par_iter().map(f).collect() }
 }
 
-/// Draws an image in bands of `rows` rows; `draw` gets the first row of its band, counted from the top, and the
-/// band's bytes.
-pub(crate) fn bands(
+/// Draws an image in bands of `rows` rows; `draw` gets memory that `scratch` makes for a worker, the first row of its
+/// band, counted from the top, and the band's bytes.
+pub(crate) fn bands<T>(
     screen: Screen,
     rows: u32,
     options: &RenderOptions,
-    draw: impl Fn(u32, &mut [u8]) + Sync,
+    scratch: impl Fn() -> T + Send + Sync,
+    draw: impl Fn(&mut T, u32, &mut [u8]) + Sync,
 ) -> Result<RgbImage, RenderError> {
     let (width, height) = (screen.width(), screen.height());
     let too_large = || RenderError::TooLarge { width, height };
@@ -38,11 +39,11 @@ pub(crate) fn bands(
     buffer.try_reserve_exact(bytes).map_err(|_| too_large())?;
     buffer.resize(bytes, 0);
     let band = (width as usize).saturating_mul(rows as usize).saturating_mul(CHANNELS);
-    buffer.par_chunks_mut(band).enumerate().try_for_each(|(index, band)| {
+    buffer.par_chunks_mut(band).enumerate().try_for_each_init(scratch, |scratch, (index, band)| {
         if options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
             return Err(RenderError::Cancelled);
         }
-        draw(index as u32 * rows, band);
+        draw(scratch, index as u32 * rows, band);
         Ok(())
     })?;
     RgbImage::from_raw(width, height, buffer).ok_or_else(too_large)

@@ -54,7 +54,10 @@ pub(super) trait Features: Formulas + 'static {
     const TREE: bool;
 
     /// The same with mirrors, for what mirrors make no difference to.
-    type Mirroring: Features;
+    type WithMirrors: Features;
+
+    /// The same with a tree, for what a tree makes no difference to.
+    type WithTree: Features;
 }
 
 /// A kernel that can draw spheres and what it says.
@@ -74,10 +77,15 @@ impl<const CUBOIDS: bool, const TRIANGLES: bool, const MIRRORS: bool, const TREE
     const SHADOWS: bool = BUILT.shadows;
     const TREE: bool = TREE && BUILT.tree;
 
-    type Mirroring = Kernel<CUBOIDS, TRIANGLES, true, TREE>;
+    type WithMirrors = Kernel<CUBOIDS, TRIANGLES, true, TREE>;
+    type WithTree = Kernel<CUBOIDS, TRIANGLES, MIRRORS, true>;
 }
 
+/// Spheres, as many as masks have bits.
+pub(super) type Spheres = Kernel<false, false, false, false>;
+
 /// All kinds, as many as masks have bits.
+#[cfg(feature = "accuracy")]
 pub(super) type Solids = Kernel<true, true, true, false>;
 
 /// Triangles and spheres that mirror nothing, any number.

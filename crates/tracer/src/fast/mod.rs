@@ -48,6 +48,7 @@ mod coincidence;
 mod features;
 mod geometry;
 mod intersect;
+mod light;
 mod lists;
 #[cfg(feature = "accuracy")]
 mod naive;
@@ -66,7 +67,7 @@ use rayfold_scene::Scene;
 
 use crate::parallel::{CHANNELS, bands};
 use crate::{Precision, RenderError, RenderOptions};
-use features::{BUILT, Everything, Features, Kernel, Solids};
+use features::{BUILT, Everything, Features, Kernel};
 use geometry::{Geometry, Solid};
 use prepare::Prepared;
 use real::Real;
@@ -88,8 +89,8 @@ pub(crate) fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage,
     let geometry = if has_kernels(options) { Geometry::new(scene, options.tree).ok() } else { None };
     let precision = |geometry| Some((geometry, precision::resolve(options, geometry, scene)?));
     match geometry.as_ref().and_then(precision) {
-        Some((geometry, Precision::F64)) => draw(scene, geometry, options, f64::draw),
-        Some((geometry, _)) => draw(scene, geometry, options, f32::draw),
+        Some((geometry, Precision::F64)) => draw(scene, geometry, options, kernel::<f64>),
+        Some((geometry, _)) => draw(scene, geometry, options, kernel::<f32>),
         // Numbers that the kernels cannot hold are left to the tracer that takes them one by one.
         None => crate::reference::render(scene, options),
     }
@@ -128,7 +129,7 @@ fn draw<E: Real>(
     scene: &Scene,
     geometry: &Geometry,
     options: &RenderOptions,
-    kernel: impl Fn(&Job<E>, Level, Band) + Sync,
+    kernel: impl Fn(&Job<E>, Level, Band, &mut Scratch<E>) + Sync,
 ) -> Result<RgbImage, RenderError> {
     let size = (scene.screen.width(), scene.screen.height());
     let many = geometry.solids.len() > MANY;
@@ -141,11 +142,18 @@ fn draw<E: Real>(
     let window = Window::new(geometry, &solids, size, side, E::ROUNDOFF);
     let background = crate::reference::levels(scene.background());
     let level = options.level.unwrap_or_else(Level::new);
-    bands(scene.screen, side.1, options, |row, bytes| {
-        let band = Band { bytes, size, background };
-        let bounces = options.bounces();
-        kernel(&Job { prepared: &prepared, window: &window, side, row, bounces }, level, band);
-    })
+    // Boxed: it is passed from band to band by value.
+    bands(
+        scene.screen,
+        side.1,
+        options,
+        || Box::new(Scratch::new()),
+        |scratch, row, bytes| {
+            let band = Band { bytes, size, background };
+            let bounces = options.bounces();
+            kernel(&Job { prepared: &prepared, window: &window, side, row, bounces }, level, band, scratch);
+        },
+    )
 }
 
 /// A row of tiles to draw.
@@ -162,8 +170,7 @@ struct Job<'a, E> {
 
 impl<E: Real> Job<'_, E> {
     #[inline(always)]
-    fn draw<S: Simd, F: Features>(&self, simd: S, mut band: Band) {
-        let mut scratch = Scratch::<E>::new();
+    fn draw<S: Simd, F: Features>(&self, simd: S, mut band: Band, scratch: &mut Scratch<E>) {
         let (width, _) = band.size;
         let height = (band.bytes.len() / (width as usize * CHANNELS)) as u32;
         for (column, left) in (0..width).step_by(self.side.0 as usize).enumerate() {
@@ -177,86 +184,78 @@ impl<E: Real> Job<'_, E> {
                 place,
                 bounces: self.bounces,
             };
-            tile::draw::<S, E, F>(simd, self.prepared, tile, &mut scratch, &mut band);
+            tile::draw::<S, E, F>(simd, self.prepared, tile, scratch, &mut band);
         }
     }
 }
 
-/// Which kernels are compiled for a kind of number.
-trait Kernels: Real {
-    fn draw(job: &Job<Self>, level: Level, band: Band);
-}
-
-impl Kernels for f64 {
-    fn draw(job: &Job<f64>, level: Level, band: Band) {
-        // Scenes that need this are few: two kernels will do for them.
-        if BUILT.tree && job.prepared.needs.tree {
-            on!(level, simd => job.draw::<_, Everything>(simd, band));
-        } else {
-            on!(level, simd => job.draw::<_, Solids>(simd, band));
-        }
+/// Draws with the kernel that has just what the scene has.
+#[cfg(target_arch = "x86_64")]
+fn kernel<E: Real>(job: &Job<E>, level: Level, band: Band, scratch: &mut Scratch<E>) {
+    if let Some(simd) = level.as_avx512() {
+        job.draw_by_kernel(simd, band, scratch);
+    } else if let Some(simd) = level.as_avx2() {
+        job.draw_by_kernel(simd, band, scratch);
+    } else {
+        // Such machines are old, and few: one kernel will do for them.
+        on!(narrow level, simd => job.draw::<_, Everything>(simd, band, scratch));
     }
 }
 
-impl Kernels for f32 {
-    #[cfg(target_arch = "x86_64")]
-    fn draw(job: &Job<f32>, level: Level, band: Band) {
-        if let Some(simd) = level.as_avx512() {
-            job.draw_by_kernel(simd, band);
-        } else if let Some(simd) = level.as_avx2() {
-            job.draw_by_kernel(simd, band);
-        } else {
-            // Such machines are old, and few: one kernel will do for them.
-            on!(narrow level, simd => job.draw::<_, Everything>(simd, band));
-        }
-    }
-
-    #[cfg(not(target_arch = "x86_64"))]
-    fn draw(job: &Job<f32>, level: Level, band: Band) {
-        on!(level, simd => job.draw_by_kernel(simd, band));
-    }
+#[cfg(not(target_arch = "x86_64"))]
+fn kernel<E: Real>(job: &Job<E>, level: Level, band: Band, scratch: &mut Scratch<E>) {
+    on!(level, simd => job.draw_by_kernel(simd, band, scratch));
 }
 
-/// With the kernel that has just what the scene has.
-impl Job<'_, f32> {
+impl<E: Real> Job<'_, E> {
     #[inline(always)]
-    fn draw_by_kernel<S: Simd>(&self, simd: S, band: Band) {
+    fn draw_by_kernel<S: Simd>(&self, simd: S, band: Band, scratch: &mut Scratch<E>) {
         if BUILT.cuboids && self.prepared.needs.cuboids {
-            self.by_triangles::<S, true>(simd, band);
+            self.by_triangles::<S, true>(simd, band, scratch);
         } else {
-            self.by_triangles::<S, false>(simd, band);
+            self.by_triangles::<S, false>(simd, band, scratch);
         }
     }
 
     #[inline(always)]
-    fn by_triangles<S: Simd, const C: bool>(&self, simd: S, band: Band) {
+    fn by_triangles<S: Simd, const C: bool>(&self, simd: S, band: Band, scratch: &mut Scratch<E>) {
         if BUILT.triangles && self.prepared.needs.triangles {
-            self.by_mirrors::<S, C, true>(simd, band);
+            self.by_mirrors::<S, C, true>(simd, band, scratch);
         } else {
-            self.by_mirrors::<S, C, false>(simd, band);
+            self.by_mirrors::<S, C, false>(simd, band, scratch);
         }
     }
 
     #[inline(always)]
-    fn by_mirrors<S: Simd, const C: bool, const T: bool>(&self, simd: S, band: Band) {
+    fn by_mirrors<S: Simd, const C: bool, const T: bool>(
+        &self,
+        simd: S,
+        band: Band,
+        scratch: &mut Scratch<E>,
+    ) {
         if BUILT.mirrors && self.prepared.needs.mirrors {
-            self.by_tree::<S, C, T, true>(simd, band);
+            self.by_tree::<S, C, T, true>(simd, band, scratch);
         } else {
-            self.by_tree::<S, C, T, false>(simd, band);
+            self.by_tree::<S, C, T, false>(simd, band, scratch);
         }
     }
 
     #[inline(always)]
-    fn by_tree<S: Simd, const C: bool, const T: bool, const M: bool>(&self, simd: S, band: Band) {
+    fn by_tree<S: Simd, const C: bool, const T: bool, const M: bool>(
+        &self,
+        simd: S,
+        band: Band,
+        scratch: &mut Scratch<E>,
+    ) {
         if BUILT.tree && self.prepared.needs.tree {
             simd.vectorize(
                 #[inline(always)]
-                || self.draw::<S, Kernel<C, T, M, true>>(simd, band),
+                || self.draw::<S, Kernel<C, T, M, true>>(simd, band, scratch),
             );
         } else {
             simd.vectorize(
                 #[inline(always)]
-                || self.draw::<S, Kernel<C, T, M, false>>(simd, band),
+                || self.draw::<S, Kernel<C, T, M, false>>(simd, band, scratch),
             );
         }
     }

@@ -11,20 +11,20 @@ use super::features::{Everything, Features, Mesh, Solids};
 use super::intersect::{Formulas, Moment, Nearest, Ray, Slopes, Surface};
 use super::prepare::{Cuboid, Edge, Sphere, Triangle};
 use super::real::{Lanes, Real, Vec3, constant, splat};
-use super::tile::Band;
+use super::tile::{Band, Scratch};
 
 /// How far from a surface a ray starts; a scene has the size of 1.
 const EPSILON: f64 = 1e-4;
 
 /// With the kernels of scenes of all kinds, of meshes, and of any number of objects.
-pub(super) fn draw(job: &Job<f32>, level: Level, band: Band) {
+pub(super) fn draw(job: &Job<f32>, level: Level, band: Band, scratch: &mut Scratch<f32>) {
     let needs = job.prepared.needs;
     if !needs.tree {
-        on!(level, simd => job.draw::<_, Naive<Solids>>(simd, band));
+        on!(level, simd => job.draw::<_, Naive<Solids>>(simd, band, scratch));
     } else if needs.cuboids || needs.mirrors {
-        on!(level, simd => job.draw::<_, Naive<Everything>>(simd, band));
+        on!(level, simd => job.draw::<_, Naive<Everything>>(simd, band, scratch));
     } else {
-        on!(level, simd => job.draw::<_, Naive<Mesh>>(simd, band));
+        on!(level, simd => job.draw::<_, Naive<Mesh>>(simd, band, scratch));
     }
 }
 
@@ -38,7 +38,8 @@ impl<F: Features> Features for Naive<F> {
     const SHADOWS: bool = F::SHADOWS;
     const TREE: bool = F::TREE;
 
-    type Mirroring = Naive<F::Mirroring>;
+    type WithMirrors = Naive<F::WithMirrors>;
+    type WithTree = Naive<F::WithTree>;
 }
 
 impl<F> Formulas for Naive<F> {

@@ -58,7 +58,7 @@ impl Real for f32 {
 
     #[inline(always)]
     fn to_index(self) -> usize {
-        self as usize
+        self as u32 as usize
     }
 
     #[inline(always)]
@@ -85,7 +85,7 @@ impl Real for f64 {
 
     #[inline(always)]
     fn to_index(self) -> usize {
-        self as usize
+        self as u32 as usize
     }
 
     #[inline(always)]

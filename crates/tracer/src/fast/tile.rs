@@ -2,18 +2,20 @@
 //!
 //! Generation by generation: the first holds the tile's pixels, each further one the mirrored rays of the one before,
 //! closed up so that packets stay full. In a generation all hits are found first; the region that they fill then decides
-//! which objects can stand in the way of each light. Each of the steps is compiled as one function with the instruction
-//! set's features (`vectorize`); all in one would take the compiler much longer.
+//! which objects can stand in the way of each light. Each of the steps is one function, compiled with the instruction
+//! set's features (`vectorize`) and never inlined: kernels that do a step alike share it, a step's registers are its own,
+//! and it is the same code whatever else a build has.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
-use super::features::Features;
-use super::intersect::{Ray, Slopes, Surface};
-use super::lists::{Beam, Picked, Seen};
-use super::prepare::{Entry, Kind, Light, OFFSET, Outlines, Prepared, Rays};
+use super::features::{Features, Spheres};
+use super::intersect::{Nearest, Ray, Slopes, Surface};
+use super::light::{Obstacles, light_up};
+use super::lists::Picked;
+use super::prepare::{Entry, Kind, OFFSET, Prepared, Rays};
 use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
-use super::search::{Candidates, Masks, nearest, unshaded};
+use super::search::{Candidates, Masks, nearest};
 use crate::parallel::CHANNELS;
 
 /// Pixels of a tile at most.
@@ -25,7 +27,7 @@ const ROOM: usize = PIXELS + 16;
 /// A number for each ray of a tile.
 #[derive(Clone)]
 #[repr(align(64))]
-struct Column<E>([E; ROOM]);
+pub(super) struct Column<E>([E; ROOM]);
 
 impl<E> AsRef<[E]> for Column<E> {
     #[inline(always)]
@@ -41,7 +43,7 @@ impl<E> AsMut<[E]> for Column<E> {
     }
 }
 
-type Columns<E> = [Column<E>; 3];
+pub(super) type Columns<E> = [Column<E>; 3];
 
 /// Rays that wait to be traced.
 struct Queue<E> {
@@ -53,40 +55,37 @@ struct Queue<E> {
     count: usize,
 }
 
-/// Hits that wait for their light.
-struct Hits<E> {
-    start: Columns<E>,
-    normal: Columns<E>,
+/// What a generation's rays meet.
+pub(super) struct Hits<E> {
+    /// How far they go.
+    distance: Column<E>,
+    /// The object's position in the script.
+    order: Column<E>,
+    pub(super) start: Columns<E>,
+    pub(super) normal: Columns<E>,
     /// Diffuse coefficient times the ray's weight.
-    diffuse: Columns<E>,
-    color: Columns<E>,
-    /// For each packet with hits: where it begins, and the object that cannot be in its way, as a bit.
-    packets: Vec<(usize, u64)>,
+    pub(super) diffuse: Columns<E>,
+    pub(super) color: Columns<E>,
+    /// For each packet with hits: where it begins, and the objects that can be in its way, as bits.
+    pub(super) packets: Vec<(usize, u64)>,
+    /// For each packet with mirrors: where it begins, and the lanes that meet them, as bits.
+    mirrors: Vec<(usize, u64)>,
 }
 
-/// Memory of a worker, used again for each of its tiles.
-pub(super) struct Scratch<E> {
-    queues: [Queue<E>; 2],
-    hits: Hits<E>,
+/// What mirrors send on.
+struct Mirrored<E> {
+    queue: Queue<E>,
+    /// The sum of what the generations add to each pixel.
     pixels: Columns<E>,
+}
+
+/// Memory of a worker, used again for each of its tiles; what is in it does not matter.
+pub(super) struct Scratch<E> {
+    queue: Queue<E>,
+    hits: Hits<E>,
+    mirrored: Mirrored<E>,
     obstacles: Obstacles,
     sights: Picked,
-}
-
-/// What can stand in the way of each light.
-#[derive(Default)]
-struct Obstacles {
-    of: Vec<InTheWay>,
-    seen: Seen,
-}
-
-#[derive(Default)]
-struct InTheWay {
-    /// In a scene without a tree.
-    masks: Masks,
-    /// In one with a tree, if it is not too long.
-    list: Picked,
-    is_listed: bool,
 }
 
 impl<E: Real> Scratch<E> {
@@ -101,15 +100,18 @@ impl<E: Real> Scratch<E> {
             count: 0,
         };
         Self {
-            queues: [queue(), queue()],
+            queue: queue(),
+            mirrored: Mirrored { queue: queue(), pixels: columns() },
             hits: Hits {
+                distance: column(),
+                order: column(),
                 start: columns(),
                 normal: columns(),
                 diffuse: columns(),
                 color: columns(),
                 packets: Vec::with_capacity(PIXELS),
+                mirrors: Vec::new(),
             },
-            pixels: columns(),
             obstacles: Obstacles::default(),
             sights: Picked::default(),
         }
@@ -138,6 +140,14 @@ pub(super) struct Band<'a> {
     pub(super) size: (u32, u32),
     /// Level of each channel of a pixel that shows nothing.
     pub(super) background: [u8; CHANNELS],
+}
+
+impl Band<'_> {
+    /// The colour of what shows nothing.
+    #[inline(always)]
+    fn background<E: Real>(&self) -> [E; 3] {
+        self.background.map(|level| E::narrow(f64::from(level) / 255.0))
+    }
 }
 
 /// Columns and rows of a packet's pixels.
@@ -173,8 +183,7 @@ pub(super) fn draw<S: Simd, E: Real, F: Features>(
     if tile.candidates == 0 {
         return fill(tile, band);
     }
-    let Scratch { queues: [queue, next], hits, pixels, obstacles, sights } = scratch;
-    next.count = 0;
+    let Scratch { queue, hits, mirrored, obstacles, sights } = scratch;
     let candidates = match &scene.sights {
         Some(all) if F::TREE && all.gather(tile.place.0, tile.place.1, sights) => {
             if sights.len() == 0 {
@@ -184,8 +193,22 @@ pub(super) fn draw<S: Simd, E: Real, F: Features>(
         }
         _ => Candidates { masks: Masks::split(tile.candidates, scene), list: None },
     };
-    first_generation::<S, E, F>(simd, scene, tile, candidates, band, hits, (&mut *queue, &mut *next));
-    light_up::<S, E, F::Mirroring>(simd, scene, hits, obstacles);
+    let background = band.background();
+    let Mirrored { queue: next, pixels } = mirrored;
+    next.count = 0;
+    hits.packets.clear();
+    match scene.rays {
+        Rays::Pinhole { corner, right, up } => {
+            let aim = [corner, right, up];
+            look_from_eye::<S, E, F::WithMirrors>(simd, scene, (tile, band), aim, candidates, queue, hits);
+            shade::<S, E, F, true>(simd, scene, background, (queue, Some(&mut *next)), hits, obstacles);
+        }
+        Rays::Parallel { corner, pixel } => {
+            aim_along_axis::<S, E>(simd, (tile, band), (corner, pixel), queue);
+            look::<S, E, F::WithMirrors>(simd, scene, candidates, background, queue, hits);
+            shade::<S, E, F, false>(simd, scene, background, (queue, Some(&mut *next)), hits, obstacles);
+        }
+    }
     if F::MIRRORS && next.count > 0 {
         core::mem::swap(&mut hits.color, pixels);
         let (mut queue, mut next) = (queue, next);
@@ -194,8 +217,9 @@ pub(super) fn draw<S: Simd, E: Real, F: Features>(
             core::mem::swap(&mut queue, &mut next);
             next.count = 0;
             let after = (bounce < tile.bounces).then_some(&mut *next);
-            later_generation::<S, E, F>(simd, scene, all, scene.background, hits, queue, after);
-            light_up::<S, E, F::Mirroring>(simd, scene, hits, obstacles);
+            hits.packets.clear();
+            look::<S, E, F::WithMirrors>(simd, scene, all, scene.background, queue, hits);
+            shade::<S, E, F, false>(simd, scene, scene.background, (queue, after), hits, obstacles);
             for ray in 0..queue.count {
                 let pixel = queue.pixel.0[ray].to_index();
                 for (sum, color) in pixels.iter_mut().zip(&hits.color) {
@@ -220,87 +244,117 @@ fn fill(tile: Tile, band: &mut Band) {
     }
 }
 
-/// The rays of the tile's pixels.
+/// The numbers of the column and the row of each pixel of the tile, packet by packet; rows count from the bottom.
 #[inline(always)]
-fn first_generation<S: Simd, E: Real, F: Features>(
+fn each_packet<S: Simd, E: Real>(
+    simd: S,
+    (tile, band): (Tile, &Band),
+    mut each: impl FnMut(usize, Lanes<S, E>, Lanes<S, E>),
+) {
+    let (width, height) = packet_shape::<S, E>();
+    let columns = lanes::<S, E>(simd, 0, width);
+    let rows = (lanes::<S, E>(simd, 0, usize::MAX) - columns) * E::narrow(1.0 / width as f64);
+    let right = constant::<S, E>(simd, f64::from(tile.left + tile.width - 1));
+    let bottom = constant::<S, E>(simd, f64::from(tile.top + tile.height - 1));
+    let last_row = constant::<S, E>(simd, f64::from(band.size.1 - 1));
+    let mut at = 0;
+    for top in (0..tile.height as usize).step_by(height) {
+        for left in (0..tile.width as usize).step_by(width) {
+            // Lanes beyond the edge draw the pixel on the edge again.
+            let i = (columns + E::narrow((tile.left as usize + left) as f64)).min(right);
+            let row = (rows + E::narrow((tile.top as usize + top) as f64)).min(bottom);
+            each(at, i, last_row - row);
+            at += Lanes::<S, E>::LEN;
+        }
+    }
+}
+
+/// The rays of the tile's pixels from an eye, and what they meet.
+#[inline(never)]
+fn look_from_eye<S: Simd, E: Real, F: Features>(
     simd: S,
     scene: &Prepared<E>,
-    tile: Tile,
+    (tile, band): (Tile, &Band),
+    [corner, right, up]: [[E; 3]; 3],
     candidates: Candidates,
-    band: &Band,
+    queue: &mut Queue<E>,
     hits: &mut Hits<E>,
-    (queue, next): (&mut Queue<E>, &mut Queue<E>),
 ) {
     simd.vectorize(
         #[inline(always)]
         || {
-            let (width, height) = packet_shape::<S, E>();
-            let columns = lanes::<S, E>(simd, 0, width);
-            let rows = (lanes::<S, E>(simd, 0, usize::MAX) - columns) * E::narrow(1.0 / width as f64);
-            let right = constant::<S, E>(simd, f64::from(tile.left + tile.width - 1));
-            let bottom = constant::<S, E>(simd, f64::from(tile.top + tile.height - 1));
-            let last_row = constant::<S, E>(simd, f64::from(band.size.1 - 1));
-            let background = band.background.map(|level| E::narrow(f64::from(level) / 255.0));
-            hits.packets.clear();
-            let mut at = 0;
-            for top in (0..tile.height as usize).step_by(height) {
-                for left in (0..tile.width as usize).step_by(width) {
-                    // Lanes beyond the edge draw the pixel on the edge again.
-                    let i = (columns + E::narrow((tile.left as usize + left) as f64)).min(right);
-                    let row = (rows + E::narrow((tile.top as usize + top) as f64)).min(bottom);
-                    let j = last_row - row;
-                    match scene.rays {
-                        Rays::Pinhole { corner, right, up } => {
-                            let along = Vec3::splat(simd, right).scale_add(i, Vec3::splat(simd, corner));
-                            let direction = Vec3::splat(simd, up).scale_add(j, along).normalize(simd);
-                            let ray = Ray { origin: Vec3::zero(simd), direction };
-                            let next = (None, Some(&mut *next));
-                            trace::<S, E, F, true>(simd, scene, ray, candidates, background, at, hits, next);
-                        }
-                        Rays::Parallel { corner, pixel } => {
-                            let pixel = splat::<S, E>(simd, pixel);
-                            let corner = Vec3::<S, E>::splat(simd, corner);
-                            Vec3::<S, E>::new(
-                                i.mul_add(pixel, corner.x),
-                                j.mul_add(pixel, corner.y),
-                                corner.z,
-                            )
-                            .store(&mut queue.origin, at);
-                            let (zero, one) = (E::narrow(0.0), E::narrow(1.0));
-                            Vec3::<S, E>::splat(simd, [zero, zero, E::narrow(-1.0)])
-                                .store(&mut queue.direction, at);
-                            Vec3::<S, E>::splat(simd, [one; 3]).store(&mut queue.weight, at);
-                            lanes::<S, E>(simd, at, usize::MAX)
-                                .store_slice(&mut queue.pixel.0[at..at + Lanes::<S, E>::LEN]);
-                            queue.count = at + Lanes::<S, E>::LEN;
-                        }
-                    }
-                    at += Lanes::<S, E>::LEN;
-                }
-            }
-            if let Rays::Parallel { .. } = scene.rays {
-                later_generation::<S, E, F>(simd, scene, candidates, background, hits, queue, Some(next));
-            }
+            let background: [E; 3] = band.background();
+            each_packet::<S, E>(
+                simd,
+                (tile, band),
+                #[inline(always)]
+                |at, i, j| {
+                    let along = Vec3::splat(simd, right).scale_add(i, Vec3::splat(simd, corner));
+                    let direction = Vec3::splat(simd, up).scale_add(j, along).normalize(simd);
+                    direction.store(&mut queue.direction, at);
+                    let ray = Ray { origin: Vec3::zero(simd), direction };
+                    let found = nearest::<S, E, F, true>(simd, scene, ray, candidates);
+                    hits.add(
+                        simd,
+                        at,
+                        found,
+                        #[inline(always)]
+                        || Vec3::splat(simd, background),
+                    );
+                },
+            );
         },
     );
 }
 
-/// The rays of a queue: those that the generation before sent on.
-#[inline(always)]
-fn later_generation<S: Simd, E: Real, F: Features>(
+/// The rays of the tile's pixels along the axis.
+#[inline(never)]
+fn aim_along_axis<S: Simd, E: Real>(
     simd: S,
-    scene: &Prepared<E>,
-    candidates: Candidates,
-    background: [E; 3],
-    hits: &mut Hits<E>,
+    (tile, band): (Tile, &Band),
+    (corner, pixel): ([E; 3], E),
     queue: &mut Queue<E>,
-    mut next: Option<&mut Queue<E>>,
 ) {
     simd.vectorize(
         #[inline(always)]
         || {
-            // Lanes beyond the last ray trace it again.
-            let (last, end) = (queue.count - 1, queue.count.next_multiple_of(Lanes::<S, E>::LEN));
+            let pixel = splat::<S, E>(simd, pixel);
+            let corner = Vec3::<S, E>::splat(simd, corner);
+            let (zero, one) = (E::narrow(0.0), E::narrow(1.0));
+            each_packet::<S, E>(
+                simd,
+                (tile, band),
+                #[inline(always)]
+                |at, i, j| {
+                    let end = at + Lanes::<S, E>::LEN;
+                    Vec3::<S, E>::new(i.mul_add(pixel, corner.x), j.mul_add(pixel, corner.y), corner.z)
+                        .store(&mut queue.origin, at);
+                    Vec3::<S, E>::splat(simd, [zero, zero, E::narrow(-1.0)]).store(&mut queue.direction, at);
+                    Vec3::<S, E>::splat(simd, [one; 3]).store(&mut queue.weight, at);
+                    lanes::<S, E>(simd, at, usize::MAX).store_slice(&mut queue.pixel.0[at..end]);
+                    queue.count = end;
+                },
+            );
+        },
+    );
+}
+
+/// What the rays of a queue meet.
+#[inline(never)]
+fn look<S: Simd, E: Real, F: Features>(
+    simd: S,
+    scene: &Prepared<E>,
+    candidates: Candidates,
+    background: [E; 3],
+    queue: &mut Queue<E>,
+    hits: &mut Hits<E>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            // The last packet is filled up with the last ray.
+            let last = queue.count - 1;
+            let end = queue.count.next_multiple_of(Lanes::<S, E>::LEN);
             for columns in [&mut queue.origin, &mut queue.direction, &mut queue.weight] {
                 for column in columns {
                     let value = column.0[last];
@@ -308,130 +362,287 @@ fn later_generation<S: Simd, E: Real, F: Features>(
                 }
             }
             queue.pixel.0[last + 1..end].fill(E::narrow(-1.0));
-            hits.packets.clear();
             for at in (0..queue.count).step_by(Lanes::<S, E>::LEN) {
                 let ray = Ray {
                     origin: Vec3::load(simd, &queue.origin, at),
                     direction: Vec3::load(simd, &queue.direction, at),
                 };
-                let queues = (Some(&*queue), next.as_deref_mut());
-                trace::<S, E, F, false>(simd, scene, ray, candidates, background, at, hits, queues);
+                let found = nearest::<S, E, F, false>(simd, scene, ray, candidates);
+                hits.add(
+                    simd,
+                    at,
+                    found,
+                    #[inline(always)]
+                    || weigh::<S, E, false>(simd, background, queue, at),
+                );
             }
         },
     );
 }
 
-/// Finds what a packet of rays sees: stores hits that wait for light, their colour without it, and mirrored rays.
-///
-/// `queues` are the one that the packet comes from, if it is not of the first generation, and the next.
-#[inline(always)]
-#[allow(
-    clippy::too_many_arguments,
-    reason = "inlined into its two callers; a struct of them would have no other use"
-)]
-fn trace<S: Simd, E: Real, F: Features, const EYE: bool>(
-    simd: S,
-    scene: &Prepared<E>,
-    ray: Ray<S, E>,
-    candidates: Candidates,
-    background: [E; 3],
-    at: usize,
-    hits: &mut Hits<E>,
-    (queue, next): (Option<&Queue<E>>, Option<&mut Queue<E>>),
-) {
-    let weight = match queue {
-        Some(queue) => Vec3::load(simd, &queue.weight, at),
-        None => Vec3::splat(simd, [E::narrow(1.0); 3]),
-    };
-    let found = nearest::<S, E, F, EYE>(simd, scene, ray, candidates);
-    let hit = found.hit(simd);
-    let background = weigh::<S, E, EYE>(Vec3::splat(simd, background), weight);
-    let mut remaining = hit.to_bitmask();
-    if remaining == 0 {
-        return background.store(&mut hits.color, at);
-    }
-    let zero = Vec3::zero(simd);
-    let mut start = zero;
-    let mut normal = zero;
-    let mut diffuse = zero;
-    let mut color = background;
-    let mut mirror_bits = 0;
-    let mut alone = u64::MAX;
-    // Without lights only mirrors need to know where and how a surface lies.
-    let is_lit = !scene.lights.is_empty();
-    while remaining != 0 {
-        let order = found.order[remaining.trailing_zeros() as usize];
-        let entry = &scene.entries[order.to_index()];
-        let same = hit & found.order.simd_eq(splat::<S, E>(simd, order));
-        let bits = same.to_bitmask();
-        let is_mirror = F::MIRRORS && entry.mirrors;
-        if is_mirror || is_lit {
-            let surface = surface::<S, E, F, EYE>(simd, scene, entry, ray, found.distance);
-            start = Vec3::select(same, surface.start, start);
-            normal = Vec3::select(same, surface.normal, normal);
-            diffuse = Vec3::select(same, Vec3::splat(simd, entry.diffuse), diffuse);
+impl<E: Real> Hits<E> {
+    /// Notes what a packet of rays meets; where that is nothing, the background is their colour.
+    #[inline(always)]
+    fn add<S: Simd>(
+        &mut self,
+        simd: S,
+        at: usize,
+        found: Nearest<S, E>,
+        background: impl FnOnce() -> Vec3<S, E>,
+    ) {
+        if !found.hit(simd).any_true() {
+            return background().store(&mut self.color, at);
         }
-        color = Vec3::select(same, weigh::<S, E, EYE>(Vec3::splat(simd, entry.ambient), weight), color);
-        if is_mirror {
-            mirror_bits |= bits;
-        }
-        if is_lit {
-            alone &= if bits == hit.to_bitmask() { own_shadow::<E, EYE>(scene, entry) } else { u64::MAX };
-        }
-        remaining &= !bits;
+        let end = at + Lanes::<S, E>::LEN;
+        found.distance.store_slice(&mut self.distance.0[at..end]);
+        found.order.store_slice(&mut self.order.0[at..end]);
+        // There is room for all packets of a tile; said, so that the loop holds no code to make more.
+        assert!(self.packets.len() < self.packets.capacity());
+        self.packets.push((at, u64::MAX));
     }
-    if F::SHADOWS && scene.needs.shadows {
-        // Lanes without a hit start where the first hit does, and leave the region as it is.
-        let mut all = start;
-        if hit.any_false() {
-            let first = hit.to_bitmask().trailing_zeros() as usize;
-            let known = Vec3::splat(simd, [start.x[first], start.y[first], start.z[first]]);
-            all = Vec3::select(hit, start, known);
-        }
-        all.store(&mut hits.start, at);
-    }
-    color.store(&mut hits.color, at);
-    if is_lit {
-        normal.store(&mut hits.normal, at);
-        weigh::<S, E, EYE>(diffuse, weight).store(&mut hits.diffuse, at);
-        hits.packets.push((at, alone));
-    }
-    if !F::MIRRORS || mirror_bits == 0 {
-        return;
-    }
-    let Some(next) = next else { return };
-    let mut mirror = zero;
-    let mut mirrors = hit & !hit;
-    while mirror_bits != 0 {
-        let order = found.order[mirror_bits.trailing_zeros() as usize];
-        let same = hit & found.order.simd_eq(splat::<S, E>(simd, order));
-        mirrors |= same;
-        mirror = Vec3::select(same, Vec3::splat(simd, scene.entries[order.to_index()].mirror), mirror);
-        mirror_bits &= !same.to_bitmask();
-    }
-    // The normal faces the ray; where rounding says otherwise, the ray grazes.
-    let towards = ray.direction.dot(normal).min(constant::<S, E>(simd, 0.0));
-    let direction = normal.scale_add(towards * constant::<S, E>(simd, -2.0), ray.direction);
-    // A step of Newton's method keeps its length at 1.
-    let stretch = direction.dot(direction).mul_add(constant::<S, E>(simd, -0.5), constant::<S, E>(simd, 1.5));
-    let pixel = match queue {
-        Some(queue) => Lanes::<S, E>::from_slice(simd, &queue.pixel.0[at..at + Lanes::<S, E>::LEN]),
-        None => lanes::<S, E>(simd, at, usize::MAX),
-    };
-    // Lanes that only repeat another send nothing on.
-    let mirrors = if EYE { mirrors } else { mirrors & pixel.simd_ge(constant::<S, E>(simd, 0.0)) };
-    let end = next.count;
-    compress(start, mirrors, &mut next.origin, end);
-    compress(direction.scale(stretch), mirrors, &mut next.direction, end);
-    compress(weigh::<S, E, EYE>(mirror, weight), mirrors, &mut next.weight, end);
-    pixel.compress(mirrors).store_slice(&mut next.pixel.0[end..end + Lanes::<S, E>::LEN]);
-    next.count += mirrors.to_bitmask().count_ones() as usize;
 }
 
-/// A colour times the ray's weight, which is 1 for rays from the eye.
+/// Draws what a generation has met: surfaces, their light, and the rays that mirrors send on to the `next`.
 #[inline(always)]
-fn weigh<S: Simd, E: Real, const EYE: bool>(color: Vec3<S, E>, weight: Vec3<S, E>) -> Vec3<S, E> {
-    if EYE { color } else { color.mul(weight) }
+fn shade<S: Simd, E: Real, F: Features, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    background: [E; 3],
+    (queue, next): (&Queue<E>, Option<&mut Queue<E>>),
+    hits: &mut Hits<E>,
+    obstacles: &mut Obstacles,
+) {
+    if hits.packets.is_empty() {
+        return;
+    }
+    let mirrors = F::MIRRORS && scene.needs.mirrors;
+    if !scene.lights.is_empty() {
+        surfaces::<S, E, F::WithTree, EYE, true>(simd, scene, background, queue, hits);
+        if F::SHADOWS && scene.needs.shadows {
+            obstacles.find(simd, scene, hits);
+            light_up::<S, E, F::WithMirrors, true>(simd, scene, hits, obstacles);
+        } else {
+            light_up::<S, E, Spheres, false>(simd, scene, hits, obstacles);
+        }
+    } else if mirrors {
+        surfaces::<S, E, F::WithTree, EYE, false>(simd, scene, background, queue, hits);
+    } else {
+        ambient::<S, E, EYE>(simd, scene, background, queue, hits);
+    }
+    if mirrors && let Some(next) = next {
+        reflect::<S, E, EYE>(simd, scene, queue, hits, next);
+    }
+}
+
+/// The colour of hits that neither light nor mirrors change.
+#[inline(never)]
+fn ambient<S: Simd, E: Real, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    background: [E; 3],
+    queue: &Queue<E>,
+    hits: &mut Hits<E>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let Hits { distance, order, color, packets, .. } = hits;
+            for &(at, _) in &*packets {
+                let met = Met::<S, E>::new(simd, at, distance, order);
+                let mut sum = weigh::<S, E, EYE>(simd, background, queue, at);
+                met.each_object(
+                    simd,
+                    scene,
+                    #[inline(always)]
+                    |entry, same, _| {
+                        sum = Vec3::select(same, weigh::<S, E, EYE>(simd, entry.ambient, queue, at), sum);
+                    },
+                );
+                sum.store(color, at);
+            }
+        },
+    );
+}
+
+/// What a packet of rays meets that meet something.
+#[derive(Clone, Copy)]
+struct Met<'a, S: Simd, E: Real> {
+    found: Nearest<S, E>,
+    /// The same orders, for one lane at a time.
+    orders: &'a [E],
+    hit: Mask<S, E>,
+}
+
+impl<'a, S: Simd, E: Real> Met<'a, S, E> {
+    #[inline(always)]
+    fn new(simd: S, at: usize, distance: &Column<E>, order: &'a Column<E>) -> Self {
+        let lanes = at..at + Lanes::<S, E>::LEN;
+        let orders = &order.0[lanes.clone()];
+        let distance = Lanes::<S, E>::from_slice(simd, &distance.0[lanes]);
+        let found = Nearest { distance, order: Lanes::<S, E>::from_slice(simd, orders) };
+        Self { found, orders, hit: found.hit(simd) }
+    }
+
+    /// The object that a lane meets, and the lanes that meet it.
+    #[inline(always)]
+    fn object<'s>(&self, simd: S, scene: &'s Prepared<E>, lane: u32) -> (&'s Entry<E>, Mask<S, E>) {
+        let order = self.orders[lane as usize];
+        let same = self.hit & self.found.order.simd_eq(splat::<S, E>(simd, order));
+        (&scene.entries[order.to_index()], same)
+    }
+
+    /// The objects that it meets, each with the lanes that meet it, and whether it is the first.
+    #[inline(always)]
+    fn each_object(&self, simd: S, scene: &Prepared<E>, mut each: impl FnMut(&Entry<E>, Mask<S, E>, bool)) {
+        let hit = self.hit.to_bitmask();
+        let mut remaining = hit;
+        while remaining != 0 {
+            let (entry, same) = self.object(simd, scene, remaining.trailing_zeros());
+            each(entry, same, remaining == hit);
+            remaining &= !same.to_bitmask();
+        }
+    }
+}
+
+/// An object's lanes of a packet.
+#[derive(Clone, Copy)]
+struct Share<S: Simd, E: Real> {
+    at: usize,
+    lanes: Mask<S, E>,
+    /// Whether it is the packet's first.
+    is_first: bool,
+}
+
+impl<S: Simd, E: Real> Share<S, E> {
+    /// Writes its lanes; the first object writes the `rest` too.
+    #[inline(always)]
+    fn put(self, simd: S, of: Vec3<S, E>, rest: Vec3<S, E>, into: &mut Columns<E>) {
+        let rest = if self.is_first { rest } else { Vec3::load(simd, into, self.at) };
+        Vec3::select(self.lanes, of, rest).store(into, self.at);
+    }
+}
+
+/// The colour of hits without light, and for light (if `LIT`) and mirrors how their surfaces lie.
+#[inline(never)]
+fn surfaces<S: Simd, E: Real, F: Features, const EYE: bool, const LIT: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    background: [E; 3],
+    queue: &Queue<E>,
+    hits: &mut Hits<E>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let Hits { distance, order, start, normal, diffuse, color, packets, mirrors } = hits;
+            mirrors.clear();
+            let zero = Vec3::zero(simd);
+            for (at, others) in packets {
+                let at = *at;
+                let met = Met::<S, E>::new(simd, at, distance, order);
+                let mut mirror_bits = 0;
+                met.each_object(
+                    simd,
+                    scene,
+                    #[inline(always)]
+                    |entry, same, is_first| {
+                        let share = Share { at, lanes: same, is_first };
+                        let bits = same.to_bitmask();
+                        let behind = weigh::<S, E, EYE>(simd, background, queue, at);
+                        share.put(simd, weigh::<S, E, EYE>(simd, entry.ambient, queue, at), behind, color);
+                        if F::MIRRORS && entry.mirrors {
+                            mirror_bits |= bits;
+                        } else if !LIT {
+                            return;
+                        }
+                        let origin = if EYE { zero } else { Vec3::load(simd, &queue.origin, at) };
+                        let ray = Ray { origin, direction: Vec3::load(simd, &queue.direction, at) };
+                        let surface = surface::<S, E, F, EYE>(simd, scene, entry, ray, met.found.distance);
+                        share.put(simd, surface.normal, zero, normal);
+                        if LIT {
+                            share.put(
+                                simd,
+                                weigh::<S, E, EYE>(simd, entry.diffuse, queue, at),
+                                zero,
+                                diffuse,
+                            );
+                            let is_alone = is_first && bits == met.hit.to_bitmask();
+                            *others = if is_alone { own_shadow::<E, EYE>(scene, entry) } else { u64::MAX };
+                        }
+                        let Vec3 { x, y, z } = surface.start;
+                        // Lanes without a hit start where the first hit does, and widen no region.
+                        let lane = bits.trailing_zeros() as usize;
+                        share.put(simd, surface.start, Vec3::splat(simd, [x[lane], y[lane], z[lane]]), start);
+                    },
+                );
+                if F::MIRRORS && mirror_bits != 0 {
+                    mirrors.push((at, mirror_bits));
+                }
+            }
+        },
+    );
+}
+
+/// The rays that mirrors send on.
+#[inline(never)]
+fn reflect<S: Simd, E: Real, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    queue: &Queue<E>,
+    hits: &Hits<E>,
+    next: &mut Queue<E>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            for &(at, mut bits) in &hits.mirrors {
+                let met = Met::<S, E>::new(simd, at, &hits.distance, &hits.order);
+                let mut mirror = Vec3::<S, E>::zero(simd);
+                let mut mirrors = met.hit & !met.hit;
+                while bits != 0 {
+                    let (entry, same) = met.object(simd, scene, bits.trailing_zeros());
+                    mirrors |= same;
+                    mirror = Vec3::select(same, weigh::<S, E, EYE>(simd, entry.mirror, queue, at), mirror);
+                    bits &= !same.to_bitmask();
+                }
+                let normal = Vec3::<S, E>::load(simd, &hits.normal, at);
+                let incoming = Vec3::load(simd, &queue.direction, at);
+                // The normal faces the ray; where rounding says otherwise, the ray grazes.
+                let towards = incoming.dot(normal).min(constant::<S, E>(simd, 0.0));
+                let direction = normal.scale_add(towards * constant::<S, E>(simd, -2.0), incoming);
+                // A step of Newton's method keeps its length at 1.
+                let stretch = direction
+                    .dot(direction)
+                    .mul_add(constant::<S, E>(simd, -0.5), constant::<S, E>(simd, 1.5));
+                let pixel = if EYE {
+                    lanes::<S, E>(simd, at, usize::MAX)
+                } else {
+                    Lanes::<S, E>::from_slice(simd, &queue.pixel.0[at..at + Lanes::<S, E>::LEN])
+                };
+                // Lanes that only repeat another send nothing on.
+                let mirrors =
+                    if EYE { mirrors } else { mirrors & pixel.simd_ge(constant::<S, E>(simd, 0.0)) };
+                let end = next.count;
+                compress(Vec3::load(simd, &hits.start, at), mirrors, &mut next.origin, end);
+                compress(direction.scale(stretch), mirrors, &mut next.direction, end);
+                compress(mirror, mirrors, &mut next.weight, end);
+                pixel.compress(mirrors).store_slice(&mut next.pixel.0[end..end + Lanes::<S, E>::LEN]);
+                next.count += mirrors.to_bitmask().count_ones() as usize;
+            }
+        },
+    );
+}
+
+/// A colour times the weights of a packet's rays, which are 1 for rays from the eye.
+#[inline(always)]
+fn weigh<S: Simd, E: Real, const EYE: bool>(
+    simd: S,
+    color: [E; 3],
+    queue: &Queue<E>,
+    at: usize,
+) -> Vec3<S, E> {
+    let color = Vec3::splat(simd, color);
+    if EYE { color } else { color.mul(Vec3::load(simd, &queue.weight, at)) }
 }
 
 #[inline(always)]
@@ -467,168 +678,55 @@ pub(super) fn surface<S: Simd, E: Real, F: Features, const EYE: bool>(
     F::sphere_surface::<S, E, EYE>(simd, &scene.spheres[at], ray, distance)
 }
 
-/// Adds the light that reaches the hits.
-#[inline(always)]
-fn light_up<S: Simd, E: Real, F: Features>(
-    simd: S,
-    scene: &Prepared<E>,
-    hits: &mut Hits<E>,
-    obstacles: &mut Obstacles,
-) {
+/// Colours to the bytes of the image.
+#[inline(never)]
+fn develop<S: Simd, E: Real>(simd: S, tile: Tile, colors: &Columns<E>, band: &mut Band) {
     simd.vectorize(
         #[inline(always)]
         || {
-            if hits.packets.is_empty() {
-                return;
-            }
-            let Obstacles { of, seen } = obstacles;
-            of.resize_with(scene.lights.len(), InTheWay::default);
-            if F::SHADOWS && scene.needs.shadows {
-                let (low, high) = region(simd, hits);
-                for (light, of) in scene.lights.iter().zip(of.iter_mut()) {
-                    let beam = beam(light, low, high);
-                    if F::TREE && scene.tree.is_some() {
-                        let InTheWay { list, is_listed, .. } = of;
-                        *is_listed =
-                            light.buffer.as_ref().is_some_and(|buffer| buffer.gather(&beam, seen, list));
-                    } else {
-                        of.masks = Masks::split(in_the_way(simd, &light.outlines, beam), scene);
+            let (width, height) = packet_shape::<S, E>();
+            let stride = band.size.0 as usize * CHANNELS;
+            let mut at = 0;
+            for top in (0..tile.height as usize).step_by(height) {
+                for left in (0..tile.width as usize).step_by(width) {
+                    let mut packed = [0; 16];
+                    let Vec3 { x, y, z } = Vec3::<S, E>::load(simd, colors, at);
+                    #[cfg(feature = "accuracy")]
+                    for channel in [x, y, z] {
+                        crate::nans::add(channel.simd_ne(channel).to_bitmask().count_ones());
                     }
+                    E::pack::<S>(
+                        [level::<S, E>(simd, x), level::<S, E>(simd, y), level::<S, E>(simd, z)],
+                        &mut packed,
+                    );
+                    let rows = top..(top + height).min(tile.height as usize);
+                    for (row, pixels) in rows.zip(packed.chunks_exact(width)) {
+                        let from = row * stride + (tile.left as usize + left) * CHANNELS;
+                        let columns = tile.width as usize - left;
+                        if columns >= width {
+                            write(pixels, &mut band.bytes[from..from + width * CHANNELS]);
+                        } else {
+                            write(&pixels[..columns], &mut band.bytes[from..from + columns * CHANNELS]);
+                        }
+                    }
+                    at += Lanes::<S, E>::LEN;
                 }
-            }
-            let zero = constant::<S, E>(simd, 0.0);
-            for &(at, others) in &hits.packets {
-                let normal = Vec3::load(simd, &hits.normal, at);
-                let start = Vec3::load(simd, &hits.start, at);
-                let mut sum = Vec3::zero(simd);
-                for (light, obstacles) in scene.lights.iter().zip(of.iter()) {
-                    let cosine = normal.dot(Vec3::splat(simd, light.axes[2]));
-                    let mut lit = cosine.simd_gt(zero);
-                    if !lit.any_true() {
-                        continue;
-                    }
-                    if F::SHADOWS && scene.needs.shadows {
-                        let candidates = Candidates {
-                            masks: obstacles.masks.and_spheres(others),
-                            list: obstacles.is_listed.then_some(&obstacles.list),
-                        };
-                        lit = unshaded::<S, E, F>(simd, scene, light, start, lit, candidates);
-                    }
-                    sum = Vec3::splat(simd, light.color).scale_add(lit.select(cosine, zero), sum);
-                }
-                let diffuse = Vec3::load(simd, &hits.diffuse, at);
-                let color = Vec3::load(simd, &hits.color, at);
-                let lit = Vec3::<S, E>::new(
-                    diffuse.x.mul_add(sum.x, color.x),
-                    diffuse.y.mul_add(sum.y, color.y),
-                    diffuse.z.mul_add(sum.z, color.z),
-                );
-                lit.store(&mut hits.color, at);
             }
         },
     );
 }
 
-/// The box of the points that wait for light; there is at least one.
+/// The three bytes of each pixel, two pixels at a time.
 #[inline(always)]
-fn region<S: Simd, E: Real>(simd: S, hits: &Hits<E>) -> ([E; 3], [E; 3]) {
-    let far = constant::<S, E>(simd, E::FAR);
-    let near = constant::<S, E>(simd, -E::FAR);
-    let mut low = Vec3::<S, E>::new(far, far, far);
-    let mut high = Vec3::<S, E>::new(near, near, near);
-    for &(at, _) in &hits.packets {
-        let Vec3 { x, y, z } = Vec3::<S, E>::load(simd, &hits.start, at);
-        low = Vec3::<S, E>::new(low.x.min(x), low.y.min(y), low.z.min(z));
-        high = Vec3::<S, E>::new(high.x.max(x), high.y.max(y), high.z.max(z));
+fn write(pixels: &[u32], bytes: &mut [u8]) {
+    let (pairs, last) = pixels.as_chunks();
+    let (two, one) = bytes.as_chunks_mut::<{ 2 * CHANNELS }>();
+    for (bytes, &[first, second]) in two.iter_mut().zip(pairs) {
+        let both = (u64::from(first) | u64::from(second) << 24).to_le_bytes();
+        bytes.copy_from_slice(&both[..2 * CHANNELS]);
     }
-    (
-        [low.x.reduce_min(), low.y.reduce_min(), low.z.reduce_min()],
-        [high.x.reduce_max(), high.y.reduce_max(), high.z.reduce_max()],
-    )
-}
-
-/// The shadow rays that start in a box, wider by the rounding errors.
-#[inline(always)]
-fn beam<E: Real>(light: &Light<E>, low: [E; 3], high: [E; 3]) -> Beam {
-    let mut spans = [(0.0, 0.0); 3];
-    let mut starts = [0.0; 3];
-    for ((axis, (from, to)), nearest) in light.axes.iter().zip(&mut spans).zip(0..3) {
-        let mut slack = 0.0;
-        for ((direction, low), high) in axis.iter().zip(low).zip(high) {
-            let (a, b) = (direction.widen() * low.widen(), direction.widen() * high.widen());
-            *from += a.min(b);
-            *to += a.max(b);
-            slack += a.abs().max(b.abs());
-        }
-        *from -= 16.0 * E::ROUNDOFF * slack;
-        *to += 16.0 * E::ROUNDOFF * slack;
-        let backwards = light.axes[2][nearest] < E::narrow(0.0);
-        starts[nearest] = if backwards { -high[nearest].widen() } else { low[nearest].widen() };
-    }
-    let [x, y, z] = spans;
-    Beam { low: [x.0, y.0], high: [x.1, y.1], height: z.0, starts }
-}
-
-/// The objects that can stand in a beam's way, by bits.
-#[inline(always)]
-fn in_the_way<S: Simd, E: Real>(simd: S, outlines: &Outlines<E>, beam: Beam) -> u64 {
-    let (left, right) = (constant::<S, E>(simd, beam.low[0]), constant::<S, E>(simd, beam.high[0]));
-    let (bottom, top) = (constant::<S, E>(simd, beam.low[1]), constant::<S, E>(simd, beam.high[1]));
-    let near = constant::<S, E>(simd, beam.height);
-    let [x, y, z] = beam.starts;
-    let starts = Vec3::<S, E>::splat(simd, [E::narrow(x), E::narrow(y), E::narrow(z)]);
-    let mut candidates = 0;
-    let count = outlines.top.len();
-    for at in (0..count).step_by(Lanes::<S, E>::LEN) {
-        let overlap = load::<S, E>(simd, at, &outlines.low[0]).simd_le(right)
-            & load::<S, E>(simd, at, &outlines.high[0]).simd_ge(left)
-            & load::<S, E>(simd, at, &outlines.low[1]).simd_le(top)
-            & load::<S, E>(simd, at, &outlines.high[1]).simd_ge(bottom)
-            & load::<S, E>(simd, at, &outlines.top).simd_ge(near)
-            & load::<S, E>(simd, at, &outlines.exits[0]).simd_ge(starts.x)
-            & load::<S, E>(simd, at, &outlines.exits[1]).simd_ge(starts.y)
-            & load::<S, E>(simd, at, &outlines.exits[2]).simd_ge(starts.z);
-        candidates |= overlap.to_bitmask() << at;
-    }
-    candidates
-}
-
-#[inline(always)]
-fn load<S: Simd, E: Real>(simd: S, at: usize, from: &[E]) -> Lanes<S, E> {
-    Lanes::<S, E>::from_slice(simd, &from[at..at + Lanes::<S, E>::LEN])
-}
-
-/// Colours to the bytes of the image.
-#[inline(always)]
-fn develop<S: Simd, E: Real>(simd: S, tile: Tile, colors: &Columns<E>, band: &mut Band) {
-    let (width, height) = packet_shape::<S, E>();
-    let stride = band.size.0 as usize * CHANNELS;
-    let mut at = 0;
-    for top in (0..tile.height as usize).step_by(height) {
-        for left in (0..tile.width as usize).step_by(width) {
-            let mut packed = [0; 16];
-            let Vec3 { x, y, z } = Vec3::<S, E>::load(simd, colors, at);
-            #[cfg(feature = "accuracy")]
-            for channel in [x, y, z] {
-                crate::nans::add(channel.simd_ne(channel).to_bitmask().count_ones());
-            }
-            E::pack::<S>(
-                [level::<S, E>(simd, x), level::<S, E>(simd, y), level::<S, E>(simd, z)],
-                &mut packed,
-            );
-            for (row, pixels) in
-                (top..(top + height).min(tile.height as usize)).zip(packed.chunks_exact(width))
-            {
-                let from = row * stride + (tile.left as usize + left) * CHANNELS;
-                let columns = width.min(tile.width as usize - left);
-                let bytes = &mut band.bytes[from..from + columns * CHANNELS];
-                for (bytes, pixel) in bytes.as_chunks_mut::<CHANNELS>().0.iter_mut().zip(pixels) {
-                    let [r, g, b, _] = pixel.to_le_bytes();
-                    *bytes = [r, g, b];
-                }
-            }
-            at += Lanes::<S, E>::LEN;
-        }
+    if let [last] = last {
+        one.copy_from_slice(&last.to_le_bytes()[..CHANNELS]);
     }
 }
 

@@ -48,12 +48,18 @@ pub struct Hit {
 pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     let scene = &*recentred(scene);
     let rays = Rays::new(&scene.camera, scene.screen);
-    bands(scene.screen, 1, options, |row, band| {
-        let j = scene.screen.height() - 1 - row;
-        for (pixel, i) in band.chunks_exact_mut(CHANNELS).zip(0u32..) {
-            pixel.copy_from_slice(&levels(color_along(scene, rays.ray(i, j), options.bounces())));
-        }
-    })
+    bands(
+        scene.screen,
+        1,
+        options,
+        || (),
+        |(), row, band| {
+            let j = scene.screen.height() - 1 - row;
+            for (pixel, i) in band.chunks_exact_mut(CHANNELS).zip(0u32..) {
+                pixel.copy_from_slice(&levels(color_along(scene, rays.ray(i, j), options.bounces())));
+            }
+        },
+    )
 }
 
 /// The colour of a pixel, unclamped; `i` counts from the left, `j` from the bottom.
