@@ -227,7 +227,12 @@ impl<'a> Stripe<'a> {
                 return clear;
             }
         }
-        if nearest <= ink.error + AT_ONCE && self.writer.extend(ink.index) {
+        let at_once = nearest <= ink.error + AT_ONCE;
+        if at_once && self.writer.extend(ink.index) {
+            return ink.index;
+        }
+        if nearest <= fresh && !self.writer.is_known() {
+            self.writer.put(ink.index);
             return ink.index;
         }
         let around = &self.inks.palette.around[usize::from(ink.index)];
@@ -243,7 +248,8 @@ impl<'a> Stripe<'a> {
                 best = (ink.index, nearest);
             }
         }
-        if self.writer.extend(best.0) {
+        let tried = |index: u8| at_once && index == ink.index;
+        if !tried(best.0) && self.writer.extend(best.0) {
             return best.0;
         }
         if !self.writer.is_known() {
@@ -251,7 +257,7 @@ impl<'a> Stripe<'a> {
             return best.0;
         }
         let mut found = (best.0, best.1 + LENIENCE);
-        if nearest < found.1 && self.writer.continues(ink.index) {
+        if !at_once && best.0 != ink.index && nearest < found.1 && self.writer.continues(ink.index) {
             found = (ink.index, nearest);
         }
         for (&index, &error) in around.indices.iter().zip(&errors) {
