@@ -41,7 +41,8 @@ pub(crate) fn log_log(path: &Path, labels: &Labels, series: &[Series]) -> Result
     draw(path, labels, series).map_err(|error| anyhow!("{}: {error}", path.display()))
 }
 
-/// Draws a column of points for each name, x being the name's index, and level lines.
+/// Draws a column of points for each name, x being the name's index, and level lines; y is logarithmic. What is not
+/// above 0 cannot be shown.
 pub(crate) fn columns(
     path: &Path,
     labels: &Labels,
@@ -59,7 +60,9 @@ fn draw_columns(
     lines: &[f64],
     series: &[Series],
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let top = series.iter().flat_map(|s| &s.points).map(|p| p.1).fold(1.0, f64::max) * 1.08;
+    let shown = || series.iter().flat_map(|s| &s.points).map(|p| p.1).filter(|&y| y > 0.0);
+    let (low, high) = shown().fold((1.0_f64, 1.0_f64), |(low, high), y| (low.min(y), high.max(y)));
+    let (bottom, top) = (low / 1.2, high * 1.2);
     let area = SVGBackend::new(path, SIZE).into_drawing_area();
     area.fill(&WHITE)?;
     // The names of the series stand to the right of the columns.
@@ -69,18 +72,20 @@ fn draw_columns(
         .margin(12)
         .x_label_area_size(110)
         .y_label_area_size(72)
-        .build_cartesian_2d(-0.6..width - 0.4, 0.0..top)?;
+        .build_cartesian_2d(-0.6..width - 0.4, (bottom..top).log_scale())?;
     chart
         .configure_mesh()
         .disable_x_mesh()
         .disable_x_axis()
         .y_desc(labels.y)
+        .y_labels(24)
+        .y_label_formatter(&|y| ratio_label(*y))
         .max_light_lines(0)
         .label_style(("sans-serif", 14))
         .draw()?;
     let turned = ("sans-serif", 14).into_font().transform(FontTransform::Rotate270);
     for (k, name) in names.iter().enumerate() {
-        let place = chart.backend_coord(&(k as f64, 0.0));
+        let place = chart.backend_coord(&(k as f64, bottom));
         area.draw(&Text::new(*name, (place.0 - 8, place.1 + 8 + 8 * name.len() as i32), turned.clone()))?;
     }
     for &line in lines {
@@ -90,8 +95,9 @@ fn draw_columns(
     for (k, series) in series.iter().enumerate() {
         let style = COLORS[k % COLORS.len()].filled();
         let shift = 0.1 * (k as f64 - 0.5 * (COLORS.len() - 1) as f64);
+        let points = series.points.iter().filter(|point| point.1 > 0.0);
         chart
-            .draw_series(series.points.iter().map(|&(x, y)| Circle::new((x + shift, y), 4, style)))?
+            .draw_series(points.map(|&(x, y)| Circle::new((x + shift, y), 4, style)))?
             .label(&series.name)
             .legend(move |(x, y)| Circle::new((x + 8, y), 5, style));
     }
@@ -156,6 +162,11 @@ fn label(x: f64) -> String {
     if [1.0, 2.0, 5.0].contains(&digit) { format!("{digit}e{exponent}") } else { String::new() }
 }
 
+/// The number itself, for 1, 2 and 5 times a power of ten.
+fn ratio_label(y: f64) -> String {
+    if label(y).is_empty() { String::new() } else { format!("{}", (y * 1e6).round() / 1e6) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -167,5 +178,6 @@ mod tests {
             ["1e-6", "1e-5", ""]
         );
         assert_eq!([2e-4, 5e7, 1.0].map(label), ["2e-4", "5e7", "1e0"]);
+        assert_eq!([0.05, 0.3, 0.5, 1.0, 20.0].map(ratio_label), ["0.05", "", "0.5", "1", "20"]);
     }
 }

@@ -308,6 +308,6 @@ fn plots(folder: &Path, results: &[Measured]) -> anyhow::Result<()> {
         Series { name: goal.name.to_owned(), points: points.collect(), joined: false }
     });
     let names = compared.iter().map(|(name, _)| *name).collect::<Vec<_>>();
-    let labels = Labels { title: "rayfold / gifski at quality 100", x: "", y: "ratio" };
+    let labels = Labels { title: "rayfold / gifski at quality 100", x: "", y: "ratio (0 is left out)" };
     columns(&folder.join("ratios.svg"), &labels, &names, &[1.0 / 3.0, 1.0], &ratios.collect::<Vec<_>>())
 }
