@@ -5,6 +5,8 @@
 //! accelerator", 1986), from which a tile takes what lies over the region that it shows. Where a list would be long, the
 //! tree is the better way, and the list is left out.
 
+use std::ops::Range;
+
 use glam::{DMat3, DVec3};
 
 use super::geometry::{Shape, Solid, View};
@@ -63,27 +65,35 @@ struct Lists {
 impl Lists {
     /// One list a cell of a grid; each of the items lies in a rectangle of cells, ends included, or nowhere. None
     /// where there would be more than `most` entries.
+    // Out of line and in plain loops, as [`LightBuffer::gather`] is.
+    #[inline(never)]
     fn new(columns: usize, rows: usize, rectangles: &[Option<Rectangle>], most: usize) -> Option<Self> {
         let entries: usize = rectangles.iter().flatten().map(Rectangle::cells).sum();
         if entries > most {
             return None;
         }
         let mut starts = vec![0u32; columns * rows + 1];
-        let cells = |r: &Rectangle| {
-            let r = *r;
-            (r.rows.0..=r.rows.1)
-                .flat_map(move |row| (r.columns.0..=r.columns.1).map(move |c| row * columns + c))
-        };
-        rectangles.iter().flatten().flat_map(cells).for_each(|cell| starts[cell + 1] += 1);
-        for cell in 0..columns * rows {
-            starts[cell + 1] += starts[cell];
+        for rectangle in rectangles.iter().flatten() {
+            for row in rectangle.rows.0..rectangle.rows.1 + 1 {
+                for count in &mut starts[1..][rectangle.cells_of(row, columns)] {
+                    *count += 1;
+                }
+            }
+        }
+        let mut sum = 0;
+        for start in &mut starts {
+            sum += *start;
+            *start = sum;
         }
         let mut items = vec![0; entries];
         let mut ends = starts.clone();
         for (item, rectangle) in rectangles.iter().enumerate() {
-            for cell in rectangle.iter().flat_map(cells) {
-                items[ends[cell] as usize] = item as u32;
-                ends[cell] += 1;
+            let Some(rectangle) = rectangle else { continue };
+            for row in rectangle.rows.0..rectangle.rows.1 + 1 {
+                for end in &mut ends[rectangle.cells_of(row, columns)] {
+                    items[*end as usize] = item as u32;
+                    *end += 1;
+                }
             }
         }
         Some(Self { starts, items })
@@ -104,6 +114,11 @@ struct Rectangle {
 impl Rectangle {
     fn cells(&self) -> usize {
         (self.columns.1 - self.columns.0 + 1) * (self.rows.1 - self.rows.0 + 1)
+    }
+
+    /// Its cells in a row, where rows are `columns` long.
+    fn cells_of(&self, row: usize, columns: usize) -> Range<usize> {
+        row * columns + self.columns.0..row * columns + self.columns.1 + 1
     }
 }
 
@@ -307,45 +322,55 @@ impl LightBuffer {
     }
 
     /// What can stand in a beam's way; false if that is too much.
-    // Out of line, so that it is the same code whatever kernels a build has.
+    // Out of line, so that it is the same code whatever kernels a build has, and in plain loops, so that it does not turn
+    // on which iterators the compiler inlines.
     #[inline(never)]
     pub(super) fn gather(&self, beam: &Beam, seen: &mut Seen, into: &mut Picked) -> bool {
         into.clear();
-        let grid = &*self.0;
-        let Grid { lists, outlines, before, side, corner, pitch } = grid;
+        let Grid { lists, outlines, before, side, corner, pitch } = &*self.0;
         if seen.marks.len() < outlines.len() {
             seen.marks.resize(outlines.len(), 0);
         }
         seen.gathering += 1;
+        let marks = &mut seen.marks[..outlines.len()];
         let cell = |x: f64, axis: usize| (((x - corner[axis]) * pitch[axis]).max(0.0) as usize).min(side - 1);
-        let [columns, rows] = [0, 1].map(|axis| cell(beam.low[axis], axis)..=cell(beam.high[axis], axis));
+        let columns = (cell(beam.low[0], 0), cell(beam.high[0], 0) + 1);
+        let rows = cell(beam.low[1], 1)..cell(beam.high[1], 1) + 1;
         // The cells of a row lie side by side.
-        let lists = rows.map(|row| {
-            let cells = row * side + columns.start()..row * side + columns.end() + 1;
-            lists.starts[cells.start] as usize..lists.starts[cells.end] as usize
-        });
-        if lists.clone().map(|list| list.len()).sum::<usize>() > LOOKED_AT {
+        let row = |row: usize| {
+            let (from, to) = (row * side + columns.0, row * side + columns.1);
+            &lists.items[lists.starts[from] as usize..lists.starts[to] as usize]
+        };
+        let mut entries = 0;
+        for at in rows.clone() {
+            entries += row(at).len();
+        }
+        if entries > LOOKED_AT {
             return false;
         }
-        for &item in lists.flat_map(|list| &grid.lists.items[list]) {
-            let (mark, o) = (&mut seen.marks[item as usize], &outlines[item as usize]);
-            if *mark == seen.gathering {
-                continue;
-            }
-            *mark = seen.gathering;
-            let meets = o.low[0] <= beam.high[0]
-                && o.high[0] >= beam.low[0]
-                && o.low[1] <= beam.high[1]
-                && o.high[1] >= beam.low[1]
-                && o.top >= beam.height
-                && o.exits[0] >= beam.starts[0]
-                && o.exits[1] >= beam.starts[1]
-                && o.exits[2] >= beam.starts[2];
-            if meets {
-                if into.len() == LONGEST {
-                    return false;
+        let mut count = 0;
+        for at in rows {
+            for &item in row(at) {
+                let (mark, o) = (&mut marks[item as usize], &outlines[item as usize]);
+                if *mark == seen.gathering {
+                    continue;
                 }
-                into.push(item, *before);
+                *mark = seen.gathering;
+                let meets = o.low[0] <= beam.high[0]
+                    && o.high[0] >= beam.low[0]
+                    && o.low[1] <= beam.high[1]
+                    && o.high[1] >= beam.low[1]
+                    && o.top >= beam.height
+                    && o.exits[0] >= beam.starts[0]
+                    && o.exits[1] >= beam.starts[1]
+                    && o.exits[2] >= beam.starts[2];
+                if meets {
+                    if count == LONGEST {
+                        return false;
+                    }
+                    count += 1;
+                    into.push(item, *before);
+                }
             }
         }
         true

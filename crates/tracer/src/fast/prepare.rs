@@ -291,6 +291,7 @@ fn sphere<E: Real>(solid: &Solid) -> Sphere<E> {
     }
 }
 
+#[inline(never)]
 fn triangle<E: Real>(solid: &Solid) -> Triangle<E> {
     let Shape::Triangle { vertices, normal } = solid.shape else { unreachable!("{SORTED}") };
     let [a, b, c] = vertices;
@@ -379,6 +380,7 @@ fn light<E: Real>(sun: &Sun, sorted: &Sorted, search: Search) -> Light<E> {
 }
 
 /// From the Plücker coordinates of the ray through `o` along `d`: `d · moment + direction · (o × d)`.
+#[inline(never)]
 fn shade<E: Real>(vertices: [DVec3; 3], normal: DVec3, towards: DVec3) -> Shade<E> {
     let facing = normal.dot(towards);
     let sign = facing.signum();
