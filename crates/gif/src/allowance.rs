@@ -69,10 +69,10 @@ pub(crate) struct Redrawn {
 }
 
 impl Redrawn {
-    /// Counts one, whose look changed by a squared error.
-    pub(crate) fn count(&mut self, error: f32) {
+    /// Counts one, whose look changed by a squared error of which the levels' part is known.
+    pub(crate) fn count(&mut self, error: f32, levels: u32) {
         self.pixels += 1;
-        self.difference += visible(error);
+        self.difference += difference(error - levels as f32);
     }
 }
 
@@ -136,7 +136,12 @@ pub(crate) struct Loan {
 
 /// The CIE 1976 difference of a squared error of which L\*a\*b\* makes up half.
 fn visible(error: f32) -> f64 {
-    f64::from((error / (2.0 * colour::LAB_WEIGHT * colour::LAB_WEIGHT)).sqrt())
+    difference(error / 2.0)
+}
+
+/// The CIE 1976 difference of the part of a squared error that L\*a\*b\* makes up.
+fn difference(lab: f32) -> f64 {
+    f64::from((lab.max(0.0) / (colour::LAB_WEIGHT * colour::LAB_WEIGHT)).sqrt())
 }
 
 /// Errors from 1 up in steps of equal ratio: the exponent and the first bits of the number.
@@ -188,7 +193,9 @@ mod tests {
             let loan = allowance.lend(&still);
             let mut redrawn = Redrawn::default();
             if still.errors.iter().any(|&count| count > 0) {
-                errors.filter(|&error| error >= loan.least_error).for_each(|error| redrawn.count(error));
+                errors
+                    .filter(|&error| error >= loan.least_error)
+                    .for_each(|error| redrawn.count(error, error as u32 / 2));
             }
             sum += redrawn.difference / 1_000.0;
             // As a frame pays only when the next one has its loan.
@@ -206,7 +213,7 @@ mod tests {
         (0..100).for_each(|_| still.count_wrong(1, 50.0));
         let mut allowance = Allowance::new();
         let mut all = Redrawn::default();
-        (0..100).for_each(|_| all.count(50.0));
+        (0..100).for_each(|_| all.count(50.0, 25));
         let loan = allowance.lend(&still);
         allowance.pay(&loan, &[all], 1.0);
         assert!(allowance.lend(&still).least_error > 50.0);

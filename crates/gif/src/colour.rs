@@ -117,6 +117,12 @@ pub(crate) fn level_error(a: [u8; 3], b: [u8; 3]) -> u32 {
     2 * square(r) + 3 * square(g) + square(b)
 }
 
+/// Squared distance of levels: a part of [`error`].
+pub(crate) fn levels_apart(a: [u8; 3], b: [u8; 3]) -> u32 {
+    let square = |k: usize| u32::from(a[k].abs_diff(b[k])) * u32::from(a[k].abs_diff(b[k]));
+    square(0) + square(1) + square(2)
+}
+
 /// For each of 16 x 16 x 16 cells of sRGB the quadratic form that [`error`] is there: the coefficients of r², g², b²,
 /// rg, rb and gb.
 static METRIC: LazyLock<Box<[[f32; 6]; 4096]>> = LazyLock::new(|| {

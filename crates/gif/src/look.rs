@@ -21,7 +21,7 @@ const GLARING: f32 = 50.0;
 /// The level error up to which a pixel that changes may be left in a tile that is drawn.
 const SEEN_RIGHT: f32 = 2.0;
 /// The squared error (see [`colour`]) above which a pixel that stays asks for a better colour.
-const SEEN_WRONG: f32 = 2.0;
+const SEEN_WRONG: f32 = 1.5;
 
 /// What a pixel asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -34,7 +34,7 @@ const MOST_MADE_GOOD: f32 = 0.8;
 const HANDED_ON: f32 = 0.8;
 const MOST_AMISS: f32 = 24.0;
 /// How much squared error a colour that is not the nearest must save to begin a new string.
-const FRESH: f32 = 30.0;
+const FRESH: f32 = 34.0;
 /// How much more squared error than it has by itself the nearest colour may have, with what is amiss, to be taken without
 /// a look at others if it continues the string.
 const AT_ONCE: f32 = 3.0;
@@ -178,7 +178,7 @@ impl<'a> Stripe<'a> {
             if Some(index) != clear {
                 let colour = self.colour(index);
                 if need == Need::Better {
-                    self.redrawn.count(self.near.error(seen, colour));
+                    self.redrawn.count(self.near.error(seen, colour), colour::levels_apart(seen, colour));
                 }
                 row.seen[k] = colour;
             }
