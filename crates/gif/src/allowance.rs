@@ -21,7 +21,7 @@ const EACH_FRAME: Grant = Grant { pixels: 0.2, difference: 0.027 };
 const FOR_CHANGES: f64 = 8.0;
 /// How much more may be asked for than is left: of what is asked for a part is drawn, and only that is taken off. One
 /// large improvement costs fewer bytes than many small ones.
-const AHEAD: f64 = 5.0;
+const AHEAD: f64 = 4.0;
 /// The part of what is asked for that is set aside until it is known what was drawn.
 const LENT: f64 = 0.5;
 /// Steps of error in an octave, as a power of two.
