@@ -221,6 +221,11 @@ fn unshaded_by_list<S: Simd, E: Real, F: Features>(
 /// Nodes that wait on the way down a tree of 2³⁰ objects, with room for a lopsided one.
 const WAITING: usize = 128;
 
+/// Aligned as the widest registers are, so that the compiler aligns the stack, and with it the registers that it keeps
+/// there: unaligned, each of them lies in two cache lines.
+#[repr(align(64))]
+struct Waiting([u32; WAITING]);
+
 /// Visits the leaves whose boxes `meets` some lane, nearer children first by the direction of the first lane.
 #[inline(always)]
 fn descend<E: Real>(
@@ -229,7 +234,7 @@ fn descend<E: Real>(
     mut meets: impl FnMut(&Node<E>) -> bool,
     mut visit: impl FnMut(Kind, core::ops::Range<usize>) -> bool,
 ) {
-    let mut waiting = [0u32; WAITING];
+    let Waiting(waiting) = &mut Waiting([0; WAITING]);
     let mut spilled = Vec::new();
     let mut count = 1;
     loop {
