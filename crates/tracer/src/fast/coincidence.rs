@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use glam::DVec3;
-use rayfold_scene::{Object, Scene};
+use rayfold_scene::{Material, Object, Scene};
 
 use super::geometry::{Geometry, Shape, Solid, View};
 use super::real::Real;
@@ -27,10 +27,6 @@ const PAIRS: usize = 400;
 /// size of a pixel: an angle from the eye, or a length in parallel projection.
 pub(super) fn surfaces_blur(geometry: &Geometry, scene: &Scene, pixel: f64) -> bool {
     let material = |solid: &Solid| scene.objects[solid.order as usize].material();
-    let Some(first) = geometry.solids.first() else { return false };
-    if geometry.solids.iter().all(|solid| material(solid) == material(first)) {
-        return false;
-    }
     let search = Search {
         solids: &geometry.solids,
         objects: &scene.objects,
@@ -75,9 +71,13 @@ impl Region {
 impl Search<'_> {
     /// Both orders of a pair are looked at once: nodes are compared with themselves and with those after them.
     fn down(&self, branches: &Branches) -> bool {
+        let materials = self.materials(branches);
         let mut left = PAIRS * self.solids.len();
         let mut pending = vec![(0, 0)];
         while let Some((a, b)) = pending.pop() {
+            if materials[a].is_some() && materials[a] == materials[b] {
+                continue;
+            }
             left -= 1;
             if left == 0 {
                 // So many boxes in one place cannot be told apart in time: more precision is never wrong.
@@ -111,6 +111,27 @@ impl Search<'_> {
             }
         }
         false
+    }
+
+    /// The material of each node, if all in it have one: most meshes have, and need not be looked into.
+    fn materials(&self, branches: &Branches) -> Vec<Option<&Material>> {
+        let mut materials = vec![None; branches.len()];
+        for at in (0..materials.len()).rev() {
+            materials[at] = match branches.part(at) {
+                Part::Solids(of) => {
+                    let first = self.material(&self.solids[of.start]);
+                    self.solids[of].iter().all(|solid| self.material(solid) == first).then_some(first)
+                }
+                Part::Children(first, second) => {
+                    materials[first].filter(|_| materials[first] == materials[second])
+                }
+            };
+        }
+        materials
+    }
+
+    fn material(&self, solid: &Solid) -> &Material {
+        self.objects[solid.order as usize].material()
     }
 
     fn within(&self, solids: Range<usize>) -> bool {
@@ -162,8 +183,7 @@ impl Search<'_> {
                 faces(other).any(|b| faces_blur(&a, &b, slack, region.pixel))
             }),
         };
-        let material = |solid: &Solid| self.objects[solid.order as usize].material();
-        is_near && material(one) != material(other)
+        is_near && self.material(one) != self.material(other)
     }
 }
 

@@ -84,6 +84,10 @@ pub(super) enum Part {
 }
 
 impl Branches {
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
     pub(super) fn part(&self, at: usize) -> Part {
         let Branch { first, count, .. } = self.0[at];
         let first = first as usize;
