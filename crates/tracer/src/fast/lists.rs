@@ -215,10 +215,12 @@ fn across(solid: &Solid, axis: DVec3, back: DVec3, slack: f64) -> Span {
     match solid.shape {
         Shape::Triangle { vertices, .. } => span(&vertices),
         Shape::Cuboid { min, max } => {
-            let corner = |k: usize| {
-                DVec3::new([min.x, max.x][k & 1], [min.y, max.y][k >> 1 & 1], [min.z, max.z][k >> 2 & 1])
-            };
-            span(&[0, 1, 2, 3, 4, 5, 6, 7].map(corner))
+            let mut corners = [min; 8];
+            for (k, corner) in corners.iter_mut().enumerate() {
+                *corner =
+                    DVec3::new([min.x, max.x][k & 1], [min.y, max.y][k >> 1 & 1], [min.z, max.z][k >> 2 & 1]);
+            }
+            span(&corners)
         }
         Shape::Sphere { center, radius, .. } => {
             let (x, depth) = (center.dot(axis), -center.dot(back));
@@ -253,7 +255,8 @@ impl Outline {
         // A face is exact: what starts beyond it, if only by its offset, is beyond it.
         let is_box = matches!(solid.shape, Shape::Cuboid { .. });
         let rounded = |x: f64| if is_box { E::narrow(x).widen() } else { x + slack };
-        let exits = [0, 1, 2].map(|axis| {
+        let mut exits = [0.0; 3];
+        for (axis, limit) in exits.iter_mut().enumerate() {
             let towards = axes.row(2)[axis];
             // A light along the other two axes passes on both sides.
             let exit = if towards > 0.0 {
@@ -263,8 +266,8 @@ impl Outline {
             } else {
                 E::FAR
             };
-            rounded(exit)
-        });
+            *limit = rounded(exit);
+        }
         Self { low: [-reach(-x), -reach(-y)], high: [reach(x), reach(y)], top: reach(axes.row(2)), exits }
     }
 }
@@ -307,11 +310,13 @@ impl LightBuffer {
     /// `outlines` are sorted by kind, `before` are those before the boxes and before the triangles.
     pub(super) fn new(outlines: Vec<Outline>, before: (u32, u32)) -> Option<Self> {
         let side = (outlines.len() as f64).sqrt().ceil() as usize;
-        let fold = |f: fn(f64, f64) -> f64, start: f64, of: fn(&Outline) -> [f64; 2]| {
-            [0, 1].map(|axis| outlines.iter().map(|o| of(o)[axis]).fold(start, f))
-        };
-        let corner = fold(f64::min, f64::INFINITY, |o| o.low);
-        let end = fold(f64::max, f64::NEG_INFINITY, |o| o.high);
+        let (mut corner, mut end) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for outline in &outlines {
+            for axis in 0..2 {
+                corner[axis] = corner[axis].min(outline.low[axis]);
+                end[axis] = end[axis].max(outline.high[axis]);
+            }
+        }
         let pitch = [0, 1].map(|axis| side as f64 / (end[axis] - corner[axis]).max(f64::MIN_POSITIVE));
         let cell = |x: f64, axis: usize| (((x - corner[axis]) * pitch[axis]).max(0.0) as usize).min(side - 1);
         let span = |o: &Outline, axis: usize| (cell(o.low[axis], axis), cell(o.high[axis], axis));
