@@ -24,7 +24,7 @@ mod parallel;
 pub mod reference;
 mod scale;
 
-pub use fast::probe;
+pub use fast::{Drawing, probe};
 #[cfg(feature = "accuracy")]
 pub use nans::take as take_nans;
 
@@ -113,7 +113,7 @@ pub fn precision(scene: &Scene) -> Precision {
 /// # Errors
 /// When the rendering was cancelled or the image cannot be held in memory.
 pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    fast::render(scene, options)
+    Drawing::new(scene, options)?.draw()
 }
 
 /// As [`render`] in single precision, by textbook formulas without any regard for rounding: what robustness is measured

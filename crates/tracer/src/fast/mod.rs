@@ -81,18 +81,42 @@ const SIDE: (u32, u32) = (16, 16);
 const SMALL_SIDE: (u32, u32) = (8, 8);
 const MANY: usize = 512;
 
-/// Draws a scene.
-///
-/// # Errors
-/// Those of [`crate::render`].
-pub(crate) fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    let geometry = if has_kernels(options) { Geometry::new(scene, options.tree).ok() } else { None };
-    let precision = |geometry| Some((geometry, precision::resolve(options, geometry, scene)?));
-    match geometry.as_ref().and_then(precision) {
-        Some((geometry, Precision::F64)) => draw(scene, geometry, options, kernel::<f64>),
-        Some((geometry, _)) => draw(scene, geometry, options, kernel::<f32>),
-        // Numbers that the kernels cannot hold are left to the tracer that takes them one by one.
-        None => crate::reference::render(scene, options),
+/// The first half of [`crate::render`]: a scene with all that is worked out before its first pixel, a tree of its
+/// objects among it.
+pub struct Drawing<'a>(Way<'a>);
+
+enum Way<'a> {
+    Single(Setup<'a, f32>),
+    Double(Setup<'a, f64>),
+    /// Numbers that the kernels cannot hold are left to the tracer that takes them one by one.
+    Plain(&'a Scene, &'a RenderOptions<'a>),
+}
+
+impl<'a> Drawing<'a> {
+    /// Prepares a scene, on the current rayon pool.
+    ///
+    /// # Errors
+    /// When this build leaves out what the scene needs.
+    pub fn new(scene: &'a Scene, options: &'a RenderOptions) -> Result<Self, RenderError> {
+        let geometry = if has_kernels(options) { Geometry::new(scene, options.tree).ok() } else { None };
+        let precision = |geometry| Some((geometry, precision::resolve(options, geometry, scene)?));
+        Ok(Self(match geometry.as_ref().and_then(precision) {
+            Some((geometry, Precision::F64)) => Way::Double(Setup::new(scene, geometry, options)?),
+            Some((geometry, _)) => Way::Single(Setup::new(scene, geometry, options)?),
+            None => Way::Plain(scene, options),
+        }))
+    }
+
+    /// The second half: the image, the same each time.
+    ///
+    /// # Errors
+    /// Those of [`crate::render`].
+    pub fn draw(&self) -> Result<RgbImage, RenderError> {
+        match &self.0 {
+            Way::Single(setup) => setup.draw(kernel::<f32>),
+            Way::Double(setup) => setup.draw(kernel::<f64>),
+            Way::Plain(scene, options) => crate::reference::render(scene, options),
+        }
     }
 }
 
@@ -121,39 +145,59 @@ pub(crate) fn precision(scene: &Scene) -> Precision {
 /// Those of [`crate::render`].
 #[cfg(feature = "accuracy")]
 pub(crate) fn render_naive(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    draw(scene, &Geometry::new(scene, options.tree)?, options, naive::draw)
+    Setup::new(scene, &Geometry::new(scene, options.tree)?, options)?.draw(naive::draw)
 }
 
-/// Draws a scene, bands of tiles side by side, each by `kernel`.
-fn draw<E: Real>(
-    scene: &Scene,
-    geometry: &Geometry,
-    options: &RenderOptions,
-    kernel: impl Fn(&Job<E>, Level, Band, &mut Scratch<E>) + Sync,
-) -> Result<RgbImage, RenderError> {
-    let size = (scene.screen.width(), scene.screen.height());
-    let many = geometry.solids.len() > MANY;
-    let side = options.tile.unwrap_or(if many { SMALL_SIDE } else { SIDE });
-    let prepared = Prepared::<E>::new(scene, geometry, options.tree, side)?;
-    let whole = geometry.whole();
-    let mut solids: Vec<&Solid> =
-        if prepared.tree.is_some() { vec![&whole] } else { geometry.solids.iter().collect() };
-    solids.sort_by_key(|solid| solid.kind_rank());
-    let window = Window::new(geometry, &solids, size, side, E::ROUNDOFF);
-    let background = crate::reference::levels(scene.background());
-    let level = options.level.unwrap_or_else(Level::new);
-    // Boxed: it is passed from band to band by value.
-    bands(
-        scene.screen,
-        side.1,
-        options,
-        || Box::new(Scratch::new()),
-        |scratch, row, bytes| {
-            let band = Band { bytes, size, background };
-            let bounces = options.bounces();
-            kernel(&Job { prepared: &prepared, window: &window, side, row, bounces }, level, band, scratch);
-        },
-    )
+/// What a kernel needs to draw a scene.
+struct Setup<'a, E> {
+    scene: &'a Scene,
+    options: &'a RenderOptions<'a>,
+    prepared: Prepared<E>,
+    window: Window,
+    /// Columns and rows of a tile.
+    side: (u32, u32),
+}
+
+impl<'a, E: Real> Setup<'a, E> {
+    fn new(
+        scene: &'a Scene,
+        geometry: &Geometry,
+        options: &'a RenderOptions<'a>,
+    ) -> Result<Self, RenderError> {
+        let size = (scene.screen.width(), scene.screen.height());
+        let many = geometry.solids.len() > MANY;
+        let side = options.tile.unwrap_or(if many { SMALL_SIDE } else { SIDE });
+        let prepared = Prepared::<E>::new(scene, geometry, options.tree, side)?;
+        let whole = geometry.whole();
+        let mut solids: Vec<&Solid> =
+            if prepared.tree.is_some() { vec![&whole] } else { geometry.solids.iter().collect() };
+        solids.sort_by_key(|solid| solid.kind_rank());
+        let window = Window::new(geometry, &solids, size, side, E::ROUNDOFF);
+        Ok(Self { scene, options, prepared, window, side })
+    }
+
+    /// Draws bands of tiles side by side, each by `kernel`.
+    fn draw(
+        &self,
+        kernel: impl Fn(&Job<E>, Level, Band, &mut Scratch<E>) + Sync,
+    ) -> Result<RgbImage, RenderError> {
+        let Self { scene, options, prepared, window, side } = self;
+        let size = (scene.screen.width(), scene.screen.height());
+        let background = crate::reference::levels(scene.background());
+        let level = options.level.unwrap_or_else(Level::new);
+        let bounces = options.bounces();
+        // Boxed: it is passed from band to band by value.
+        bands(
+            scene.screen,
+            side.1,
+            options,
+            || Box::new(Scratch::new()),
+            |scratch, row, bytes| {
+                let band = Band { bytes, size, background };
+                kernel(&Job { prepared, window, side: *side, row, bounces }, level, band, scratch);
+            },
+        )
+    }
 }
 
 /// A row of tiles to draw.
