@@ -26,6 +26,10 @@ const PAIRS: usize = 400;
 /// Whether there are two surfaces whose order cannot be told in single precision, where it can be seen. `pixel` is the
 /// size of a pixel: an angle from the eye, or a length in parallel projection.
 pub(super) fn surfaces_blur(geometry: &Geometry, scene: &Scene, pixel: f64) -> bool {
+    let first = scene.objects.first().map(Object::material);
+    if scene.objects.iter().all(|object| Some(object.material()) == first) {
+        return false;
+    }
     let material = |solid: &Solid| scene.objects[solid.order as usize].material();
     let search = Search {
         solids: &geometry.solids,

@@ -8,7 +8,7 @@ use glam::DVec3;
 use rayfold_scene::model::unit;
 use rayfold_scene::{Camera, Light, Object, Scene, Screen};
 
-use super::tree::{Branches, group};
+use super::tree::{Branches, group, join};
 use crate::RenderError;
 use crate::parallel::map;
 use crate::reference::power;
@@ -110,9 +110,10 @@ impl Geometry {
 impl Geometry {
     /// The box of all solids.
     pub(super) fn whole(&self) -> Solid {
-        let nothing = (DVec3::ZERO, DVec3::ZERO);
-        let join = |a: (DVec3, DVec3), b: (DVec3, DVec3)| (a.0.min(b.0), a.1.max(b.1));
-        let (min, max) = self.solids.iter().map(Solid::bounds).reduce(join).unwrap_or(nothing);
+        let (min, max) = match &self.branches {
+            Some(branches) => branches.bounds(0),
+            None => self.solids.iter().map(Solid::bounds).reduce(join).unwrap_or_default(),
+        };
         Solid { shape: Shape::Cuboid { min, max }, order: 0 }
     }
 }

@@ -234,6 +234,7 @@ impl<E: Real> Tree<E> {
     }
 }
 
-fn join(a: (DVec3, DVec3), b: (DVec3, DVec3)) -> (DVec3, DVec3) {
+/// The box around two.
+pub(super) fn join(a: (DVec3, DVec3), b: (DVec3, DVec3)) -> (DVec3, DVec3) {
     (a.0.min(b.0), a.1.max(b.1))
 }
