@@ -80,6 +80,11 @@ impl Histogram {
         &self.bins
     }
 
+    /// How many were counted.
+    pub(crate) fn pixels(&self) -> u64 {
+        self.bins.iter().map(|bin| u64::from(bin.count)).sum()
+    }
+
     /// Whether each bin is one colour.
     pub(crate) fn is_exact(&self) -> bool {
         self.shift == 0

@@ -38,3 +38,10 @@ pub(crate) fn mean_level_error(histogram: &Histogram, of_bins: &[Ink], palette: 
     }
     sum / f32::max(pixels, 1.0)
 }
+
+/// Mean squared error of all pixels.
+pub(crate) fn mean_error(histogram: &Histogram, of_bins: &[Ink]) -> f32 {
+    let bins = histogram.bins().iter().zip(of_bins);
+    let sum = bins.map(|(bin, ink)| bin.count as f32 * ink.error).sum::<f32>();
+    sum / f32::max(histogram.pixels() as f32, 1.0)
+}

@@ -18,6 +18,16 @@ use crate::stripe::{self, Inks, Row, Sheet, Stripe};
 
 /// Parts of a frame whose colours are counted side by side.
 const PARTS: usize = 2;
+/// Mean squared error (see [`colour`](crate::colour)) up to which a palette of half as many colours is taken: it takes up
+/// half as many bytes, and the indices fewer, too. More of it by a number for all pixels together, up to a limit: where
+/// little is drawn, a palette is much of the file.
+const GOOD_ENOUGH: f32 = 0.8;
+const BY_PIXELS: f32 = 3000.0;
+const AT_MOST: f32 = 3.0;
+/// The fewest colours that a palette is halved to, with the one that is clear.
+const FEWEST: usize = 16;
+/// With more bins than that, no palette is good enough but by much work.
+const MOST_BINS_HALVED: usize = 4096;
 
 /// Turns frames into blocks, one after the other.
 #[derive(Debug)]
@@ -191,11 +201,44 @@ impl Paint {
         let least = loan.as_ref().map_or(0.0, |loan| loan.least_error);
         let changed = needs.count(pixels, least, histogram, parts) as f64 / pixels.len() as f64;
         let area = Area::around(&needs.pixels, width, |need| matches!(need, Need::Draw | Need::Better));
-        let (palette, guesses) = Palette::of_bins(histogram, if loan.is_none() { 256 } else { 255 });
-        let of_bins = Ink::of_bins(histogram, &palette, &guesses);
+        let (palette, of_bins) = match loan {
+            // A viewer may see it for long, or see nothing else.
+            None => inked(histogram, 256),
+            Some(_) => fewer_colours(histogram, inked(histogram, 255)),
+        };
         let error = ink::mean_level_error(histogram, &of_bins, &palette);
         Self { loan, changed, area, palette, of_bins, error }
     }
+}
+
+/// A palette of at most so many colours, and which of them is nearest to each bin.
+fn inked(histogram: &Histogram, size: usize) -> (Palette, Vec<Ink>) {
+    let (palette, guesses) = Palette::of_bins(histogram, size);
+    let of_bins = Ink::of_bins(histogram, &palette, &guesses);
+    (palette, of_bins)
+}
+
+/// Halves a palette as long as what it draws stays good enough; one index is left free.
+fn fewer_colours(histogram: &Histogram, mut best: (Palette, Vec<Ink>)) -> (Palette, Vec<Ink>) {
+    if histogram.bins().len() > MOST_BINS_HALVED {
+        return best;
+    }
+    let bound = GOOD_ENOUGH + (BY_PIXELS / histogram.pixels() as f32).min(AT_MOST);
+    let mut error = ink::mean_error(histogram, &best.1);
+    // Half as many colours draw with twice the error or more.
+    while error * 2.0 <= bound {
+        let size = (best.0.colours.len() + 1).next_power_of_two() / 2;
+        if size < FEWEST {
+            break;
+        }
+        let fewer = inked(histogram, size - 1);
+        error = ink::mean_error(histogram, &fewer.1);
+        if error > bound {
+            break;
+        }
+        best = fewer;
+    }
+    best
 }
 
 impl Waiting {
