@@ -7,6 +7,7 @@
 
 mod bounces;
 mod boxes;
+mod everyday;
 mod extremes;
 mod images;
 mod nasty;
@@ -144,6 +145,7 @@ pub const CASES: &[Case] = &[
     Case { number: "23", title: "mirror spheres face to face", run: bounces::face_to_face },
     Case { number: "24", title: "identical objects", run: ties::identical },
     Case { number: "25", title: "random scenes", run: nasty::scenes },
+    Case { number: "26", title: "random scenes as people write them", run: everyday::scenes },
 ];
 
 /// A random number generator of a case's own.

@@ -23,7 +23,7 @@ const BESIDE: f64 = 1.0 / 16.0;
 const LEVELS: f64 = 2.0;
 
 /// What a scene is made of.
-type Kind = (&'static str, fn(&mut Rng) -> Result<Scene>);
+pub(super) type Kind = (&'static str, fn(&mut Rng) -> Result<Scene>);
 
 /// The share of pixels that may be wrong: rays that meet corners or the edges of needles exactly, where the last bit of
 /// any arithmetic decides what comes first.
@@ -74,15 +74,25 @@ fn first_seed() -> u64 {
 
 /// Every way on every kind of scene.
 pub(super) fn scenes(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+    judge_kinds(KINDS, FEW, tracers, size, figures)
+}
+
+/// Every way on scenes of these kinds; `few` is the share of pixels that may be wrong.
+pub(super) fn judge_kinds(
+    kinds: &[Kind],
+    few: f64,
+    tracers: &[Tracer],
+    size: Size,
+    figures: &mut Figures,
+) -> Result<()> {
     let rounds = size.pick(2, 60);
-    let first = first_seed() / KINDS.len() as u64 * KINDS.len() as u64;
-    for kind in 0..KINDS.len() as u64 {
+    let first = first_seed() / kinds.len() as u64 * kinds.len() as u64;
+    for (kind, (name, make)) in (0..).zip(kinds) {
         let mut wrong = vec![Vec::new(); tracers.len()];
         let mut pixels = 0;
-        let name = KINDS[kind as usize].0;
         for round in 0..rounds {
-            let seed = first + round * KINDS.len() as u64 + kind;
-            let (_, scene) = scene(seed)?;
+            let seed = first + round * kinds.len() as u64 + kind;
+            let scene = make(&mut Rng::with_seed(seed))?;
             pixels += scene.screen.pixels() as usize;
             let drawn = tracers.iter().map(|tracer| tracer.render(&scene)).collect::<Result<Vec<_>>>()?;
             for (wrong, count) in wrong.iter_mut().zip(judge(&scene, &drawn, size.pick(30, 100), seed)?) {
@@ -93,7 +103,7 @@ pub(super) fn scenes(tracers: &[Tracer], size: Size, figures: &mut Figures) -> R
         }
         for (tracer, wrong) in tracers.iter().zip(wrong) {
             let count: usize = wrong.iter().map(|(_, count)| count).sum();
-            let bound = FEW * pixels as f64;
+            let bound = few * pixels as f64;
             let seeds: Vec<String> = wrong.iter().take(4).map(|(seed, _)| seed.to_string()).collect();
             let seeds = if seeds.is_empty() { String::new() } else { format!(", seeds {}", seeds.join(" ")) };
             figures.add(
