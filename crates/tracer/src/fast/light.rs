@@ -4,11 +4,11 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use super::features::{BUILT, Features};
+use super::generation::Hits;
 use super::lists::{Beam, LightBuffer, Picked, Seen};
 use super::prepare::{Light, Outlines, Prepared};
 use super::real::{Lanes, Real, Vec3, constant};
 use super::search::{Candidates, Masks, unshaded};
-use super::tile::Hits;
 
 /// What can stand in the way of each light.
 #[derive(Default)]

@@ -44,8 +44,10 @@ macro_rules! on {
     };
 }
 
+mod band;
 mod coincidence;
 mod features;
+mod generation;
 mod geometry;
 mod intersect;
 mod light;
@@ -57,6 +59,7 @@ mod prepare;
 pub mod probe;
 mod real;
 mod search;
+mod surfaces;
 mod tile;
 mod tree;
 mod window;
@@ -67,11 +70,12 @@ use rayfold_scene::Scene;
 
 use crate::parallel::{CHANNELS, bands};
 use crate::{Precision, RenderError, RenderOptions};
+use band::{Band, Tile};
 use features::{BUILT, Everything, Features, Kernel};
 use geometry::{Geometry, Solid};
 use prepare::Prepared;
 use real::Real;
-use tile::{Band, Scratch, Tile};
+use tile::Scratch;
 use window::Window;
 
 /// Columns and rows of a tile.

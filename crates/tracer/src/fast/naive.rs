@@ -7,11 +7,12 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd};
 
 use super::Job;
+use super::band::Band;
 use super::features::{Everything, Features, Mesh, Solids};
 use super::intersect::{Formulas, Moment, Nearest, Ray, Slopes, Surface};
 use super::prepare::{Cuboid, Edge, Sphere, Triangle};
 use super::real::{Lanes, Real, Vec3, constant, splat};
-use super::tile::{Band, Scratch};
+use super::tile::Scratch;
 
 /// How far from a surface a ray starts; a scene has the size of 1.
 const EPSILON: f64 = 1e-4;

@@ -14,7 +14,7 @@ use super::precision::resolve;
 use super::prepare::Prepared;
 use super::real::{Lanes, Real, Vec3};
 use super::search::{Candidates, nearest};
-use super::tile::surface;
+use super::surfaces::surface;
 use crate::{Precision, RenderError, RenderOptions};
 
 /// What a ray meets first.
