@@ -22,6 +22,8 @@ const FOR_CHANGES: f64 = 8.0;
 /// How much more may be asked for than is left: of what is asked for a part is drawn, and only that is taken off. One
 /// large improvement costs fewer bytes than many small ones.
 const AHEAD: f64 = 4.0;
+/// Where fewer than one pixel in so many stay, none is drawn anew: they stay by chance, as in noise, or not for long.
+const FEW_STAY: f64 = 16.0;
 /// The part of what is asked for that is set aside until it is known what was drawn.
 const LENT: f64 = 0.5;
 /// Steps of error in an octave, as a power of two.
@@ -92,9 +94,12 @@ impl Allowance {
         self.share > 0.01 && self.difference > 0.01
     }
 
-    /// Sets aside what the next frame may use, before the frame before it has paid.
-    pub(crate) fn lend(&mut self, still: &Still) -> Loan {
+    /// Sets aside what the next frame may use, before the frame before it has paid. `of`: pixels of the whole frame.
+    pub(crate) fn lend(&mut self, still: &Still, of: usize) -> Loan {
         let pixels = still.pixels as f64;
+        if pixels * FEW_STAY < of as f64 {
+            return Loan { pixels, share: 0.0, difference: 0.0, least_error: f32::INFINITY };
+        }
         let most = [self.share * pixels * AHEAD, self.difference * pixels * AHEAD];
         let (mut asked, mut least_error) = ([0.0; 2], 0.0);
         for at in (0..STEPS).rev() {
@@ -114,6 +119,9 @@ impl Allowance {
 
     /// Gives back what was not used, and adds what a frame of which a part `changed` gives.
     pub(crate) fn pay(&mut self, loan: &Loan, redrawn: &[Redrawn], changed: f64) {
+        if loan.least_error == f32::INFINITY {
+            return;
+        }
         let more = (changed * FOR_CHANGES).min(1.0);
         let pixels = loan.pixels.max(1.0);
         self.share += EACH_FRAME.pixels * more + loan.share
@@ -171,7 +179,7 @@ mod tests {
     fn the_largest_errors_come_first_and_no_more_than_allowed() {
         let mut still = Still::none();
         (0..1_000).for_each(|k| still.count_wrong(1, 2.0 + k as f32 * 0.01));
-        let least = Allowance::new().lend(&still).least_error;
+        let least = Allowance::new().lend(&still, still.pixels as usize).least_error;
         let drawn = (0..1_000).filter(|&k| 2.0 + k as f32 * 0.01 >= least).count();
         let most = 1_000.0 * AHEAD * AT_FIRST.pixels;
         assert!((100..=most as usize).contains(&drawn), "{drawn} of 1000 from {least}");
@@ -190,7 +198,7 @@ mod tests {
             } else {
                 still.count(1_000);
             }
-            let loan = allowance.lend(&still);
+            let loan = allowance.lend(&still, still.pixels as usize);
             let mut redrawn = Redrawn::default();
             if still.errors.iter().any(|&count| count > 0) {
                 errors
@@ -214,9 +222,21 @@ mod tests {
         let mut allowance = Allowance::new();
         let mut all = Redrawn::default();
         (0..100).for_each(|_| all.count(50.0, 25));
-        let loan = allowance.lend(&still);
+        let loan = allowance.lend(&still, still.pixels as usize);
         allowance.pay(&loan, &[all], 1.0);
-        assert!(allowance.lend(&still).least_error > 50.0);
+        assert!(allowance.lend(&still, still.pixels as usize).least_error > 50.0);
+    }
+
+    #[test]
+    fn where_few_stay_nothing_is_drawn_anew() {
+        let mut still = Still::none();
+        (0..100).for_each(|_| still.count_wrong(1, 50.0));
+        let mut allowance = Allowance::new();
+        let loan = allowance.lend(&still, 10_000);
+        assert!(loan.least_error > from(STEPS));
+        allowance.pay(&loan, &[], 1.0);
+        assert_eq!((allowance.share, allowance.difference), (AT_FIRST.pixels, AT_FIRST.difference));
+        assert!(allowance.lend(&still, 1_000).least_error <= 50.0);
     }
 
     #[test]
@@ -224,11 +244,11 @@ mod tests {
         let mut still = Still::none();
         (0..100).for_each(|k| still.count_wrong(1, if k < 20 { 50.0 } else { 3.0 }));
         let mut allowance = Allowance::new();
-        let first = allowance.lend(&still);
-        let meanwhile = allowance.lend(&still);
+        let first = allowance.lend(&still, still.pixels as usize);
+        let meanwhile = allowance.lend(&still, still.pixels as usize);
         allowance.pay(&first, &[], 0.0);
         allowance.pay(&meanwhile, &[], 0.0);
-        let later = allowance.lend(&still);
+        let later = allowance.lend(&still, still.pixels as usize);
         assert!(meanwhile.least_error > first.least_error);
         assert_eq!(later.least_error, first.least_error);
     }

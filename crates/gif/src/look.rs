@@ -15,7 +15,7 @@ use crate::ink::Ink;
 /// as if all were drawn.
 const TILE: usize = 8;
 /// [Level error](colour::level_error) beyond that of a drawn pixel, in the mean of a tile, up to which the tile is left.
-const TOLERATED: f32 = 12.0;
+const TOLERATED: f32 = 20.0;
 /// The level error of a pixel above which its tile is drawn in any case: almost three levels.
 const GLARING: f32 = 50.0;
 /// The level error up to which a pixel that changes may be left in a tile that is drawn.

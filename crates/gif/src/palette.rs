@@ -14,7 +14,7 @@ use crate::histogram::{Bin, Histogram};
 /// Rounds of k-means at most.
 const ROUNDS: usize = 5;
 /// The most colours that are looked at one by one.
-const SAMPLES: usize = 1 << 12;
+const SAMPLES: usize = 1 << 13;
 /// How many of a colour's nearest others are kept at hand.
 pub(crate) const NEIGHBOURS: usize = 16;
 

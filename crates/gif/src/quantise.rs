@@ -123,7 +123,7 @@ impl Quantiser {
             let loan = match before {
                 Some(before) => {
                     let still = needs.look(pixels, width, before, allowance.is_left());
-                    Some(allowance.lend(&still))
+                    Some(allowance.lend(&still, pixels.len()))
                 }
                 None => {
                     needs.want_all(width, pixels.len());
@@ -251,9 +251,9 @@ impl Waiting {
                 (exact::draw(pixels, width, self.first, seen, colours, self.delay_cs), Vec::new())
             }
             Plan::With(Paint { area: None, .. }) => (Block::nothing(self.delay_cs), Vec::new()),
-            Plan::With(Paint { area: Some(area), palette, of_bins, .. }) => {
+            Plan::With(Paint { area: Some(area), palette, of_bins, changed, .. }) => {
                 let clear = (!self.first).then_some(palette.colours.len() as u8);
-                let inks = Inks { palette, of_bins, histogram: &self.histogram, clear };
+                let inks = Inks { palette, of_bins, histogram: &self.histogram, clear, changed: *changed };
                 draw(pixels, width, *area, &self.needs.pixels, seen, inks, self.delay_cs)
             }
         }

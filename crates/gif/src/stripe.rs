@@ -26,10 +26,14 @@ const LENIENCE: f32 = 6.0;
 const SMOOTH: f32 = 24.0;
 const SMOOTH_BY_ERROR: f32 = 0.6;
 /// The squared error of the nearest colour up to which a pixel makes nothing good.
-const SMALL: f32 = 2.0;
+const SMALL: f32 = 6.0;
 /// The part of what is amiss that a pixel makes good, for each unit of error beyond that, and at most.
-const MADE_GOOD: f32 = 0.015;
+const MADE_GOOD: f32 = 0.018;
 const MOST_MADE_GOOD: f32 = 0.8;
+/// The part of a frame that is drawn because it changed from which on that holds in full. Below, proportionally less is
+/// made good, down to a least part of it: what changes now is soon drawn anew, and the mean is seen where a picture stays.
+const MUCH_CHANGED: f64 = 0.4;
+const LEAST_PART: f64 = 0.5;
 /// The part that is handed on, half of it to the right, half down; and how many levels at most.
 const HANDED_ON: f32 = 0.8;
 const MOST_AMISS: f32 = 24.0;
@@ -42,8 +46,7 @@ const AT_ONCE: f32 = 3.0;
 const STRIPE: usize = 160_000;
 /// Smaller ones are not worth a thread.
 const LEAST_STRIPE: usize = 30_000;
-/// From how many colours on a book is soon full, so that two or four stripes cost nothing.
-const SOME_COLOURS: usize = 1024;
+/// From how many colours on a book is soon full, so that two stripes cost next to nothing.
 const MANY_COLOURS: usize = 4096;
 
 /// What a frame is drawn with.
@@ -54,6 +57,8 @@ pub(crate) struct Inks<'a> {
     pub(crate) histogram: &'a Histogram,
     /// The index that leaves a pixel as it is.
     pub(crate) clear: Option<u8>,
+    /// The part of the frame that is drawn because it changed.
+    pub(crate) changed: f64,
 }
 
 /// What a block is drawn on.
@@ -82,9 +87,8 @@ pub(crate) fn in_stripes<R: Send>(
     let height = area.bottom - area.top;
     let pixels = (area.right - area.left) * height;
     let least = match meant {
-        0..SOME_COLOURS => 1,
-        SOME_COLOURS..MANY_COLOURS => 2,
-        _ => 4,
+        0..MANY_COLOURS => 1,
+        _ => 2,
     };
     // An odd one out would be drawn while other threads wait.
     let count = match pixels.div_ceil(STRIPE) {
@@ -109,6 +113,8 @@ pub(crate) struct Stripe<'a> {
     writer: &'a mut Writer,
     redrawn: Redrawn,
     near: Near,
+    /// The part of what is amiss that a pixel makes good, for each unit of error.
+    made_good: f32,
     /// What the pixels above hand down to each of the row.
     handed_down: Vec<[f32; 3]>,
 }
@@ -124,7 +130,16 @@ pub(crate) struct Row<'a> {
 
 impl<'a> Stripe<'a> {
     pub(crate) fn new(inks: Inks<'a>, writer: &'a mut Writer) -> Self {
-        Self { inks, writer, redrawn: Redrawn::default(), near: Near::new(), handed_down: Vec::new() }
+        let part = (inks.changed / MUCH_CHANGED).clamp(LEAST_PART, 1.0);
+        let made_good = MADE_GOOD * part as f32;
+        Self {
+            inks,
+            writer,
+            redrawn: Redrawn::default(),
+            near: Near::new(),
+            made_good,
+            handed_down: Vec::new(),
+        }
     }
 
     /// What all rows together drew anew.
@@ -158,7 +173,7 @@ impl<'a> Stripe<'a> {
                     let Some(ink) = last.1 else { continue };
                     let levels = colour::levels(now);
                     if ink.error > SMALL && row.is_smooth(k, ink.error) {
-                        let part = ((ink.error - SMALL) * MADE_GOOD).min(MOST_MADE_GOOD);
+                        let part = ((ink.error - SMALL) * self.made_good).min(MOST_MADE_GOOD);
                         let target = [
                             levels[0] + part * amiss[0],
                             levels[1] + part * amiss[1],
@@ -306,7 +321,8 @@ mod tests {
         let index = palette.nearest(&point, 0);
         let error = colour::error(&point, &palette.points[usize::from(index)]);
         let of_bins = [Ink { index, error }];
-        let inks = Inks { palette: &palette, of_bins: &of_bins, histogram: &histogram, clear: None };
+        let inks =
+            Inks { palette: &palette, of_bins: &of_bins, histogram: &histogram, clear: None, changed: 1.0 };
         let mut writer = Writer::new(8);
         let mut stripe = Stripe::new(inks, &mut writer);
         let mut seen = vec![[0; 3]; SIDE * SIDE];
