@@ -230,7 +230,7 @@ mod tests {
     #[test]
     fn where_few_stay_nothing_is_drawn_anew() {
         let mut still = Still::none();
-        (0..100).for_each(|_| still.count_wrong(1, 50.0));
+        (0..100).for_each(|k| still.count_wrong(1, if k < 20 { 50.0 } else { 3.0 }));
         let mut allowance = Allowance::new();
         let loan = allowance.lend(&still, 10_000);
         assert!(loan.least_error > from(STEPS));
