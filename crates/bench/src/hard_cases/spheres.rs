@@ -176,6 +176,15 @@ pub(super) fn inside(tracers: &[Tracer], size: Size, figures: &mut Figures) -> R
             let within = single(center + depth * direction(&mut rng));
             around(within, &mut rng, 16);
         }
+        // Into the sphere, ever more along its surface: to 16 roundoffs of f32.
+        for p in on {
+            let (u, v) = p.normalize().any_orthonormal_pair();
+            for k in 0..size.pick(40, 2000) {
+                let along = u * f64::from(k).cos() + v * f64::from(k).sin();
+                let into = 10f64.powf(-6.0 * rng.f64()) * p.normalize();
+                rays.push(Ray { origin: center + p, direction: single((along - into).normalize()) });
+            }
+        }
         sets.push((Object::Sphere(sphere(radius, center)?), rays));
     }
     let corners = [DVec3::new(-1.0, -2.0, -3.0), DVec3::new(1.0, 2.0, 4.0)];

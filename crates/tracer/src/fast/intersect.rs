@@ -127,21 +127,21 @@ pub(super) trait Formulas {
         let zero = constant::<S, E>(simd, 0.0);
         let center = Vec3::splat(simd, sphere.center);
         let middle = center.dot(direction);
-        let closest = direction.scale_sub(middle, center);
-        let rest = splat::<S, E>(simd, sphere.square) - closest.dot(closest);
-        let meets = rest.simd_ge(zero);
         let ahead = middle.simd_gt(zero);
         let power = splat::<S, E>(simd, sphere.power);
         if sphere.power > E::narrow(0.0) {
-            let hit = meets & ahead;
+            let closest = direction.scale_sub(middle, center);
+            let rest = splat::<S, E>(simd, sphere.square) - closest.dot(closest);
+            let hit = rest.simd_ge(zero) & ahead;
             if hit.any_true() {
                 nearest.offer(simd, hit, power / (middle + rest.sqrt()), sphere.order);
             }
         } else {
-            let half_chord = rest.sqrt();
+            // A sum without cancellation: every ray from within meets the sphere, grazing ones from its surface too.
+            let half_chord = middle.mul_add(middle, -power).sqrt();
             let far = ahead.select(middle + half_chord, middle - half_chord);
             let distance = ahead.select(far, power / far);
-            nearest.offer(simd, meets & distance.simd_gt(zero), distance, sphere.order);
+            nearest.offer(simd, distance.simd_gt(zero), distance, sphere.order);
         }
     }
 
