@@ -11,7 +11,7 @@ use super::{Figures, Size, direction};
 use crate::scenes::{icosphere, light};
 use crate::tracers::Tracer;
 
-const KINDS: &[Kind] = &[
+pub(super) const KINDS: &[Kind] = &[
     ("things at rest on a floor", at_rest),
     ("a room of boxes that touch", room),
     ("lights along faces", grazing_lights),

@@ -11,6 +11,7 @@ mod everyday;
 mod extremes;
 mod images;
 mod nasty;
+mod searched;
 mod spheres;
 mod ties;
 mod triangles;
@@ -146,6 +147,7 @@ pub const CASES: &[Case] = &[
     Case { number: "24", title: "identical objects", run: ties::identical },
     Case { number: "25", title: "random scenes", run: nasty::scenes },
     Case { number: "26", title: "random scenes as people write them", run: everyday::scenes },
+    Case { number: "27", title: "random scenes searched in every way", run: searched::scenes },
 ];
 
 /// A random number generator of a case's own.

@@ -29,7 +29,7 @@ pub(super) type Kind = (&'static str, fn(&mut Rng) -> Result<Scene>);
 /// any arithmetic decides what comes first.
 const FEW: f64 = 5e-4;
 
-const KINDS: &[Kind] = &[
+pub(super) const KINDS: &[Kind] = &[
     ("objects of all scales", of_all_scales),
     ("faces in one plane", coplanar),
     ("faces almost in one plane", almost_coplanar),
@@ -68,7 +68,7 @@ pub(crate) fn one_of_each(side: u32) -> Result<Vec<(&'static str, Scene)>> {
 }
 
 /// The seed of the first scene: [`super::SEED`], unless `RAYFOLD_SEED` says another.
-fn first_seed() -> u64 {
+pub(super) fn first_seed() -> u64 {
     std::env::var("RAYFOLD_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(super::SEED)
 }
 

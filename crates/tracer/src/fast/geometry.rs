@@ -4,6 +4,8 @@
 //! power of two, so that everything lies in -1..=1: no product overflows, and a scene scaled by a power of two is the
 //! same scene bit for bit. All of it is `f64`; nothing here knows how precise the kernels are.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use rayfold_scene::model::unit;
 use rayfold_scene::{Camera, Light, Object, Scene, Screen};
@@ -11,7 +13,7 @@ use rayfold_scene::{Camera, Light, Object, Scene, Screen};
 use super::tree::{Branches, group, join};
 use crate::RenderError;
 use crate::parallel::map;
-use crate::reference::power;
+use crate::reference::{normal_and_width, power, triangle_normal};
 use crate::scale::below_inverse;
 
 /// The shape of an object.
@@ -62,7 +64,7 @@ pub(super) struct Sun {
 pub(super) struct Geometry {
     pub(super) view: View,
     /// In the order of the script, or in that of `branches`.
-    pub(super) solids: Vec<Solid>,
+    pub(super) solids: Arc<Vec<Solid>>,
     /// How a tree groups the solids, if they are to be found down a tree.
     pub(super) branches: Option<Branches>,
     pub(super) suns: Vec<Sun>,
@@ -103,7 +105,7 @@ impl Geometry {
             .lights
             .iter()
             .map(|Light::Directional(light)| Sun { towards: -unit(light.direction()), color: light.color() });
-        Ok(Self { view, solids, branches, suns: suns.collect(), scale, center })
+        Ok(Self { view, solids: solids.into(), branches, suns: suns.collect(), scale, center })
     }
 }
 
@@ -180,14 +182,19 @@ fn shape(object: &Object, place: impl Fn(DVec3) -> DVec3, eye: DVec3, scale: f64
         Object::Triangle(triangle) => {
             let vertices = triangle.vertices().map(&place);
             // Its own size decides whether it has an area, wherever it lies.
-            let normal = crate::reference::triangle_normal(triangle);
-            if normal == DVec3::ZERO {
+            let (own, width) = normal_and_width(triangle.vertices());
+            if own == DVec3::ZERO {
                 return None;
             }
-            Shape::Triangle { vertices, normal }
+            // A needle turns when its corners are rounded; rays meet it as it is here.
+            let here = if width < NEEDLE { triangle_normal(&vertices) } else { own };
+            Shape::Triangle { vertices, normal: if here == DVec3::ZERO { own } else { here } }
         }
     })
 }
+
+/// The width of a triangle, for its length, below which its normal is worked out from where its corners are rounded to.
+const NEEDLE: f64 = 0.1;
 
 fn view(scene: &Scene, scale: f64) -> View {
     let axis = |from: f64, to: f64, samples: u32| {

@@ -7,7 +7,8 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
-use super::prepare::{Cuboid, Edge, GRAZING, Light, Shade, Sphere, Triangle};
+use super::doubt::{Beside, Place, distance_error, settle, settle_shadows};
+use super::prepare::{Cuboid, Edge, GRAZING, Light, Prepared, Shade, Sphere, Triangle};
 use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
 
 /// A packet of rays with what the tests share.
@@ -163,13 +164,14 @@ pub(super) trait Formulas {
         }
     }
 
-    /// By the sides of its edges in Plücker coordinates, each with a bound on its error; the distance is that of the
-    /// plane, by the operations of a box's slab, so that one in the plane of a face is met where the face is. A ray within
-    /// the rounding error of the plane misses.
+    /// By the sides of its edges in Plücker coordinates, each with a bound on its error, and exactly where that leaves
+    /// them open; the distance is that of the plane, by the operations of a box's slab, so that one in the plane of a face
+    /// is met where the face is. A ray within the rounding error of the plane misses.
     #[inline(always)]
     fn triangle<S: Simd, E: Real>(
         simd: S,
         triangle: &Triangle<E>,
+        place: Place,
         ray: Ray<S, E>,
         moment: Moment<S, E>,
         nearest: &mut Nearest<S, E>,
@@ -186,8 +188,13 @@ pub(super) trait Formulas {
             let slope = normal.dot(ray.direction);
             let above = splat::<S, E>(simd, triangle.height) - normal.dot(ray.origin);
             let distance = above * (constant::<S, E>(simd, 1.0) / slope);
-            let steep = slope.abs().simd_gt(constant::<S, E>(simd, GRAZING * E::ROUNDOFF));
-            nearest.offer(simd, inside & steep & distance.simd_gt(zero), distance, triangle.order);
+            let away = distance.simd_gt(constant::<S, E>(simd, distance_error::<E>()));
+            let clear = away
+                & (a_right.min(b_right).min(c_right).simd_gt(zero)
+                    | a_left.max(b_left).max(c_left).simd_lt(zero));
+            let hit = inside & distance.simd_gt(zero);
+            let ray = (ray, Beside::Anywhere);
+            offer_settled(simd, (triangle, place), ray, (hit, clear), (slope, distance), nearest);
         }
     }
 
@@ -195,18 +202,21 @@ pub(super) trait Formulas {
     fn triangle_from_eye<S: Simd, E: Real>(
         simd: S,
         triangle: &Triangle<E>,
+        place: Place,
         direction: Vec3<S, E>,
         nearest: &mut Nearest<S, E>,
     ) {
-        let zero = constant::<S, E>(simd, 0.0);
         let [a, b, c] = triangle.from_eye;
         let (a, b) = (affine(simd, a, direction), affine(simd, b, direction));
-        let inside = a.min(b).min(affine(simd, c, direction)).simd_ge(zero);
+        let least = a.min(b).min(affine(simd, c, direction));
+        let inside = least.simd_ge(constant::<S, E>(simd, 0.0));
         if inside.any_true() {
             let slope = Vec3::splat(simd, triangle.normal).dot(direction);
             let distance = splat::<S, E>(simd, triangle.height) * (constant::<S, E>(simd, 1.0) / slope);
-            let steep = slope.abs().simd_gt(constant::<S, E>(simd, GRAZING * E::ROUNDOFF));
-            nearest.offer(simd, inside & steep & distance.simd_gt(zero), distance, triangle.order);
+            // What is clear of the edges lies ahead: the sides are turned that way.
+            let clear = least.simd_gt(constant::<S, E>(simd, 1.0));
+            let ray = (Ray { origin: Vec3::zero(simd), direction }, Beside::Eye);
+            offer_settled(simd, (triangle, place), ray, (inside, clear), (slope, distance), nearest);
         }
     }
 
@@ -339,6 +349,29 @@ fn along<S: Simd, E: Real>(
 /// 2(2), 2013).
 const LATE: f64 = 8.0;
 
+/// Offers a `hit`, where it is not `clear` of the edges or nearly in the plane what comes of it when settled. A ray
+/// within the rounding error of the plane misses.
+#[inline(always)]
+fn offer_settled<S: Simd, E: Real>(
+    simd: S,
+    (triangle, place): (&Triangle<E>, Place),
+    (ray, beside): (Ray<S, E>, Beside),
+    (hit, clear): (Mask<S, E>, Mask<S, E>),
+    (slope, distance): (Lanes<S, E>, Lanes<S, E>),
+    nearest: &mut Nearest<S, E>,
+) {
+    let sure = clear & slope.abs().simd_ge(constant::<S, E>(simd, beside.flat()));
+    let doubtful = hit & !sure;
+    if !doubtful.any_true() {
+        return nearest.offer(simd, hit, distance, triangle.order);
+    }
+    let steep = slope.abs().simd_gt(constant::<S, E>(simd, GRAZING * E::ROUNDOFF));
+    let (met, settled) = settle(simd, place, ray, beside, (doubtful & steep, clear), distance);
+    let distance = doubtful.select(settled, distance);
+    let met = sure | (met & steep & distance.simd_gt(constant::<S, E>(simd, 0.0)));
+    nearest.offer(simd, hit & met, distance, triangle.order);
+}
+
 /// The least and the most that the ray's side of an edge can be.
 #[inline(always)]
 fn side<S: Simd, E: Real>(
@@ -384,12 +417,35 @@ pub(super) fn sphere_shades<S: Simd, E: Real>(simd: S, sphere: &[E; 4], point: V
     rest.simd_ge(zero) & ahead.simd_gt(zero)
 }
 
+/// Whether a triangle keeps the light from points: not below 0, certainly from 1.
 #[inline(always)]
-pub(super) fn triangle_shades<S: Simd, E: Real>(simd: S, shade: &Shade<E>, point: Vec3<S, E>) -> Mask<S, E> {
+pub(super) fn triangle_shades<S: Simd, E: Real>(simd: S, shade: &Shade<E>, point: Vec3<S, E>) -> Lanes<S, E> {
     let [a, b, c] = shade.sides;
     let (a, b, c) = (affine(simd, a, point), affine(simd, b, point), affine(simd, c, point));
-    let zero = constant::<S, E>(simd, 0.0);
-    a.min(b).min(c).simd_ge(zero) & affine(simd, shade.depth, point).simd_gt(zero)
+    a.min(b).min(c).min(affine(simd, shade.depth, point))
+}
+
+/// The points that stay lit, by the largest of [`triangle_shades`] over the triangles at these positions.
+#[inline(always)]
+pub(super) fn unshaded_by_triangles<S: Simd, E: Real>(
+    simd: S,
+    scene: &Prepared<E>,
+    light: &Light<E>,
+    (point, lit): (Vec3<S, E>, Mask<S, E>),
+    shaded: Lanes<S, E>,
+    triangles: impl Iterator<Item = usize>,
+) -> Mask<S, E> {
+    let over = shaded.simd_ge(constant::<S, E>(simd, 0.0));
+    if !over.any_true() {
+        return lit;
+    }
+    let lit = lit & shaded.simd_lt(constant::<S, E>(simd, 1.0));
+    let doubtful = lit & over;
+    if doubtful.any_true() {
+        lit & !settle_shadows(simd, &scene.corners, light, point, doubtful, triangles)
+    } else {
+        lit
+    }
 }
 
 #[inline(always)]

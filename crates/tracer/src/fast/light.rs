@@ -124,7 +124,8 @@ fn beam<E: Real>(light: &Light<E>, low: [E; 3], high: [E; 3]) -> Beam {
             let (a, b) = (direction.widen() * low.widen(), direction.widen() * high.widen());
             *from += a.min(b);
             *to += a.max(b);
-            slack += a.abs().max(b.abs());
+            // Of all coordinates: the light's axes are square to each other but for rounding.
+            slack += low.widen().abs().max(high.widen().abs());
         }
         *from -= 16.0 * E::ROUNDOFF * slack;
         *to += 16.0 * E::ROUNDOFF * slack;

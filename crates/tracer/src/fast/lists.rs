@@ -191,6 +191,7 @@ fn outline(view: &View, solid: &Solid, slack: f64) -> Option<(Span, Span)> {
         View::Pinhole { right, up, back, .. } => (right, up, back),
         View::Parallel { .. } => {
             let (min, max) = solid.bounds();
+            let slack = 2.0 * slack;
             let ahead = min.z <= slack;
             return ahead
                 .then_some((Some((min.x - slack, max.x + slack)), Some((min.y - slack, max.y + slack))));

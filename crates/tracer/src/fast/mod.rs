@@ -46,6 +46,8 @@ macro_rules! on {
 
 mod band;
 mod coincidence;
+mod doubt;
+mod exact;
 mod features;
 mod generation;
 mod geometry;

@@ -8,6 +8,7 @@ use fearless_simd::{Level, Simd};
 
 use super::Job;
 use super::band::Band;
+use super::doubt::Place;
 use super::features::{Everything, Features, Mesh, Solids};
 use super::intersect::{Formulas, Moment, Nearest, Ray, Slopes, Surface};
 use super::prepare::{Cuboid, Edge, Sphere, Triangle};
@@ -89,6 +90,7 @@ impl<F> Formulas for Naive<F> {
     fn triangle<S: Simd, E: Real>(
         simd: S,
         triangle: &Triangle<E>,
+        _: Place,
         ray: Ray<S, E>,
         moment: Moment<S, E>,
         nearest: &mut Nearest<S, E>,

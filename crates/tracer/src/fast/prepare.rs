@@ -3,9 +3,12 @@
 //! What is the same for all rays of a kind is computed here and not by lane: for rays from the eye and for rays
 //! towards a light the tests of spheres and triangles shrink to a few products with such constants.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DVec3};
 use rayfold_scene::{Object, Scene};
 
+use super::doubt::Corners;
 use super::features::Needs;
 use super::geometry::{Geometry, Shape, Solid, Sun, View};
 use super::lists::{LISTED, LightBuffer, Outline, Sights};
@@ -18,11 +21,20 @@ use crate::parallel::map;
 /// the offset of a new ray's origin exceeds them.
 pub(super) const OFFSET: f64 = 32.0;
 
-/// Rounding errors of an edge's side, in roundoffs of the sum of the products' magnitudes.
-const SIDE: f64 = 4.0;
+/// Rounding errors of an edge's side, in roundoffs of the sum of the products' magnitudes: one of the constant, four of
+/// the sum without fused multiply-add, and what is of second order.
+const SIDE: f64 = 5.25;
 
-/// Rounding errors of bounds on where objects lie.
-pub(super) const BOUNDS: f64 = 16.0;
+/// Rounding errors of the constants of an edge in `f64`, before they are rounded to the kernels' numbers.
+const CONSTANT: f64 = 4.0 * f64::EPSILON;
+
+/// Rounding errors of a triangle's volume with the eye.
+const VOLUME: f64 = 4.0 * f64::EPSILON;
+
+/// Rounding errors of bounds on where objects lie, and how far beside them rays meet them (triangles: [`Beside`]).
+///
+/// [`Beside`]: super::doubt::Beside
+pub(super) const BOUNDS: f64 = 64.0;
 
 /// Below this many roundoffs the sine of the angle between a ray and a triangle's plane is noise.
 pub(super) const GRAZING: f64 = 4.0;
@@ -55,8 +67,8 @@ pub(super) struct Cuboid<E> {
 /// Plücker coordinates of an edge: its direction and its moment, the cross product of its ends.
 ///
 /// `d · moment + direction · (o × d)` tells on which side of the edge the ray from `o` along `d` passes, with an error
-/// below `slack.0 + slack.1 · |o|₁`: what is within the error belongs to the triangle, so that meshes have no cracks,
-/// neither along edges nor at vertices.
+/// below `slack.0 + slack.1 · |o|₁`: what is within the error belongs to the triangle unless it lies beyond its tips, so
+/// that meshes have no cracks, neither along edges nor at vertices.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edge<E> {
     pub(super) direction: [E; 3],
@@ -67,8 +79,9 @@ pub(super) struct Edge<E> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Triangle<E> {
     pub(super) edges: [Edge<E>; 3],
-    /// The same edges for rays from the eye, turned so that what is visible is not negative; the last is a bound on
-    /// the error, or less than zero where the eye lies in the plane.
+    /// The same edges for rays from the eye, in units of twice a bound on the error, turned so that what is visible is
+    /// not negative: below 0 is outside, from 0 to 1 in doubt. The last is a half, or less than zero where the eye lies in
+    /// the plane.
     pub(super) from_eye: [([E; 3], E); 3],
     pub(super) normal: [E; 3],
     /// `normal · point` of its points.
@@ -79,9 +92,9 @@ pub(super) struct Triangle<E> {
 /// A triangle as an obstacle to one light: affine functions of the ray's origin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shade<E> {
-    /// Not negative within the triangle, error bound included.
+    /// In units of twice a bound on the error: below 0 is outside the triangle, from 0 to 1 in doubt.
     pub(super) sides: [([E; 3], E); 3],
-    /// Positive on the side that the light does not shine on.
+    /// The same for the side that the light does not shine on: below 0 is the other one.
     pub(super) depth: ([E; 3], E),
 }
 
@@ -156,6 +169,7 @@ pub(super) struct Prepared<E> {
     pub(super) spheres: Vec<Sphere<E>>,
     pub(super) cuboids: Vec<Cuboid<E>>,
     pub(super) triangles: Vec<Triangle<E>>,
+    pub(super) corners: Corners,
     pub(super) entries: Vec<Entry<E>>,
     pub(super) lights: Vec<Light<E>>,
     pub(super) tree: Option<Tree<E>>,
@@ -183,6 +197,7 @@ impl<E: Real> Prepared<E> {
     ) -> Result<Self, RenderError> {
         let size = (scene.screen.width(), scene.screen.height());
         let stump = (geometry.branches.is_some() && tree == Some(false)).then(|| stump(&geometry.solids));
+        let stump = stump.map(|(solids, branches)| (Arc::new(solids), branches));
         let (solids, branches) = match &stump {
             Some((solids, branches)) => (solids, Some(branches)),
             None => (&geometry.solids, geometry.branches.as_ref()),
@@ -197,11 +212,15 @@ impl<E: Real> Prepared<E> {
         needs.check()?;
         let mut entries: Vec<Entry<E>> = map(&scene.objects, entry);
         let mut sorted = Sorted { balls: vec![], boxes: vec![], facets: vec![] };
-        for solid in solids {
+        let mut places = vec![];
+        for (place, solid) in solids.iter().enumerate() {
             let of_kind = match solid.shape {
                 Shape::Sphere { .. } => &mut sorted.balls,
                 Shape::Cuboid { .. } => &mut sorted.boxes,
-                Shape::Triangle { .. } => &mut sorted.facets,
+                Shape::Triangle { .. } => {
+                    places.push(place as u32);
+                    &mut sorted.facets
+                }
             };
             let entry = &mut entries[solid.order as usize];
             entry.index = of_kind.len() as u32;
@@ -225,6 +244,7 @@ impl<E: Real> Prepared<E> {
             spheres,
             cuboids: map(&sorted.boxes, |solid| cuboid(solid)),
             triangles: map(&sorted.facets, |solid| triangle(solid)),
+            corners: Corners::new(solids.clone(), places),
             lights: geometry.suns.iter().map(|sun| light(sun, &sorted, search)).collect(),
             needs,
             background: point(scene.background()),
@@ -295,38 +315,63 @@ fn sphere<E: Real>(solid: &Solid) -> Sphere<E> {
 fn triangle<E: Real>(solid: &Solid) -> Triangle<E> {
     let Shape::Triangle { vertices, normal } = solid.shape else { unreachable!("{SORTED}") };
     let [a, b, c] = vertices;
-    let edges = [(b, c), (c, a), (a, b)].map(|(p, q)| (q - p, p.cross(q)));
-    let volume = a.dot(b.cross(c));
-    let noise = SIDE
-        * f64::EPSILON
-        * a.length()
-        * b.length().max(c.length())
-        * (b - a).length().max((c - a).length());
-    let from_eye = edges.map(|(_, moment)| {
-        if volume.abs() <= noise {
-            ([E::narrow(0.0); 3], E::narrow(-1.0))
-        } else {
-            let moment = moment * volume.signum();
-            (point(moment), E::narrow(SIDE * E::ROUNDOFF * l1(moment)))
-        }
-    });
-    let slack = |v: DVec3| E::narrow(2.0 * SIDE * E::ROUNDOFF * l1(v));
+    let ends = Ends::new(vertices);
+    let [to_a, to_b, to_c] = ends.squares.map(f64::sqrt);
+    let volume = a.dot((b - a).cross(c - a));
+    let noise = VOLUME * to_a * to_b.max(to_c) * (b - a).length().max((c - a).length());
+    let sign = if volume.abs() > noise { volume.signum() } else { 0.0 };
+    // From elsewhere a cross product adds its errors.
+    let slack = |size: f64, noise: f64| E::narrow(2.0 * SIDE * E::ROUNDOFF * size + noise);
+    let edge = |from: usize, to: usize| {
+        let (direction, anchor) = (vertices[to] - vertices[from], ends.nearer(from, to));
+        let moment = anchor.cross(direction);
+        let length = l1(direction);
+        let noise = CONSTANT * l1(anchor) * length;
+        let scale = 0.5 * sign / (SIDE * E::ROUNDOFF * moment.length() + noise);
+        let from_eye = (point(moment * scale), E::narrow(if sign == 0.0 { -1.0 } else { 0.5 }));
+        let (direction, slack) = (point(direction), (slack(l1(moment), noise), slack(length, 0.0)));
+        (Edge { direction, moment: point(moment), slack }, from_eye)
+    };
+    let [a, b, c] = [edge(1, 2), edge(2, 0), edge(0, 1)];
     Triangle {
-        edges: edges.map(|(direction, moment)| Edge {
-            direction: point(direction),
-            moment: point(moment),
-            slack: (slack(moment), slack(direction)),
-        }),
-        from_eye,
+        edges: [a.0, b.0, c.0],
+        from_eye: [a.1, b.1, c.1],
         normal: point(normal),
-        height: E::narrow(normal.dot(nearest_vertex(vertices))),
+        height: E::narrow(normal.dot(ends.nearest())),
         order: order(solid),
     }
 }
 
-/// The vertex of the smallest coordinates: the one whose height above the plane is rounded least.
-fn nearest_vertex(vertices: [DVec3; 3]) -> DVec3 {
-    vertices.into_iter().min_by(|p, q| p.length().total_cmp(&q.length())).unwrap_or_default()
+/// A triangle's corners by how near they are to the eye: relative to the nearer one numbers are smaller, and rounded
+/// less.
+struct Ends {
+    vertices: [DVec3; 3],
+    /// Of their distances.
+    squares: [f64; 3],
+}
+
+impl Ends {
+    #[inline(always)]
+    fn new(vertices: [DVec3; 3]) -> Self {
+        Self { vertices, squares: vertices.map(|v| v.length_squared()) }
+    }
+
+    #[inline(always)]
+    fn nearer(&self, i: usize, j: usize) -> DVec3 {
+        self.vertices[if self.squares[i] < self.squares[j] { i } else { j }]
+    }
+
+    #[inline(always)]
+    fn nearest(&self) -> DVec3 {
+        let [a, b, c] = self.squares;
+        self.vertices[if a <= b && a <= c {
+            0
+        } else if b <= c {
+            1
+        } else {
+            2
+        }]
+    }
 }
 
 fn l1(v: DVec3) -> f64 {
@@ -390,21 +435,22 @@ fn shade<E: Real>(vertices: [DVec3; 3], normal: DVec3, towards: DVec3) -> Shade<
             depth: ([E::narrow(0.0); 3], E::narrow(-1.0)),
         };
     }
-    let [a, b, c] = vertices;
-    let reach = vertices.iter().map(|v| v.length()).fold(0.0, f64::max);
-    let side = |p: DVec3, q: DVec3| {
-        // Relative to the nearer end, so that the constant is as small as the edge is near.
-        let slope = towards.cross(q - p) * sign;
-        let anchor = if p.length() < q.length() { p } else { q };
-        let start = slope.dot(-anchor);
-        // Less than the offset of what starts at the triangle's edge: that is not in its shadow.
-        let slack = SIDE * E::ROUNDOFF * slope.length() * reach;
-        (point(slope), E::narrow(start + slack))
+    let ends = Ends::new(vertices);
+    // No point has a coordinate beyond 1, no corner is farther away than the root of 3.
+    let scale =
+        |slope: DVec3, start: f64, noise: f64| 0.5 / (SIDE * E::ROUNDOFF * (l1(slope) + start.abs()) + noise);
+    let side = |from: usize, to: usize| {
+        let edge = vertices[to] - vertices[from];
+        let slope = towards.cross(edge) * sign;
+        let start = -slope.dot(ends.nearer(from, to));
+        let scale = scale(slope, start, 3.0 * CONSTANT * l1(edge));
+        (point(slope * scale), E::narrow(start * scale + 0.5))
     };
-    let height = normal.dot(nearest_vertex(vertices));
+    let height = normal.dot(ends.nearest());
+    let scale = sign * scale(normal, height, CONSTANT);
     Shade {
-        sides: [side(b, c), side(c, a), side(a, b)],
-        depth: (point(-normal * sign), E::narrow(height * sign)),
+        sides: [side(1, 2), side(2, 0), side(0, 1)],
+        depth: (point(-normal * scale), E::narrow(height * scale)),
     }
 }
 

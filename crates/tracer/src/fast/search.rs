@@ -5,8 +5,12 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
+use super::doubt::distance_error;
 use super::features::Features;
-use super::intersect::{Moment, Nearest, Ray, Slopes, cuboid_shades, facing, sphere_shades, triangle_shades};
+use super::intersect::{
+    Moment, Nearest, Ray, Slopes, cuboid_shades, facing, sphere_shades, triangle_shades,
+    unshaded_by_triangles,
+};
 use super::lists::Picked;
 use super::prepare::{Kind, Light, Prepared};
 use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
@@ -115,10 +119,11 @@ pub(super) fn nearest<S: Simd, E: Real, F: Features, const EYE: bool>(
     if F::TRIANGLES && masks.triangles != 0 {
         let moment = Moment::new(ray);
         for at in Positions(masks.triangles) {
+            let (triangle, place) = (&scene.triangles[at], (&scene.corners, at));
             if EYE {
-                F::triangle_from_eye(simd, &scene.triangles[at], ray.direction, &mut nearest);
+                F::triangle_from_eye(simd, triangle, place, ray.direction, &mut nearest);
             } else {
-                F::triangle(simd, &scene.triangles[at], ray, moment, &mut nearest);
+                F::triangle(simd, triangle, place, ray, moment, &mut nearest);
             }
         }
     }
@@ -155,10 +160,13 @@ pub(super) fn unshaded<S: Simd, E: Real, F: Features>(
             lit &= !cuboid_shades(simd, &scene.cuboids[at], light, point);
         }
     }
-    if F::TRIANGLES {
+    if F::TRIANGLES && masks.triangles != 0 {
+        let mut shaded = constant::<S, E>(simd, -1.0);
         for at in Positions(masks.triangles) {
-            lit &= !triangle_shades(simd, &light.shades[at], point);
+            shaded = shaded.max(triangle_shades(simd, &light.shades[at], point));
         }
+        let all = Positions(masks.triangles);
+        lit = unshaded_by_triangles(simd, scene, light, (point, lit), shaded, all);
     }
     lit
 }
@@ -184,7 +192,8 @@ fn nearest_of_list<S: Simd, E: Real, F: Features>(
     }
     if F::TRIANGLES {
         for &at in &list.triangles {
-            F::triangle_from_eye(simd, &scene.triangles[at as usize], direction, &mut nearest);
+            let at = at as usize;
+            F::triangle_from_eye(simd, &scene.triangles[at], (&scene.corners, at), direction, &mut nearest);
         }
     }
     nearest
@@ -210,10 +219,13 @@ fn unshaded_by_list<S: Simd, E: Real, F: Features>(
             lit &= !cuboid_shades(simd, &scene.cuboids[at as usize], light, point);
         }
     }
-    if F::TRIANGLES {
+    if F::TRIANGLES && !list.triangles.is_empty() {
+        let mut shaded = constant::<S, E>(simd, -1.0);
         for &at in &list.triangles {
-            lit &= !triangle_shades(simd, &light.shades[at as usize], point);
+            shaded = shaded.max(triangle_shades(simd, &light.shades[at as usize], point));
         }
+        let all = list.triangles.iter().map(|&at| at as usize);
+        lit = unshaded_by_triangles(simd, scene, light, (point, lit), shaded, all);
     }
     lit
 }
@@ -275,7 +287,7 @@ fn descend<E: Real>(
 
 /// The tree's part of a packet of rays.
 #[derive(Clone, Copy)]
-struct Descent<S: Simd, E: Real> {
+pub(super) struct Descent<S: Simd, E: Real> {
     inverse: Vec3<S, E>,
     /// -origin / direction
     shift: Vec3<S, E>,
@@ -284,7 +296,7 @@ struct Descent<S: Simd, E: Real> {
 
 impl<S: Simd, E: Real> Descent<S, E> {
     #[inline(always)]
-    fn new(simd: S, origin: Vec3<S, E>, direction: Vec3<S, E>) -> Self {
+    pub(super) fn new(simd: S, origin: Vec3<S, E>, direction: Vec3<S, E>) -> Self {
         let inverse = Slopes::new(simd, direction).inverse;
         let shift = Vec3::zero(simd).sub(origin.mul(inverse));
         let zero = E::narrow(0.0);
@@ -295,15 +307,22 @@ impl<S: Simd, E: Real> Descent<S, E> {
     /// Which lanes meet the node's box nearer than `limit`.
     #[inline(always)]
     fn meets(&self, simd: S, node: &Node<E>, limit: Lanes<S, E>) -> Mask<S, E> {
-        let low = Vec3::splat(simd, node.low);
-        let high = Vec3::splat(simd, node.high);
+        let (enter, leave) = self.span(simd, node.low, node.high);
+        enter.simd_le(leave.min(limit))
+    }
+
+    /// Where the rays enter a box and where they leave it, at the latest. A box within another has a span within its
+    /// span: rounding keeps order.
+    #[inline(always)]
+    pub(super) fn span(&self, simd: S, low: [E; 3], high: [E; 3]) -> (Lanes<S, E>, Lanes<S, E>) {
+        let (low, high) = (Vec3::splat(simd, low), Vec3::splat(simd, high));
         let (inverse, shift) = (self.inverse, self.shift);
         let (ax, bx) = (low.x.mul_add(inverse.x, shift.x), high.x.mul_add(inverse.x, shift.x));
         let (ay, by) = (low.y.mul_add(inverse.y, shift.y), high.y.mul_add(inverse.y, shift.y));
         let (az, bz) = (low.z.mul_add(inverse.z, shift.z), high.z.mul_add(inverse.z, shift.z));
         let enter = ax.min(bx).max(ay.min(by)).max(az.min(bz)).max(constant::<S, E>(simd, 0.0));
-        let leave = ax.max(bx).min(ay.max(by)).min(az.max(bz)).min(limit);
-        enter.simd_le(leave * constant::<S, E>(simd, 1.0 + 64.0 * E::ROUNDOFF))
+        let leave = ax.max(bx).min(ay.max(by)).min(az.max(bz));
+        (enter, leave * constant::<S, E>(simd, 1.0 + 64.0 * E::ROUNDOFF))
     }
 }
 
@@ -315,6 +334,9 @@ fn nearest_in_tree<S: Simd, E: Real, F: Features, const EYE: bool>(
     ray: Ray<S, E>,
 ) -> Nearest<S, E> {
     let found = core::cell::Cell::new(Nearest::none(simd));
+    // Computed distances are no nearer than this to those of boxes beyond them.
+    let slack = constant::<S, E>(simd, distance_error::<E>());
+    let limit = core::cell::Cell::new(found.get().distance);
     let descent = Descent::new(simd, ray.origin, ray.direction);
     let slopes = Slopes::new(simd, ray.direction);
     let moment = Moment::new(ray);
@@ -322,16 +344,17 @@ fn nearest_in_tree<S: Simd, E: Real, F: Features, const EYE: bool>(
         tree,
         descent.backwards,
         #[inline(always)]
-        |node| descent.meets(simd, node, found.get().distance).any_true(),
+        |node| descent.meets(simd, node, limit.get()).any_true(),
         #[inline(always)]
         |kind, items| {
             let mut nearest = found.get();
             if F::TRIANGLES && kind == Kind::Triangle {
-                for of in &scene.triangles[items] {
+                for (at, of) in items.clone().zip(&scene.triangles[items]) {
+                    let place = (&scene.corners, at);
                     if EYE {
-                        F::triangle_from_eye(simd, of, ray.direction, &mut nearest);
+                        F::triangle_from_eye(simd, of, place, ray.direction, &mut nearest);
                     } else {
-                        F::triangle(simd, of, ray, moment, &mut nearest);
+                        F::triangle(simd, of, place, ray, moment, &mut nearest);
                     }
                 }
             } else if F::CUBOIDS && kind == Kind::Cuboid {
@@ -348,6 +371,7 @@ fn nearest_in_tree<S: Simd, E: Real, F: Features, const EYE: bool>(
                 }
             }
             found.set(nearest);
+            limit.set(nearest.distance.mul_add(slack, nearest.distance + slack));
             true
         },
     );
@@ -376,22 +400,24 @@ fn unshaded_in_tree<S: Simd, E: Real, F: Features>(
         |node| descent.meets(simd, node, limit.get()).any_true(),
         #[inline(always)]
         |kind, items| {
-            let mut dark = zero.simd_lt(zero);
+            let mut lit = limit.get().simd_gt(zero);
             if F::TRIANGLES && kind == Kind::Triangle {
-                for of in &light.shades[items] {
-                    dark |= triangle_shades(simd, of, point);
+                let mut shaded = constant::<S, E>(simd, -1.0);
+                for of in &light.shades[items.clone()] {
+                    shaded = shaded.max(triangle_shades(simd, of, point));
                 }
+                lit = unshaded_by_triangles(simd, scene, light, (point, lit), shaded, items);
             } else if F::CUBOIDS && kind == Kind::Cuboid {
                 for of in &scene.cuboids[items] {
-                    dark |= cuboid_shades(simd, of, light, point);
+                    lit &= !cuboid_shades(simd, of, light, point);
                 }
             } else {
                 for of in &light.spheres[items] {
-                    dark |= sphere_shades(simd, of, faced);
+                    lit &= !sphere_shades(simd, of, faced);
                 }
             }
-            limit.set(dark.select(splat::<S, E>(simd, E::narrow(-1.0)), limit.get()));
-            limit.get().simd_gt(zero).any_true()
+            limit.set(lit.select(limit.get(), splat::<S, E>(simd, E::narrow(-1.0))));
+            lit.any_true()
         },
     );
     limit.get().simd_gt(zero)

@@ -12,9 +12,12 @@ use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
 
 use super::geometry::Solid;
-use super::prepare::{BOUNDS, Entry, Kind, MASKED};
+use super::prepare::{Entry, Kind, MASKED};
 use super::real::Real;
 use crate::parallel::map;
+
+/// Rounding errors of boxes and of rays against them, in roundoffs of the scene's size.
+const BOX: f64 = 32.0;
 
 /// Objects of a leaf at most.
 const LEAF: u32 = 4;
@@ -199,8 +202,6 @@ impl<E: Real> Tree<E> {
     /// `solids` are in the order of [`group`].
     pub(super) fn new(branches: &Branches, solids: &[Solid], entries: &[Entry<E>]) -> Self {
         let branches = &branches.0;
-        // A ray's origin is rounded relative to the scene's size, which is 1, wherever the node lies.
-        let slack = BOUNDS * E::ROUNDOFF;
         // Children change places so that the first comes first along the axis on which they lie farthest apart.
         let mut place: Vec<u32> = (0..branches.len() as u32).collect();
         let mut axes = vec![0; branches.len()];
@@ -216,22 +217,25 @@ impl<E: Real> Tree<E> {
             }
         }
         let node = |&from: &u32| {
-            let Branch { first, count, bounds: (min, max) } = branches[from as usize];
+            let Branch { first, count, bounds } = branches[from as usize];
             let (first, content) = if count == 0 {
                 (first, axes[from as usize])
             } else {
                 let entry = &entries[solids[first as usize].order as usize];
                 (entry.index, count << 2 | entry.kind as u32)
             };
-            Node {
-                low: (min - slack).to_array().map(E::narrow),
-                high: (max + slack).to_array().map(E::narrow),
-                first,
-                content,
-            }
+            let (low, high) = padded(bounds);
+            Node { low, high, first, content }
         };
         Self { nodes: place.iter().map(node).collect() }
     }
+}
+
+/// A box as the tree's tests have it. One that lies within another is within that one here too.
+pub(super) fn padded<E: Real>((min, max): (DVec3, DVec3)) -> ([E; 3], [E; 3]) {
+    // A ray's origin is rounded relative to the scene's size, which is 1, wherever the box lies.
+    let slack = BOX * E::ROUNDOFF;
+    ((min - slack).to_array().map(E::narrow), (max + slack).to_array().map(E::narrow))
 }
 
 /// The box around two.

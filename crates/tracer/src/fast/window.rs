@@ -55,7 +55,7 @@ impl Window {
             View::Pinhole { back, .. } => -back,
             View::Parallel { .. } => DVec3::NEG_Z,
         };
-        let visible = mask(solids, |solid| solid.support(ahead) >= -slack(solid));
+        let visible = mask(solids, |solid| solid.support(ahead) >= -2.0 * slack(solid));
         let span = |from: f64, to: f64, axis: fn(&View) -> DVec3| {
             let (from, to) = (from.min(to), from.max(to));
             let (along, back) = (axis(&view), back(&view));

@@ -145,7 +145,7 @@ fn to_triangle(triangle: &Triangle, ray: Ray) -> Option<f64> {
     if outside || edges == [0.0; 3] {
         return None;
     }
-    let normal = triangle_normal(triangle);
+    let normal = triangle_normal(triangle.vertices());
     let [a, b, c] = triangle.vertices().map(|vertex| vertex - ray.origin);
     let nearest = [b, c].into_iter().fold(a, |n, v| if v.length() < n.length() { v } else { n });
     Some(nearest.dot(normal) / ray.direction.dot(normal))
@@ -179,24 +179,48 @@ fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
     (ab - cd) + (a.mul_add(b, -ab) - c.mul_add(d, -cd))
 }
 
-/// Unit normal; zero where the area is nothing but rounding error.
-pub(crate) fn triangle_normal(triangle: &Triangle) -> DVec3 {
-    let largest = triangle.vertices().iter().fold(DVec3::ZERO, |m, v| m.max(v.abs())).max_element();
+/// Unit normal of a triangle; zero where the area is nothing but rounding error.
+pub(crate) fn triangle_normal(vertices: &[DVec3; 3]) -> DVec3 {
+    normal_and_width(vertices).0
+}
+
+/// [`triangle_normal`], and about how wide the triangle is for its length.
+///
+/// The normal is right to a few roundoffs also for a needle: the rounding errors of its edges, which are large beside
+/// its width, are put back.
+pub(crate) fn normal_and_width(vertices: &[DVec3; 3]) -> (DVec3, f64) {
+    let largest = vertices.iter().fold(DVec3::ZERO, |m, v| m.max(v.abs())).max_element();
     let scale = below_inverse(largest);
-    let [a, b, c] = triangle.vertices().map(|v| v * scale);
-    let level = |v: DVec3| v * below_inverse(v.abs().max_element());
-    let (p, q) = (level(b - a), level(c - a));
-    let normal = DVec3::new(
+    let [a, b, c] = vertices.map(|v| v * scale);
+    let (p, q) = (b - a, c - a);
+    let (p_scale, q_scale) = (below_inverse(p.abs().max_element()), below_inverse(q.abs().max_element()));
+    let (p, q) = (p * p_scale, q * q_scale);
+    let mut normal = DVec3::new(
         difference_of_products(p.y, q.z, p.z, q.y),
         difference_of_products(p.z, q.x, p.x, q.z),
         difference_of_products(p.x, q.y, p.y, q.x),
     );
-    let noise = 8.0 * ROUNDOFF * p.length() * q.length();
-    if normal.length() <= noise { DVec3::ZERO } else { unit(normal) }
+    let edges = p.length() * q.length();
+    if normal.length() < SLIM * edges {
+        normal += p.cross(rest(c, a) * q_scale) + (rest(b, a) * p_scale).cross(q);
+    }
+    let sine = normal.length() / edges;
+    let width = sine * (q_scale / p_scale).min(p_scale / q_scale);
+    (if sine > 8.0 * ROUNDOFF { unit(normal) } else { DVec3::ZERO }, width)
+}
+
+/// Below this sine of the angle between its edges, their rounding errors count.
+const SLIM: f64 = 0.25;
+
+/// The rounding error of `a - b` (Knuth).
+fn rest(a: DVec3, b: DVec3) -> DVec3 {
+    let difference = a - b;
+    let of_b = difference - a;
+    (a - (difference - of_b)) - (b + of_b)
 }
 
 fn of_triangle(triangle: &Triangle, ray: Ray, distance: f64) -> Surface {
-    let normal = triangle_normal(triangle);
+    let normal = triangle_normal(triangle.vertices());
     let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
     let corner = triangle.vertices()[0];
     let near = ray.origin + distance * ray.direction;

@@ -24,7 +24,7 @@ use image::RgbImage;
 use rayfold_scene::{Camera, Cuboid, Light, Object, Pinhole, Scene, Sphere, Triangle, model::unit};
 
 pub use intersect::Surface;
-pub(crate) use intersect::{power, triangle_normal};
+pub(crate) use intersect::{normal_and_width, power, triangle_normal};
 
 use crate::camera::{Ray, Rays};
 use crate::parallel::{CHANNELS, bands};
