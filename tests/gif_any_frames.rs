@@ -1,5 +1,5 @@
 //! Frames drawn at random through the encoder and another's decoder: all are there, in order, for their time, and exact
-//! where they have at most 256 colours.
+//! where they have at most 256 colours and do not drift.
 //!
 //! A short slice of the fuzz target `gif`. A failure prints the seed; `RAYFOLD_SEED` tries another one.
 
@@ -62,6 +62,23 @@ fn decode(bytes: &[u8], size: (u32, u32)) -> Vec<(RgbImage, u64)> {
     shown
 }
 
+/// Whether a frame of few colours need not be exact: some of it changes by a few levels, or did before and little has
+/// changed since.
+fn may_drift(before: &RgbImage, now: &RgbImage, drifted: bool) -> bool {
+    let steps = before.pixels().zip(now.pixels()).filter(|(was, now)| was != now);
+    let (slight, large) = steps.fold((0, 0), |(slight, large), (was, now)| {
+        let most = was.0.iter().zip(now.0).map(|(&a, b)| a.abs_diff(b)).max();
+        if most < Some(8) { (slight + 1, large) } else { (slight, large + 1) }
+    });
+    slight > 0 || drifted && large * 2 < now.pixels().len()
+}
+
+/// Mean squared.
+fn error(a: &RgbImage, b: &RgbImage) -> f64 {
+    let sum = a.iter().zip(b.iter()).map(|(&a, &b)| f64::from(a.abs_diff(b)).powi(2)).sum::<f64>();
+    sum / a.len() as f64
+}
+
 #[test]
 fn any_frames_come_back() {
     let seed = std::env::var("RAYFOLD_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(20_261_121);
@@ -79,30 +96,29 @@ fn any_frames_come_back() {
             encoder.push(image.clone()).unwrap();
             image.clone()
         });
-        let meant = meant.collect::<Vec<_>>();
+        let frames = meant.collect::<Vec<_>>();
         let summary = encoder.finish().unwrap();
-        assert_eq!((summary.size, summary.frames), (size, meant.len() as u64), "animation {animation}");
+        assert_eq!((summary.size, summary.frames), (size, frames.len() as u64), "animation {animation}");
         let shown = decode(&bytes, size);
-        assert_eq!(shown.len(), meant.len(), "animation {animation}");
+        assert_eq!(shown.len(), frames.len(), "animation {animation}");
         let mut end = 0;
-        for (k, (meant, (seen, delay))) in meant.iter().zip(&shown).enumerate() {
+        let mut drifts = false;
+        for (k, (meant, (seen, delay))) in frames.iter().zip(&shown).enumerate() {
             end += delay;
             let time = (k + 1) as f64 * 100.0 / fps;
             assert!(
                 (end as f64 - time).abs() <= 0.5 + 1e-6,
                 "animation {animation}, frame {k}: {end} for {time}"
             );
-            if meant.pixels().collect::<HashSet<_>>().len() <= 256 {
+            let few = meant.pixels().collect::<HashSet<_>>().len() <= 256;
+            drifts = few && k > 0 && may_drift(&frames[k - 1], meant, drifts);
+            if few && !drifts {
                 assert!(meant == seen, "animation {animation}, frame {k} of {size:?} is not exact");
                 exact += 1;
             } else {
-                let sum = meant
-                    .iter()
-                    .zip(seen.iter())
-                    .map(|(&a, &b)| f64::from(a.abs_diff(b)).powi(2))
-                    .sum::<f64>();
-                let error = sum / meant.len() as f64;
-                assert!(error < 900.0, "animation {animation}, frame {k}: mean squared error {error}");
+                let most = if drifts { 25.0 } else { 900.0 };
+                let error = error(meant, seen);
+                assert!(error < most, "animation {animation}, frame {k}: mean squared error {error}");
                 near += 1;
             }
         }

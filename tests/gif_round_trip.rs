@@ -118,6 +118,24 @@ fn a_frame_of_256_colours_after_another_is_exact() {
 }
 
 #[test]
+fn few_colours_that_drift_are_near_and_small_and_a_cut_is_exact() {
+    let sky = |time: u32| {
+        RgbImage::from_fn(96, 96, |x, y| Rgb([(40 + (x + y) / 8 + time) as u8, 60, (90 + time / 2) as u8]))
+    };
+    let mut frames = (0..12).map(sky).collect::<Vec<_>>();
+    frames.push(RgbImage::from_fn(96, 96, |x, _| Rgb([(x / 4) as u8, 200, 10])));
+    let (bytes, _) = encode(&frames, Settings::default()).unwrap();
+    let shown = decode(&bytes);
+    assert!(frames[0] == shown[0].0 && frames[12] == shown[12].0);
+    for (k, (frame, (seen, _))) in frames.iter().zip(&shown).enumerate() {
+        assert!(frame == seen || psnr(frame, seen) > 44.0, "frame {k}: {} dB", psnr(frame, seen));
+    }
+    let alone =
+        frames.iter().map(|frame| encode(std::slice::from_ref(frame), Settings::default()).unwrap().0.len());
+    assert!(bytes.len() * 3 < alone.sum::<usize>() * 2, "{} bytes", bytes.len());
+}
+
+#[test]
 fn one_pixel_one_frame() {
     let frame = RgbImage::from_pixel(1, 1, Rgb([12, 34, 56]));
     let (bytes, summary) = encode(std::slice::from_ref(&frame), Settings::default()).unwrap();

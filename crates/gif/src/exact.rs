@@ -1,8 +1,11 @@
-//! Frames of at most 256 colours, which lose nothing.
+//! Frames of at most 256 colours, which lose nothing unless the picture drifts: where much of it [changes](change)
+//! slightly from frame to frame, to draw all that would cost several times the bytes.
 
 use rayon::prelude::*;
 
 use crate::block::{Area, Block};
+use crate::colour;
+use crate::look::GLARING;
 use crate::stripe::{self, Sheet};
 
 /// Colours, at most 256, and their numbers in order of appearance.
@@ -14,6 +17,12 @@ pub(crate) struct FewColours {
 }
 
 const SLOTS: usize = 1024;
+/// How many pixels in a row are looked at, and of how many such rows one is, to see how a frame changes: a prime,
+/// so that they are not below each other.
+const PROBE: usize = 61;
+const ONE_IN: usize = 4;
+/// Much changes where one pixel in so many does.
+const MUCH: usize = 8;
 /// Parts of a frame that are looked at side by side.
 const PARTS: usize = 2;
 
@@ -60,6 +69,39 @@ pub(crate) fn few_colours(pixels: &[[u8; 3]]) -> Option<FewColours> {
         }
     }
     Some(colours)
+}
+
+/// What becomes of a frame in the next one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Change {
+    /// Most of it stays.
+    Little,
+    /// Much changes, most of that by no more than a viewer may miss, as in a slow fade of a gradient.
+    Slight,
+    /// Much changes, and clearly.
+    Large,
+}
+
+/// How a frame differs from the one before it.
+pub(crate) fn change(pixels: &[[u8; 3]], before: &[[u8; 3]]) -> Change {
+    let probes = pixels.chunks(PROBE).zip(before.chunks(PROBE)).step_by(ONE_IN);
+    let (mut probed, mut changed, mut slightly) = (0, 0, 0);
+    for (now, was) in probes {
+        probed += now.len();
+        for (&now, &was) in now.iter().zip(was) {
+            if now != was {
+                changed += 1;
+                slightly += usize::from(colour::level_error(now, was) as f32 <= GLARING);
+            }
+        }
+    }
+    if changed * MUCH < probed {
+        Change::Little
+    } else if slightly * 4 >= changed * 3 {
+        Change::Slight
+    } else {
+        Change::Large
+    }
 }
 
 /// Draws whatever is not seen right; all of the frame if it is the first or no index is left to mean nothing.
@@ -128,4 +170,24 @@ pub(crate) fn draw(
         }
     });
     block
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_are_told_apart() {
+        let before = (0..10_000_u32).map(|k| [(k / 64) as u8, 10, 20]).collect::<Vec<_>>();
+        let with = |part: usize, by: u8| {
+            let mut now = before.clone();
+            now.iter_mut().take(10_000 / part).for_each(|[_, g, _]| *g += by);
+            now
+        };
+        assert_eq!(change(&before, &before), Change::Little);
+        assert_eq!(change(&with(20, 1), &before), Change::Little);
+        assert_eq!(change(&with(20, 100), &before), Change::Little);
+        assert_eq!(change(&with(2, 1), &before), Change::Slight);
+        assert_eq!(change(&with(2, 100), &before), Change::Large);
+    }
 }

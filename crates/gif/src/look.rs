@@ -15,9 +15,11 @@ use crate::ink::Ink;
 /// as if all were drawn.
 const TILE: usize = 8;
 /// [Level error](colour::level_error) beyond that of a drawn pixel, in the mean of a tile, up to which the tile is left.
-const TOLERATED: f32 = 20.0;
+pub(crate) const TOLERATED: f32 = 20.0;
+/// The same where the palette has all colours: there an error is seen more easily.
+pub(crate) const TOLERATED_IF_EXACT: f32 = 6.0;
 /// The level error of a pixel above which its tile is drawn in any case: almost three levels.
-const GLARING: f32 = 50.0;
+pub(crate) const GLARING: f32 = 50.0;
 /// The level error up to which a pixel that changes may be left in a tile that is drawn.
 const SEEN_RIGHT: f32 = 2.0;
 /// The squared error (see [`colour`]) above which a pixel that stays asks for a better colour.
@@ -45,6 +47,8 @@ pub(crate) struct Before<'a> {
     pub(crate) seen: &'a [[u8; 3]],
     /// Mean level error of what will be drawn.
     pub(crate) error: f32,
+    /// [Level error](colour::level_error) beyond that, in the mean of a tile, up to which the tile is left.
+    pub(crate) tolerated: f32,
     /// What will be drawn with which squared error; `None`: all of it with none.
     pub(crate) inks: Option<(&'a Histogram, &'a [Ink])>,
 }
@@ -151,6 +155,7 @@ impl<'a> Before<'a> {
             needs: &self.needs[range.clone()],
             seen: &self.seen[range],
             error: self.error,
+            tolerated: self.tolerated,
             inks: self.inks,
         }
     }
@@ -181,7 +186,7 @@ fn look_at_band(
         }
         still.count_wrong(tile.wrong, tile.wrong_error());
         *error = tile.wrong_error();
-        if tile.may_be_left() {
+        if tile.may_be_left(before.tolerated) {
             for start in rows {
                 for need in &mut needs[start..start + count] {
                     if matches!(need, Need::Draw | Need::Free) {
@@ -220,9 +225,12 @@ impl Tile {
             still.count(needs.len());
             return;
         }
-        let rows = pixels.iter().zip(before.frame).zip(before.seen).zip(before.needs).zip(needs);
-        for ((((&now, &was), &seen), &drawn), need) in rows {
-            let left = drawn == Need::Nothing;
+        // By number: five iterators in one are not always inlined, which costs a tenth of the encoder's time.
+        let count = pixels.len();
+        let (frame, shown, drawn) = (&before.frame[..count], &before.seen[..count], &before.needs[..count]);
+        for (k, need) in needs[..count].iter_mut().enumerate() {
+            let (now, was, seen) = (pixels[k], frame[k], shown[k]);
+            let left = drawn[k] == Need::Nothing;
             *need = if now == was {
                 let error = match self.refine {
                     Some(near) if left && now != seen => near.error(now, seen),
@@ -259,7 +267,7 @@ impl Tile {
         self.sum_wrong / self.wrong.max(1) as f32
     }
 
-    fn may_be_left(&self) -> bool {
-        self.excess <= TOLERATED * self.pixels as f32 && self.worst <= GLARING
+    fn may_be_left(&self, tolerated: f32) -> bool {
+        self.excess <= tolerated * self.pixels as f32 && self.worst <= GLARING
     }
 }

@@ -9,10 +9,10 @@ use image::RgbImage;
 use crate::allowance::{Allowance, Loan, Redrawn};
 use crate::block::{Area, Block};
 use crate::colour::Near;
-use crate::exact::{self, FewColours};
+use crate::exact::{self, Change, FewColours};
 use crate::histogram::{Histogram, MOST_BINS};
 use crate::ink::{self, Ink};
-use crate::look::{Before, Need, Needs};
+use crate::look::{Before, Need, Needs, TOLERATED, TOLERATED_IF_EXACT};
 use crate::palette::Palette;
 use crate::stripe::{self, Inks, Row, Sheet, Stripe};
 
@@ -50,6 +50,8 @@ struct Waiting {
     delay_cs: u16,
     /// Whether there is none before it.
     first: bool,
+    /// Whether it has at most 256 colours and is not exact, because it changes slightly from frame to frame.
+    drifts: bool,
     needs: Needs,
     histogram: Histogram,
     plan: Plan,
@@ -108,13 +110,26 @@ impl Quantiser {
 
         let (seen, allowance, parts) = (&mut self.seen, &mut self.allowance, &mut self.parts);
         let error = self.drawn_error;
+        let mut drifting = false;
         let mut look = |seen: &RgbImage, needs: &mut Needs| {
+            let before = before.as_ref();
             let few = exact::few_colours(pixels);
-            let before = before.as_ref().filter(|_| few.is_none()).map(|before| Before {
+            let change = match before {
+                Some(before) if few.is_some() => exact::change(pixels, before.frame.as_raw().as_chunks().0),
+                _ => Change::Large,
+            };
+            let drifts = match change {
+                Change::Little => before.is_some_and(|before| before.drifts),
+                Change::Slight => true,
+                Change::Large => false,
+            };
+            let few = few.filter(|_| !drifts);
+            let before = before.filter(|_| few.is_none()).map(|before| Before {
                 frame: before.frame.as_raw().as_chunks().0,
                 needs: &before.needs.pixels,
                 seen: seen.as_raw().as_chunks().0,
                 error,
+                tolerated: if drifts { TOLERATED_IF_EXACT } else { TOLERATED },
                 inks: match &before.plan {
                     Plan::Exactly(_) => None,
                     Plan::With(paint) => Some((&before.histogram, &paint.of_bins)),
@@ -122,7 +137,8 @@ impl Quantiser {
             });
             let loan = match before {
                 Some(before) => {
-                    let still = needs.look(pixels, width, before, allowance.is_left());
+                    let still =
+                        needs.look(pixels, width, before, change != Change::Slight && allowance.is_left());
                     Some(allowance.lend(&still, pixels.len()))
                 }
                 None => {
@@ -130,6 +146,7 @@ impl Quantiser {
                     None
                 }
             };
+            drifting = drifts;
             (few, loan)
         };
         let (plan, drawn) = match &before {
@@ -157,7 +174,7 @@ impl Quantiser {
         if let Plan::With(Paint { area: Some(_), error, .. }) = plan {
             self.drawn_error = error;
         }
-        self.waiting = Some(Waiting { frame, delay_cs, first, needs, histogram, plan });
+        self.waiting = Some(Waiting { frame, delay_cs, first, drifts: drifting, needs, histogram, plan });
         let (before, (block, redrawn)) = (before?, drawn?);
         if let Plan::With(Paint { loan: Some(loan), changed, .. }) = &before.plan {
             self.allowance.pay(loan, &redrawn, *changed);
