@@ -106,7 +106,7 @@ pub(super) fn shared_vertices(tracers: &[Tracer], size: Size, figures: &mut Figu
 /// Long thin triangles in any position: the oracle's hits but within 4 ulp of an edge, distances to 16 ulp.
 pub(super) fn needles(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
     let mut rng = random(12);
-    let mut worst = vec![(0f64, 0f64); tracers.len()];
+    let mut worst = vec![(0f64, 0f64, 0f64); tracers.len()];
     let (needles, each) = (size.pick(40, 1000), size.pick(40, 200));
     for _ in 0..needles {
         let tip = direction(&mut rng);
@@ -129,7 +129,10 @@ pub(super) fn needles(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
                 let largest = vertices.iter().fold(0.0, |m: f64, v| m.max((*v - ray.origin).length()));
                 match (truth, hit) {
                     (Some(truth), Some(hit)) => {
-                        worst.1 = worse(worst.1, (hit.t - truth.t).abs() / tracer.ulp(truth.t));
+                        let off = (hit.t - truth.t).abs() / tracer.ulp(truth.t);
+                        let sine = truth.normal.dot(ray.direction).abs();
+                        worst.1 = worse(worst.1, off);
+                        worst.2 = worse(worst.2, off * sine);
                     }
                     (None, None) => {}
                     _ => {
@@ -140,7 +143,7 @@ pub(super) fn needles(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
             }
         }
     }
-    for (tracer, (edge, t)) in tracers.iter().zip(worst) {
+    for (tracer, (edge, t, plane)) in tracers.iter().zip(worst) {
         figures.add(
             tracer,
             "wrong hit or miss off the edge, ulp",
@@ -149,6 +152,10 @@ pub(super) fn needles(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
             unless_single(tracer, 4.0),
         );
         figures.add(tracer, "t, ulp", needles * each, t, unless_single(tracer, 16.0));
+        // How far off the true plane the hit lies. The distance is that, with the roundoff of a normal of unit length in
+        // it, divided by the sine of the angle to the plane, which has no least value here.
+        let off_plane = "t times the sine to the plane, ulp";
+        figures.add(tracer, off_plane, needles * each, plane, unless_single(tracer, 16.0));
     }
     Ok(())
 }

@@ -193,7 +193,7 @@ pub(super) trait Formulas {
                 & (a_right.min(b_right).min(c_right).simd_gt(zero)
                     | a_left.max(b_left).max(c_left).simd_lt(zero));
             let hit = inside & distance.simd_gt(zero);
-            let ray = (ray, Beside::Anywhere);
+            let ray = (ray.origin, ray.direction, Beside::Anywhere);
             offer_settled(simd, (triangle, place), ray, (hit, clear), (slope, distance), nearest);
         }
     }
@@ -215,7 +215,7 @@ pub(super) trait Formulas {
             let distance = splat::<S, E>(simd, triangle.height) * (constant::<S, E>(simd, 1.0) / slope);
             // What is clear of the edges lies ahead: the sides are turned that way.
             let clear = least.simd_gt(constant::<S, E>(simd, 1.0));
-            let ray = (Ray { origin: Vec3::zero(simd), direction }, Beside::Eye);
+            let ray = (Vec3::zero(simd), direction, Beside::Eye);
             offer_settled(simd, (triangle, place), ray, (inside, clear), (slope, distance), nearest);
         }
     }
@@ -355,7 +355,7 @@ const LATE: f64 = 8.0;
 fn offer_settled<S: Simd, E: Real>(
     simd: S,
     (triangle, place): (&Triangle<E>, Place),
-    (ray, beside): (Ray<S, E>, Beside),
+    (origin, direction, beside): (Vec3<S, E>, Vec3<S, E>, Beside),
     (hit, clear): (Mask<S, E>, Mask<S, E>),
     (slope, distance): (Lanes<S, E>, Lanes<S, E>),
     nearest: &mut Nearest<S, E>,
@@ -366,6 +366,8 @@ fn offer_settled<S: Simd, E: Real>(
         return nearest.offer(simd, hit, distance, triangle.order);
     }
     let steep = slope.abs().simd_gt(constant::<S, E>(simd, GRAZING * E::ROUNDOFF));
+    // Put together here, so that only rays in doubt go through memory.
+    let ray = Ray { origin, direction };
     let (met, settled) = settle(simd, place, ray, beside, (doubtful & steep, clear), distance);
     let distance = doubtful.select(settled, distance);
     let met = sure | (met & steep & distance.simd_gt(constant::<S, E>(simd, 0.0)));
