@@ -235,6 +235,19 @@ fn a_surface_is_not_in_the_shadow_of_what_touches_it_with_a_corner() {
 }
 
 #[test]
+fn a_ray_that_starts_on_a_sphere_sees_it_from_within() {
+    // 5² + 12² = 13²: four pixels' rays start exactly on the sphere, four touch it as they go along.
+    let script = "Screen 27 27\nBackground 1 1 1\nSphere 13  13 13 -12  0 0 0  0.2 0.4 0.5  0.2 0.4 0.6\n\
+                  Ilight 1 1 1  -0.6 -0.5 0.8\nTrace\n";
+    let scene = parse("on.txt", script.as_bytes(), &Limits::default()).script.unwrap().frame(0).unwrap();
+    let plain = reference::render(&scene, &RenderOptions::default()).unwrap();
+    for precision in [Precision::F32, Precision::F64] {
+        let image = draw(&scene, RenderOptions { precision, ..Default::default() });
+        assert_eq!(off_by_more_than(1, &image, &plain), 0, "{precision:?}");
+    }
+}
+
+#[test]
 fn tiles_trees_and_threads_cannot_be_seen() {
     for scene in Dice::new("tiles").scenes() {
         for precision in [Precision::F32, Precision::F64] {

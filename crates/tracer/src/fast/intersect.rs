@@ -164,9 +164,9 @@ pub(super) trait Formulas {
         }
     }
 
-    /// By the sides of its edges in Plücker coordinates, each with a bound on its error, and exactly where that leaves
-    /// them open; the distance is that of the plane, by the operations of a box's slab, so that one in the plane of a face
-    /// is met where the face is. A ray within the rounding error of the plane misses.
+    /// By the sides of its edges in Plücker coordinates, each with a bound on its error; what that leaves open is
+    /// [settled](settle). The distance is that of the plane, by the operations of a box's slab, so that one in the plane
+    /// of a face is met where the face is. A ray within the rounding error of the plane misses.
     #[inline(always)]
     fn triangle<S: Simd, E: Real>(
         simd: S,
@@ -239,7 +239,8 @@ pub(super) trait Formulas {
             let zero = constant::<S, E>(simd, 0.0);
             zero.simd_eq(zero)
         } else {
-            to_center.dot(to_center).simd_lt(splat::<S, E>(simd, sphere.square))
+            // What starts on the surface and meets the sphere goes through it.
+            to_center.dot(to_center).simd_le(splat::<S, E>(simd, sphere.square))
         };
         if !EYE && !inside.any_true() {
             return outside;
