@@ -33,7 +33,7 @@ const MOST_MADE_GOOD: f32 = 0.8;
 /// The part of a frame that is drawn because it changed from which on that holds in full. Below, proportionally less is
 /// made good, down to a least part of it: what changes now is soon drawn anew, and the mean is seen where a picture stays.
 const MUCH_CHANGED: f64 = 0.4;
-const LEAST_PART: f64 = 0.5;
+const LEAST_PART: f64 = 0.3;
 /// The part that is handed on, half of it to the right, half down; and how many levels at most.
 const HANDED_ON: f32 = 0.8;
 const MOST_AMISS: f32 = 24.0;
