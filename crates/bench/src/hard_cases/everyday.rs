@@ -3,12 +3,12 @@
 
 use anyhow::Result;
 use fastrand::Rng;
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayfold_scene::{Camera, Cuboid, Material, Object, Pinhole, Scene, Screen, Sphere, Triangle};
 
 use super::nasty::{Kind, judge_kinds};
 use super::{Figures, Size, direction};
-use crate::scenes::{icosphere, light};
+use crate::scenes::{icosphere, light, looking_at};
 use crate::tracers::Tracer;
 
 pub(super) const KINDS: &[Kind] = &[
@@ -83,9 +83,7 @@ fn seen(rng: &mut Rng, objects: Vec<Object>) -> Result<Scene> {
     let eye = DVec3::new(tenths(rng, -40, 40), tenths(rng, 2, 50), 8.0);
     let screen = Screen::new(rng.u32(24..48), rng.u32(24..48))?;
     let target = DVec3::new(0.0, tenths(rng, -5, 10), 0.0);
-    let half = DVec2::new(0.5, 0.5 * f64::from(screen.height()) / f64::from(screen.width()));
-    let camera = Pinhole::new(eye, target - eye, DVec3::Y, 1.0, -half, half)?;
-    let mut scene = Scene::new(screen, Camera::Pinhole(camera));
+    let mut scene = Scene::new(screen, looking_at(eye, target, 1.0, screen)?);
     scene.set_background(DVec3::new(0.2, 0.3, 0.5))?;
     scene.objects = objects.into();
     let lights: Result<Vec<_>> =
