@@ -14,9 +14,9 @@ struct Grant {
     difference: f64,
 }
 /// At the start. Over 10 frames and the first, the mean difference stays below 0.05 with what comes later.
-const AT_FIRST: Grant = Grant { pixels: 0.1, difference: 0.12 };
+const AT_FIRST: Grant = Grant { pixels: 0.1, difference: 0.13 };
 /// More with each frame of which a fair part changes.
-const EACH_FRAME: Grant = Grant { pixels: 0.2, difference: 0.027 };
+const EACH_FRAME: Grant = Grant { pixels: 0.2, difference: 0.03 };
 /// A frame gives that grant in full when one pixel in so many of them changes.
 const FOR_CHANGES: f64 = 8.0;
 /// How much more may be asked for than is left: of what is asked for a part is drawn, and only that is taken off. One
@@ -83,11 +83,13 @@ impl Redrawn {
 pub(crate) struct Allowance {
     share: f64,
     difference: f64,
+    /// How many frames in a row have left alone what lies apart from their changes, and one.
+    pub(crate) waited: usize,
 }
 
 impl Allowance {
     pub(crate) fn new() -> Self {
-        Self { share: AT_FIRST.pixels, difference: AT_FIRST.difference }
+        Self { share: AT_FIRST.pixels, difference: AT_FIRST.difference, waited: 1 }
     }
 
     pub(crate) fn is_left(&self) -> bool {

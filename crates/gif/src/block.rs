@@ -17,6 +17,24 @@ impl Area {
         Self { left: 0, top: 0, right: width, bottom: pixels / width }
     }
 
+    pub(crate) fn size(&self) -> usize {
+        (self.right - self.left) * (self.bottom - self.top)
+    }
+
+    pub(crate) fn contains(&self, x: usize, y: usize) -> bool {
+        (self.left..self.right).contains(&x) && (self.top..self.bottom).contains(&y)
+    }
+
+    /// The smallest that holds it and a pixel.
+    pub(crate) fn with(&self, x: usize, y: usize) -> Self {
+        Self {
+            left: self.left.min(x),
+            top: self.top.min(y),
+            right: self.right.max(x + 1),
+            bottom: self.bottom.max(y + 1),
+        }
+    }
+
     /// The smallest that holds all pixels wanted, row by row; `None` if there are none.
     pub(crate) fn around<T>(items: &[T], width: usize, wanted: impl Fn(&T) -> bool) -> Option<Self> {
         let mut around: Option<Self> = None;

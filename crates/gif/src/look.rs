@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use crate::allowance::Still;
+use crate::block::Area;
 use crate::colour::{self, Near};
 use crate::histogram::Histogram;
 use crate::ink::Ink;
@@ -24,6 +25,12 @@ pub(crate) const GLARING: f32 = 50.0;
 const SEEN_RIGHT: f32 = 2.0;
 /// The squared error (see [`colour`]) above which a pixel that stays asks for a better colour.
 const SEEN_WRONG: f32 = 1.5;
+
+/// The same, in parts of the mean of those of its tile: the worst are worth their flicker.
+const AMONG_WORST: f32 = 0.8;
+/// How many pixels the area of a frame may grow by for each pixel that stays and is drawn better. Runs of pixels that are
+/// left are not for nothing: LZW learns their lengths one by one.
+const GROWN_BY: usize = 6;
 
 /// What a pixel asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,8 +65,17 @@ pub(crate) struct Before<'a> {
 pub(crate) struct Needs {
     width: usize,
     pub(crate) pixels: Vec<Need>,
-    /// Of the pixels of each tile that stay and are seen wrong.
-    tile_errors: Vec<f32>,
+    tiles: Vec<TileNeeds>,
+}
+
+/// What a tile needs.
+#[derive(Debug, Clone, Copy, Default)]
+struct TileNeeds {
+    /// Whether any of it is to be drawn because it changes.
+    changes: bool,
+    /// How many pixels stay, are seen wrong and ask for a better colour, and the mean of their squared errors.
+    wrong: u32,
+    error: f32,
 }
 
 impl Needs {
@@ -68,7 +84,7 @@ impl Needs {
         self.width = width;
         self.pixels.clear();
         self.pixels.resize(pixels, Need::Draw);
-        self.tile_errors.clear();
+        self.tiles.clear();
     }
 
     /// Looks at a frame; `refining`: whether pixels that stay may be drawn better.
@@ -81,19 +97,45 @@ impl Needs {
     ) -> Still {
         self.width = width;
         self.pixels.resize(pixels.len(), Need::Draw);
-        self.tile_errors.resize(width.div_ceil(TILE) * pixels.len().div_ceil(TILE * width), 0.0);
+        self.tiles.resize(width.div_ceil(TILE) * pixels.len().div_ceil(TILE * width), TileNeeds::default());
         let refine = refining.then(Near::new);
-        let bands = self
-            .pixels
-            .par_chunks_mut(TILE * width)
-            .zip(self.tile_errors.par_chunks_mut(width.div_ceil(TILE)));
-        let looked = bands.enumerate().fold(Still::none, |mut still, (number, (needs, errors))| {
+        let bands =
+            self.pixels.par_chunks_mut(TILE * width).zip(self.tiles.par_chunks_mut(width.div_ceil(TILE)));
+        let looked = bands.enumerate().fold(Still::none, |mut still, (number, (needs, tiles))| {
             let start = number * TILE * width;
             let part = &pixels[start..start + needs.len()];
-            look_at_band(part, width, before.part(start, needs.len()), refine, needs, errors, &mut still);
+            look_at_band(part, width, before.part(start, needs.len()), refine, needs, tiles, &mut still);
             still
         });
         looked.reduce(Still::none, Still::join)
+    }
+
+    /// Leaves what stays alone where it lies apart from what changes, unless it is much for the area that it adds, or has
+    /// `waited` for so many frames. `least`: the error from which a tile may be drawn better. Gives how long it has waited.
+    pub(crate) fn confine(&mut self, least: f32, waited: usize) -> usize {
+        let columns = self.width.div_ceil(TILE);
+        let Some(inside) = Area::around(&self.tiles, columns, |tile| tile.changes) else { return waited };
+        let (mut all, mut apart) = (inside, 0);
+        for (at, tile) in self.tiles.iter().enumerate() {
+            let (x, y) = (at % columns, at / columns);
+            if tile.wrong > 0 && tile.error >= least && !inside.contains(x, y) {
+                apart += tile.wrong as usize;
+                all = all.with(x, y);
+            }
+        }
+        let added = (all.size() - inside.size()) * TILE * TILE;
+        if apart == 0 {
+            return waited;
+        }
+        if apart * waited * GROWN_BY >= added {
+            return 1;
+        }
+        for (at, tile) in self.tiles.iter_mut().enumerate() {
+            if !inside.contains(at % columns, at / columns) {
+                tile.error = f32::NEG_INFINITY;
+            }
+        }
+        waited + 1
     }
 
     /// Counts the colours that are to be drawn, those of pixels that stay only from an error of their tile on. Gives the
@@ -106,7 +148,7 @@ impl Needs {
         others: &mut [Histogram],
     ) -> u64 {
         let part = pixels.len().div_ceil(1 + others.len());
-        let (width, columns, tile_errors) = (self.width, self.width.div_ceil(TILE), &self.tile_errors);
+        let (width, columns, tiles) = (self.width, self.width.div_ceil(TILE), &self.tiles);
         let mut histograms = std::iter::once(&mut *all).chain(&mut *others).collect::<Vec<_>>();
         let parts = histograms.par_iter_mut().zip(self.pixels.par_chunks_mut(part)).enumerate();
         let changed = parts.map(|(number, (histogram, needs))| {
@@ -116,7 +158,7 @@ impl Needs {
             for (at, need) in (number * part..).zip(needs) {
                 match need {
                     Need::Nothing | Need::Free => continue,
-                    Need::Better if tile_errors[at / width / TILE * columns + at % width / TILE] < least => {
+                    Need::Better if tiles[at / width / TILE * columns + at % width / TILE].error < least => {
                         *need = Need::Nothing;
                         continue;
                     }
@@ -168,25 +210,32 @@ fn look_at_band(
     before: Before<'_>,
     refine: Option<Near>,
     needs: &mut [Need],
-    errors: &mut [f32],
+    tiles: &mut [TileNeeds],
     still: &mut Still,
 ) {
     if refine.is_none() && pixels == before.frame {
         needs.fill(Need::Nothing);
+        tiles.fill(TileNeeds::default());
         still.count(needs.len());
         return;
     }
-    for (left, error) in (0..width).step_by(TILE).zip(errors) {
+    for (left, needed) in (0..width).step_by(TILE).zip(tiles) {
         let count = TILE.min(width - left);
         let mut tile = Tile::new(refine);
         let rows = (left..needs.len()).step_by(width);
-        for start in rows.clone() {
+        for (row, start) in rows.clone().enumerate() {
             let part = start..start + count;
-            tile.look(&pixels[part.clone()], before.part(start, count), &mut needs[part], still);
+            tile.look(row, &pixels[part.clone()], before.part(start, count), &mut needs[part], still);
         }
-        still.count_wrong(tile.wrong, tile.wrong_error());
-        *error = tile.wrong_error();
+        *needed = tile.needs();
+        if tile.wrong > 0 {
+            for (row, start) in rows.clone().enumerate() {
+                tile.leave_the_rest(row, &mut needs[start..start + count], still);
+            }
+            still.count_wrong(u64::from(needed.wrong), needed.error);
+        }
         if tile.may_be_left(before.tolerated) {
+            needed.changes = false;
             for start in rows {
                 for need in &mut needs[start..start + count] {
                     if matches!(need, Need::Draw | Need::Free) {
@@ -207,18 +256,34 @@ struct Tile {
     /// Level error beyond that of a drawn pixel, of all that changed, and the largest level error of one.
     excess: f32,
     worst: f32,
-    /// Pixels that stay and are seen wrong, and their errors.
-    wrong: u64,
+    /// Pixels that stay and are seen wrong, the sum of their squared errors, and each of these.
+    wrong: u32,
     sum_wrong: f32,
+    errors: [f32; TILE * TILE],
 }
 
 impl Tile {
     fn new(refine: Option<Near>) -> Self {
-        Self { refine, pixels: 0, excess: 0.0, worst: 0.0, wrong: 0, sum_wrong: 0.0 }
+        Self {
+            refine,
+            pixels: 0,
+            excess: 0.0,
+            worst: 0.0,
+            wrong: 0,
+            sum_wrong: 0.0,
+            errors: [0.0; TILE * TILE],
+        }
     }
 
     /// Notes what the pixels of a row need.
-    fn look(&mut self, pixels: &[[u8; 3]], before: Before<'_>, needs: &mut [Need], still: &mut Still) {
+    fn look(
+        &mut self,
+        row: usize,
+        pixels: &[[u8; 3]],
+        before: Before<'_>,
+        needs: &mut [Need],
+        still: &mut Still,
+    ) {
         self.pixels += pixels.len();
         if self.refine.is_none() && pixels == before.frame {
             needs.fill(Need::Nothing);
@@ -240,6 +305,7 @@ impl Tile {
                 if error > SEEN_WRONG {
                     self.wrong += 1;
                     self.sum_wrong += error;
+                    self.errors[row * TILE + k] = error;
                     Need::Better
                 } else {
                     still.count(1);
@@ -262,12 +328,103 @@ impl Tile {
         }
     }
 
-    /// The mean error of pixels that stay and are seen wrong.
-    fn wrong_error(&self) -> f32 {
-        self.sum_wrong / self.wrong.max(1) as f32
+    /// The error from which on pixels that stay are among the worst.
+    fn least_wrong(&self) -> f32 {
+        AMONG_WORST * self.sum_wrong / self.wrong.max(1) as f32
+    }
+
+    fn needs(&self) -> TileNeeds {
+        let changes = self.worst > SEEN_RIGHT;
+        if self.wrong == 0 {
+            return TileNeeds { changes, wrong: 0, error: 0.0 };
+        }
+        let least = self.least_wrong();
+        let worst = self.errors.iter().filter(|&&error| error > 0.0 && error >= least);
+        let (wrong, sum) = worst.fold((0, 0.0), |(wrong, sum), error| (wrong + 1, sum + error));
+        TileNeeds { changes, wrong, error: sum / wrong as f32 }
+    }
+
+    /// Leaves those of a row alone that are not among the worst.
+    fn leave_the_rest(&self, row: usize, needs: &mut [Need], still: &mut Still) {
+        let least = self.least_wrong();
+        for (need, &error) in needs.iter_mut().zip(&self.errors[row * TILE..]) {
+            if *need == Need::Better && error < least {
+                *need = Need::Nothing;
+                still.count(1);
+            }
+        }
     }
 
     fn may_be_left(&self, tolerated: f32) -> bool {
         self.excess <= tolerated * self.pixels as f32 && self.worst <= GLARING
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 20 x 20 tiles, of which the first changes and those given ask for better colours.
+    fn needs(wrong: &[(usize, usize)]) -> Needs {
+        let mut tiles = vec![TileNeeds::default(); 400];
+        tiles[0].changes = true;
+        for &(x, y) in wrong {
+            tiles[y * 20 + x] = TileNeeds { changes: false, wrong: 30, error: 9.0 };
+        }
+        Needs { width: 160, pixels: Vec::new(), tiles }
+    }
+
+    #[test]
+    fn a_little_far_from_all_changes_waits_and_much_does_not() {
+        let mut waited = 1;
+        let waits = std::iter::from_fn(|| {
+            let mut few = needs(&[(19, 19), (10, 3)]);
+            waited = few.confine(2.0, waited);
+            (few.tiles[399].error < 2.0).then_some(())
+        });
+        // 25,536 pixels for 60.
+        assert_eq!(waits.count(), 25_536 / (60 * GROWN_BY));
+        assert_eq!(waited, 1);
+        let all = (0..400).map(|at| (at % 20, at / 20)).collect::<Vec<_>>();
+        let mut many = needs(&all);
+        assert_eq!(many.confine(2.0, 1), 1);
+        assert!(many.tiles.iter().all(|tile| tile.error >= 2.0 || tile.changes));
+    }
+
+    #[test]
+    fn what_lies_among_changes_does_not_wait() {
+        let mut beside = needs(&[(0, 0), (19, 19)]);
+        beside.tiles[0].changes = true;
+        assert_eq!(beside.confine(2.0, 3), 4);
+        assert!(beside.tiles[0].error >= 2.0 && beside.tiles[399].error < 2.0);
+        // Nothing asks, or not enough.
+        assert_eq!(needs(&[]).confine(2.0, 3), 3);
+        assert_eq!(needs(&[(19, 19)]).confine(10.0, 3), 3);
+    }
+
+    #[test]
+    fn the_worst_of_a_tile_are_drawn_better() {
+        let pixels = [[100; 3]; 64];
+        let mut seen = pixels;
+        // Half of the tile is a little wrong, the other half much.
+        seen[..32].fill([103, 100, 100]);
+        seen[32..].fill([112, 100, 100]);
+        let needs = [Need::Nothing; 64];
+        let before = Before {
+            frame: &pixels,
+            needs: &needs,
+            seen: &seen,
+            error: 0.0,
+            tolerated: TOLERATED,
+            inks: None,
+        };
+        let mut found = Needs::default();
+        let _ = found.look(&pixels, 8, before, true);
+        assert!(found.pixels[..32].iter().all(|&need| need == Need::Nothing));
+        assert!(found.pixels[32..].iter().all(|&need| need == Need::Better));
+        let [tile] = found.tiles[..] else { panic!("{:?}", found.tiles) };
+        assert_eq!((tile.changes, tile.wrong), (false, 32));
+        let error = Near::new().error(pixels[0], seen[63]);
+        assert!((tile.error - error).abs() < 0.001 * error, "{} for {error}", tile.error);
     }
 }

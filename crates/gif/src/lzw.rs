@@ -17,8 +17,8 @@ struct Book {
     /// Parent, index and code of each string in 12, 8 and 12 bits, where the hash of the first two puts it.
     slots: Box<[u32; SLOTS]>,
     next: u16,
-    /// Whether a string has longer ones.
-    grown: Box<[bool; MOST_CODES as usize]>,
+    /// For each string a bit for each of the indices that continue it, modulo 32.
+    followed: Box<[u32; MOST_CODES as usize]>,
 }
 
 impl Book {
@@ -36,6 +36,12 @@ impl Book {
             }
             at = (at + 1) % SLOTS;
         }
+    }
+
+    /// The code of the string `parent` with `index` after it. Mostly there is none, which one look tells.
+    fn code(&self, parent: u16, index: u8) -> Option<u16> {
+        let followed = self.followed[usize::from(parent)] >> (index & 31) & 1 != 0;
+        if followed { self.find(parent, index).ok() } else { None }
     }
 }
 
@@ -56,25 +62,35 @@ impl Writer {
         let book = Book {
             slots: Box::new([EMPTY; SLOTS]),
             next: (1 << bits) + 2,
-            grown: Box::new([false; MOST_CODES as usize]),
+            followed: Box::new([0; MOST_CODES as usize]),
         };
         Self { bits, book, string: None, width: u32::from(bits) + 1, codes: Codes::default() }
     }
 
     /// Whether the string goes on with any index.
     pub(crate) fn is_known(&self) -> bool {
-        self.string.is_none_or(|string| self.book.grown[usize::from(string)])
+        self.string.is_none_or(|string| self.book.followed[usize::from(string)] != 0)
     }
 
     /// Whether the string goes on with this index: it costs nothing yet.
     pub(crate) fn continues(&self, index: u8) -> bool {
-        self.string.is_none_or(|string| self.book.find(string, index).is_ok())
+        self.string.is_none_or(|string| self.book.code(string, index).is_some())
+    }
+
+    /// A bit for each of some indices that the string may go on with; the others it does not go on with.
+    pub(crate) fn may_continue<const N: usize>(&self, indices: &[u8; N]) -> u32 {
+        let followed = self.string.map_or(u32::MAX, |string| self.book.followed[usize::from(string)]);
+        let mut bits = 0;
+        for (k, index) in indices.iter().enumerate() {
+            bits |= (followed >> (index & 31) & 1) << k;
+        }
+        bits
     }
 
     /// Writes the index if the string goes on with it.
     pub(crate) fn extend(&mut self, index: u8) -> bool {
         let longer = match self.string {
-            Some(string) => self.book.find(string, index).ok(),
+            Some(string) => self.book.code(string, index),
             None => Some(u16::from(index)),
         };
         if longer.is_some() {
@@ -95,12 +111,12 @@ impl Writer {
                 self.end_string(string);
                 self.book.slots[at] =
                     u32::from(string) << 20 | u32::from(index) << 12 | u32::from(self.book.next);
-                self.book.grown[usize::from(string)] = true;
+                self.book.followed[usize::from(string)] |= 1 << (index & 31);
                 self.book.next += 1;
                 if self.book.next == MOST_CODES {
                     self.codes.put(1 << self.bits, self.width);
                     self.book.slots.fill(EMPTY);
-                    self.book.grown.fill(false);
+                    self.book.followed.fill(0);
                     self.book.next = (1 << self.bits) + 2;
                     self.width = u32::from(self.bits) + 1;
                 }
@@ -228,5 +244,18 @@ mod tests {
         writer.put(9);
         let bytes = join(8, &[writer.finish(true)]);
         assert_eq!(decode(&bytes, 9), [1, 2, 1, 2, 3, 1, 2, 3, 9]);
+    }
+
+    #[test]
+    fn what_continues_is_among_what_may() {
+        let mut writer = Writer::new(8);
+        let indices: [u8; 32] = std::array::from_fn(|k| (k * 7) as u8);
+        for k in 0..20_000_u32 {
+            let may = writer.may_continue(&indices);
+            for (at, &index) in indices.iter().enumerate() {
+                assert!(may >> at & 1 == 1 || !writer.continues(index), "{k} {index}");
+            }
+            writer.put(indices[(k.wrapping_mul(2_654_435_761) >> 27) as usize % 32]);
+        }
     }
 }

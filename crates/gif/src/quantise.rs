@@ -75,7 +75,8 @@ struct Paint {
     area: Option<Area>,
     palette: Palette,
     of_bins: Vec<Ink>,
-    /// Mean level error of what is drawn.
+    /// Mean level error and mean squared error of what is drawn.
+    level_error: f32,
     error: f32,
 }
 
@@ -139,7 +140,9 @@ impl Quantiser {
                 Some(before) => {
                     let still =
                         needs.look(pixels, width, before, change != Change::Slight && allowance.is_left());
-                    Some(allowance.lend(&still, pixels.len()))
+                    let loan = allowance.lend(&still, pixels.len());
+                    allowance.waited = needs.confine(loan.least_error, allowance.waited);
+                    Some(loan)
                 }
                 None => {
                     needs.want_all(width, pixels.len());
@@ -171,8 +174,8 @@ impl Quantiser {
                 })
             }
         };
-        if let Plan::With(Paint { area: Some(_), error, .. }) = plan {
-            self.drawn_error = error;
+        if let Plan::With(Paint { area: Some(_), level_error, .. }) = plan {
+            self.drawn_error = level_error;
         }
         self.waiting = Some(Waiting { frame, delay_cs, first, drifts: drifting, needs, histogram, plan });
         let (before, (block, redrawn)) = (before?, drawn?);
@@ -223,8 +226,9 @@ impl Paint {
             None => inked(histogram, 256),
             Some(_) => fewer_colours(histogram, inked(histogram, 255)),
         };
-        let error = ink::mean_level_error(histogram, &of_bins, &palette);
-        Self { loan, changed, area, palette, of_bins, error }
+        let level_error = ink::mean_level_error(histogram, &of_bins, &palette);
+        let error = ink::mean_error(histogram, &of_bins);
+        Self { loan, changed, area, palette, of_bins, level_error, error }
     }
 }
 
@@ -268,9 +272,10 @@ impl Waiting {
                 (exact::draw(pixels, width, self.first, seen, colours, self.delay_cs), Vec::new())
             }
             Plan::With(Paint { area: None, .. }) => (Block::nothing(self.delay_cs), Vec::new()),
-            Plan::With(Paint { area: Some(area), palette, of_bins, changed, .. }) => {
+            Plan::With(Paint { area: Some(area), palette, of_bins, changed, error, .. }) => {
                 let clear = (!self.first).then_some(palette.colours.len() as u8);
-                let inks = Inks { palette, of_bins, histogram: &self.histogram, clear, changed: *changed };
+                let (changed, error) = (*changed, *error);
+                let inks = Inks { palette, of_bins, histogram: &self.histogram, clear, changed, error };
                 draw(pixels, width, *area, &self.needs.pixels, seen, inks, self.delay_cs)
             }
         }

@@ -21,6 +21,14 @@ use crate::palette::Palette;
 
 /// How much more squared error (see [`colour`](crate::colour)) an index may have that makes the file smaller.
 const LENIENCE: f32 = 6.0;
+/// The same where much changes, if that is more: so much for each unit of the palette's mean error. What is soon drawn
+/// anew needs no better colours than the palette has.
+const LENIENCE_BY_ERROR: f32 = 1.4;
+/// More of it there, where the surroundings are not smooth.
+const LENIENCE_IF_ROUGH: f32 = 10.0;
+/// A pixel that stays is drawn anew if its squared error becomes less than one in so many of what it was: less gained
+/// would not be worth the flicker.
+const MUCH_BETTER: f32 = 2.0;
 /// The level error against the pixels to the left and above, together, up to which the surroundings are smooth; more by
 /// `SMOOTH_BY_ERROR` for each unit of the nearest colour's squared error.
 const SMOOTH: f32 = 24.0;
@@ -28,12 +36,12 @@ const SMOOTH_BY_ERROR: f32 = 0.6;
 /// The squared error of the nearest colour up to which a pixel makes nothing good.
 const SMALL: f32 = 6.0;
 /// The part of what is amiss that a pixel makes good, for each unit of error beyond that, and at most.
-const MADE_GOOD: f32 = 0.018;
+const MADE_GOOD: f32 = 0.022;
 const MOST_MADE_GOOD: f32 = 0.8;
-/// The part of a frame that is drawn because it changed from which on that holds in full. Below, proportionally less is
-/// made good, down to a least part of it: what changes now is soon drawn anew, and the mean is seen where a picture stays.
+/// The part of a frame that is drawn because it changed from which on all that holds in full. Below, proportionally less
+/// is made good, down to a least part of it.
 const MUCH_CHANGED: f64 = 0.4;
-const LEAST_PART: f64 = 0.3;
+const LEAST_PART: f32 = 0.4;
 /// The part that is handed on, half of it to the right, half down; and how many levels at most.
 const HANDED_ON: f32 = 0.8;
 const MOST_AMISS: f32 = 24.0;
@@ -59,6 +67,8 @@ pub(crate) struct Inks<'a> {
     pub(crate) clear: Option<u8>,
     /// The part of the frame that is drawn because it changed.
     pub(crate) changed: f64,
+    /// Mean squared error of what is drawn.
+    pub(crate) error: f32,
 }
 
 /// What a block is drawn on.
@@ -115,6 +125,8 @@ pub(crate) struct Stripe<'a> {
     near: Near,
     /// The part of what is amiss that a pixel makes good, for each unit of error.
     made_good: f32,
+    /// Where the surroundings are smooth, and where not.
+    leniences: [f32; 2],
     /// What the pixels above hand down to each of the row.
     handed_down: Vec<[f32; 3]>,
 }
@@ -130,14 +142,17 @@ pub(crate) struct Row<'a> {
 
 impl<'a> Stripe<'a> {
     pub(crate) fn new(inks: Inks<'a>, writer: &'a mut Writer) -> Self {
-        let part = (inks.changed / MUCH_CHANGED).clamp(LEAST_PART, 1.0);
-        let made_good = MADE_GOOD * part as f32;
+        let part = (inks.changed / MUCH_CHANGED).min(1.0) as f32;
+        // A viewer may see the first frame for long.
+        let soon_gone = if inks.clear.is_some() { part } else { 0.0 };
+        let lenience = LENIENCE.max(LENIENCE_BY_ERROR * inks.error * soon_gone);
         Self {
             inks,
             writer,
             redrawn: Redrawn::default(),
             near: Near::new(),
-            made_good,
+            made_good: MADE_GOOD * part.max(LEAST_PART),
+            leniences: [lenience, lenience + LENIENCE_IF_ROUGH * soon_gone],
             handed_down: Vec::new(),
         }
     }
@@ -179,12 +194,12 @@ impl<'a> Stripe<'a> {
                             levels[1] + part * amiss[1],
                             levels[2] + part * amiss[2],
                         ];
-                        let index = self.drawn(now, target, need, seen, ink, FRESH);
+                        let index = self.drawn(&row, k, target, ink, FRESH);
                         let shown = if Some(index) == clear { seen } else { self.colour(index) };
                         handed_on = hand_on(amiss, levels, colour::levels(shown));
                         index
                     } else {
-                        self.drawn(now, levels, need, seen, ink, f32::INFINITY)
+                        self.drawn(&row, k, levels, ink, f32::INFINITY)
                     }
                 }
             };
@@ -219,17 +234,16 @@ impl<'a> Stripe<'a> {
         index
     }
 
+    /// How much more error than of the best index is taken for the sake of the file's size.
+    fn lenience(&self, row: &Row<'_>, k: usize, ink: Ink) -> f32 {
+        let [smooth, rough] = self.leniences;
+        if rough > smooth && !row.is_smooth(k, ink.error) { rough } else { smooth }
+    }
+
     /// The index for a pixel. `target` is what is meant with what is amiss around it; a colour that is not the nearest
     /// begins a string only when that saves more error than `fresh`.
-    fn drawn(
-        &mut self,
-        now: [u8; 3],
-        target: [f32; 3],
-        need: Need,
-        seen: [u8; 3],
-        ink: Ink,
-        fresh: f32,
-    ) -> u8 {
+    fn drawn(&mut self, row: &Row<'_>, k: usize, target: [f32; 3], ink: Ink, fresh: f32) -> u8 {
+        let (now, need, seen) = (row.pixels[k], row.needs[k], row.seen[k]);
         // As good as can be, for nothing. What is seen right may be left, too.
         if ink.error == 0.0 && (self.inks.clear.is_none() || now != seen) && self.writer.extend(ink.index) {
             return ink.index;
@@ -238,11 +252,15 @@ impl<'a> Stripe<'a> {
         let nearest = form.error(target, colour::levels(self.colour(ink.index)));
         if let Some(clear) = self.inks.clear {
             let shown = form.error(target, colour::levels(seen));
-            let lenience = if need == Need::Better { nearest } else { LENIENCE };
-            if nearest >= shown || shown <= nearest + lenience && self.writer.extend(clear) {
-                if nearest >= shown {
-                    self.writer.put(clear);
-                }
+            let bound = if need == Need::Better { MUCH_BETTER * nearest } else { nearest };
+            if bound >= shown {
+                self.writer.put(clear);
+                return clear;
+            }
+            if need != Need::Better
+                && shown <= nearest + self.lenience(row, k, ink)
+                && self.writer.extend(clear)
+            {
                 return clear;
             }
         }
@@ -275,13 +293,19 @@ impl<'a> Stripe<'a> {
             self.writer.put(best.0);
             return best.0;
         }
-        let mut found = (best.0, best.1 + LENIENCE);
+        let mut found = (best.0, best.1 + self.lenience(row, k, ink));
         if !at_once && best.0 != ink.index && nearest < found.1 && self.writer.continues(ink.index) {
             found = (ink.index, nearest);
         }
-        for (&index, &error) in around.indices.iter().zip(&errors) {
-            if error < found.1 && self.writer.continues(index) {
-                found = (index, error);
+        let mut candidates = self.writer.may_continue(&around.indices);
+        for (k, error) in errors.iter().enumerate() {
+            candidates &= !(u32::from(*error >= found.1) << k);
+        }
+        while candidates != 0 {
+            let k = candidates.trailing_zeros() as usize;
+            candidates &= candidates - 1;
+            if errors[k] < found.1 && self.writer.continues(around.indices[k]) {
+                found = (around.indices[k], errors[k]);
             }
         }
         self.writer.put(found.0);
@@ -325,8 +349,14 @@ mod tests {
         let index = palette.nearest(&point, 0);
         let error = colour::error(&point, &palette.points[usize::from(index)]);
         let of_bins = [Ink { index, error }];
-        let inks =
-            Inks { palette: &palette, of_bins: &of_bins, histogram: &histogram, clear: None, changed: 1.0 };
+        let inks = Inks {
+            palette: &palette,
+            of_bins: &of_bins,
+            histogram: &histogram,
+            clear: None,
+            changed: 1.0,
+            error,
+        };
         let mut writer = Writer::new(8);
         let mut stripe = Stripe::new(inks, &mut writer);
         let mut seen = vec![[0; 3]; SIDE * SIDE];
