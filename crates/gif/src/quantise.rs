@@ -22,7 +22,7 @@ const PARTS: usize = 2;
 /// half as many bytes, and the indices fewer, too. More of it by a number for all pixels together, up to a limit: where
 /// little is drawn, a palette is much of the file.
 const GOOD_ENOUGH: f32 = 0.8;
-const BY_PIXELS: f32 = 3000.0;
+const BY_PIXELS: f32 = 5000.0;
 const AT_MOST: f32 = 3.0;
 /// The fewest colours that a palette is halved to, with the one that is clear.
 const FEWEST: usize = 16;
