@@ -94,15 +94,6 @@ impl Form {
         let form = self.0;
         r * (form[0] * r + form[3] * g + form[4] * b) + g * (form[1] * g + form[5] * b) + form[2] * b * b
     }
-
-    /// The errors of several colours, given channel by channel.
-    pub(crate) fn errors<const N: usize>(self, a: [f32; 3], b: &[[f32; N]; 3]) -> [f32; N] {
-        let mut errors = [0.0; N];
-        for (k, error) in errors.iter_mut().enumerate() {
-            *error = self.error(a, [b[0][k], b[1][k], b[2][k]]);
-        }
-        errors
-    }
 }
 
 /// The levels of a colour as numbers to reckon with.

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::colour;
 use crate::histogram::Histogram;
-use crate::palette::{Guesses, Palette};
+use crate::palette::{Guesses, Palette, Sample};
 
 /// A palette colour, and its squared error as the colour that is meant.
 #[derive(Debug, Clone, Copy)]
@@ -15,14 +15,12 @@ pub(crate) struct Ink {
 
 impl Ink {
     /// The nearest for each bin.
-    pub(crate) fn of_bins(histogram: &Histogram, palette: &Palette, guesses: &Guesses) -> Vec<Self> {
-        let bins = histogram.bins().par_iter().enumerate().with_min_len(512);
-        let inks = bins.map(|(number, bin)| {
-            let mean = bin.mean();
-            let point = colour::point(mean);
-            let index = palette.nearest(&point, guesses.of(number, mean));
-            Self { index, error: colour::error(&point, &palette.points[usize::from(index)]) }
-        });
+    pub(crate) fn of_bins(bins: &[Sample], palette: &Palette, guesses: &Guesses) -> Vec<Self> {
+        let inks =
+            bins.par_iter().enumerate().with_min_len(512).map(|(number, Sample { point, rgb, .. })| {
+                let index = palette.nearest(point, guesses.of(number, *rgb));
+                Self { index, error: colour::error(point, &palette.points[usize::from(index)]) }
+            });
         inks.collect()
     }
 }

@@ -20,10 +20,16 @@ pub(crate) const NEIGHBOURS: usize = 16;
 
 /// A weighted colour.
 #[derive(Debug, Clone, Copy)]
-struct Sample {
-    point: Point,
-    rgb: [f32; 3],
+pub(crate) struct Sample {
+    pub(crate) point: Point,
+    pub(crate) rgb: [f32; 3],
     weight: f32,
+}
+
+impl Sample {
+    pub(crate) fn of_bins(histogram: &Histogram) -> Vec<Self> {
+        histogram.bins().par_iter().with_min_len(1024).map(Self::from).collect()
+    }
 }
 
 impl From<&Bin> for Sample {
@@ -46,22 +52,20 @@ pub(crate) struct Palette {
     neighbours: Neighbours,
 }
 
-/// A colour's nearest others, channel by channel.
+/// A colour's nearest others.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Around {
     pub(crate) indices: [u8; AROUND],
     /// Far from everything where there are fewer.
-    pub(crate) levels: [[f32; AROUND]; 3],
+    pub(crate) levels: [[f32; 3]; AROUND],
 }
 
 impl Around {
     fn of(near: &[Neighbour], colours: &[[u8; 3]]) -> Self {
-        let mut around = Self { indices: [0; AROUND], levels: [[1e9; AROUND]; 3] };
+        let mut around = Self { indices: [0; AROUND], levels: [[1e9; 3]; AROUND] };
         for (at, neighbour) in near.iter().take(AROUND).enumerate() {
             around.indices[at] = neighbour.index;
-            for (channel, &level) in around.levels.iter_mut().zip(&colours[usize::from(neighbour.index)]) {
-                channel[at] = f32::from(level);
-            }
+            around.levels[at] = colour::levels(colours[usize::from(neighbour.index)]);
         }
         around
     }
@@ -102,22 +106,21 @@ impl Palette {
         Self { colours, points, around, neighbours }
     }
 
-    /// The colours of the bins if there are at most `size`, else so many that fit them well.
-    pub(crate) fn of_bins(histogram: &Histogram, size: usize) -> (Self, Guesses) {
+    /// The colours of the bins, given as samples, too, if there are at most `size`, else so many that fit them well.
+    pub(crate) fn of_bins(histogram: &Histogram, samples: &[Sample], size: usize) -> (Self, Guesses) {
         let bins = histogram.bins();
-        let samples = |bins: &[Bin]| bins.par_iter().with_min_len(1024).map(Sample::from).collect::<Vec<_>>();
         if histogram.is_exact() && bins.len() <= size {
             let mut colours = bins.iter().map(|bin| bin.mean().map(|level| level as u8)).collect::<Vec<_>>();
             colours.sort_unstable();
             return (Self::new(colours), Guesses { coarse: None, indices: Vec::new() });
         }
         if bins.len() <= SAMPLES {
-            let (palette, indices) = Self::of(&samples(bins), size);
+            let (palette, indices) = Self::of(samples, size);
             return (palette, Guesses { coarse: None, indices });
         }
         let mut coarse = Histogram::new(SAMPLES);
         coarse.absorb(histogram);
-        let (palette, indices) = Self::of(&samples(coarse.bins()), size);
+        let (palette, indices) = Self::of(&Sample::of_bins(&coarse), size);
         (palette, Guesses { coarse: Some(coarse), indices })
     }
 

@@ -13,7 +13,7 @@ use crate::exact::{self, Change, FewColours};
 use crate::histogram::{Histogram, MOST_BINS};
 use crate::ink::{self, Ink};
 use crate::look::{Before, Need, Needs, TOLERATED, TOLERATED_IF_EXACT};
-use crate::palette::Palette;
+use crate::palette::{Palette, Sample};
 use crate::stripe::{self, Inks, Row, Sheet, Stripe};
 
 /// Parts of a frame whose colours are counted side by side.
@@ -221,10 +221,11 @@ impl Paint {
         let least = loan.as_ref().map_or(0.0, |loan| loan.least_error);
         let changed = needs.count(pixels, least, histogram, parts) as f64 / pixels.len() as f64;
         let area = Area::around(&needs.pixels, width, |need| matches!(need, Need::Draw | Need::Better));
+        let bins = Sample::of_bins(histogram);
         let (palette, of_bins) = match loan {
             // A viewer may see it for long, or see nothing else.
-            None => inked(histogram, 256),
-            Some(_) => fewer_colours(histogram, inked(histogram, 255)),
+            None => inked(histogram, &bins, 256),
+            Some(_) => fewer_colours(histogram, &bins, inked(histogram, &bins, 255)),
         };
         let level_error = ink::mean_level_error(histogram, &of_bins, &palette);
         let error = ink::mean_error(histogram, &of_bins);
@@ -233,14 +234,18 @@ impl Paint {
 }
 
 /// A palette of at most so many colours, and which of them is nearest to each bin.
-fn inked(histogram: &Histogram, size: usize) -> (Palette, Vec<Ink>) {
-    let (palette, guesses) = Palette::of_bins(histogram, size);
-    let of_bins = Ink::of_bins(histogram, &palette, &guesses);
+fn inked(histogram: &Histogram, bins: &[Sample], size: usize) -> (Palette, Vec<Ink>) {
+    let (palette, guesses) = Palette::of_bins(histogram, bins, size);
+    let of_bins = Ink::of_bins(bins, &palette, &guesses);
     (palette, of_bins)
 }
 
 /// Halves a palette as long as what it draws stays good enough; one index is left free.
-fn fewer_colours(histogram: &Histogram, mut best: (Palette, Vec<Ink>)) -> (Palette, Vec<Ink>) {
+fn fewer_colours(
+    histogram: &Histogram,
+    bins: &[Sample],
+    mut best: (Palette, Vec<Ink>),
+) -> (Palette, Vec<Ink>) {
     if histogram.bins().len() > MOST_BINS_HALVED {
         return best;
     }
@@ -252,7 +257,7 @@ fn fewer_colours(histogram: &Histogram, mut best: (Palette, Vec<Ink>)) -> (Palet
         if size < FEWEST {
             break;
         }
-        let fewer = inked(histogram, size - 1);
+        let fewer = inked(histogram, bins, size - 1);
         error = ink::mean_error(histogram, &fewer.1);
         if error > bound {
             break;

@@ -258,6 +258,7 @@ impl<'a> Stripe<'a> {
                 return clear;
             }
             if need != Need::Better
+                && shown <= nearest + self.leniences[1]
                 && shown <= nearest + self.lenience(row, k, ink)
                 && self.writer.extend(clear)
             {
@@ -273,10 +274,11 @@ impl<'a> Stripe<'a> {
             return ink.index;
         }
         let around = &self.inks.palette.around[usize::from(ink.index)];
-        let errors = form.errors(target, &around.levels);
+        let error = |at: usize| form.error(target, around.levels[at]);
         let mut best = (ink.index, nearest);
         if nearest > fresh {
-            for (&index, &error) in around.indices.iter().zip(&errors) {
+            for (at, &index) in around.indices.iter().enumerate() {
+                let error = error(at);
                 if error < best.1 {
                     best = (index, error);
                 }
@@ -289,23 +291,20 @@ impl<'a> Stripe<'a> {
         if !tried(best.0) && self.writer.extend(best.0) {
             return best.0;
         }
-        if !self.writer.is_known() {
-            self.writer.put(best.0);
-            return best.0;
-        }
-        let mut found = (best.0, best.1 + self.lenience(row, k, ink));
-        if !at_once && best.0 != ink.index && nearest < found.1 && self.writer.continues(ink.index) {
-            found = (ink.index, nearest);
-        }
         let mut candidates = self.writer.may_continue(&around.indices);
-        for (k, error) in errors.iter().enumerate() {
-            candidates &= !(u32::from(*error >= found.1) << k);
+        let mut found = (best.0, best.1);
+        if candidates != 0 || best.0 != ink.index {
+            found.1 += self.lenience(row, k, ink);
+            if !at_once && best.0 != ink.index && nearest < found.1 && self.writer.continues(ink.index) {
+                found = (ink.index, nearest);
+            }
         }
         while candidates != 0 {
-            let k = candidates.trailing_zeros() as usize;
+            let at = candidates.trailing_zeros() as usize;
             candidates &= candidates - 1;
-            if errors[k] < found.1 && self.writer.continues(around.indices[k]) {
-                found = (around.indices[k], errors[k]);
+            let error = error(at);
+            if error < found.1 && self.writer.continues(around.indices[at]) {
+                found = (around.indices[at], error);
             }
         }
         self.writer.put(found.0);
