@@ -143,8 +143,7 @@ pub(crate) fn draw(
         None => Some(Area::whole(width, pixels.len())),
     };
     let Some(area) = area else { return Block::nothing(delay_cs) };
-    let sheet =
-        Sheet { area, width, colours: &colours.colours, clear, delay_cs, meant: colours.colours.len() };
+    let sheet = Sheet { area, width, colours: &colours.colours, clear, delay_cs, stripes: 1 };
     let (block, _) = stripe::in_stripes(sheet, seen, |writer, first_row, seen| {
         let mut last = ([0; 3], colours.find([0; 3]).ok());
         for (y, seen) in (first_row..).zip(seen.chunks_exact_mut(width)) {

@@ -29,6 +29,13 @@ const FEWEST: usize = 16;
 /// With more bins than that, no palette is good enough but by much work.
 const MOST_BINS_HALVED: usize = 4096;
 
+/// From which part of a frame on that changes many stripes cost little size. Several to a thread, for one of them begins
+/// late: it has prepared the next frame.
+const MOST: f64 = 0.5;
+const STRIPES_IF_MOST: usize = 5;
+/// From how many colours on a book is soon full, so that two stripes cost next to nothing.
+const MANY_COLOURS: usize = 4096;
+
 /// Turns frames into blocks, one after the other.
 #[derive(Debug)]
 pub(crate) struct Quantiser {
@@ -297,8 +304,12 @@ fn draw(
     delay_cs: u16,
 ) -> (Block, Vec<Redrawn>) {
     let colours = &inks.palette.colours;
-    let sheet =
-        Sheet { area, width, colours, clear: inks.clear, delay_cs, meant: inks.histogram.bins().len() };
+    let stripes = match inks.histogram.bins().len() {
+        _ if inks.changed >= MOST => STRIPES_IF_MOST,
+        0..MANY_COLOURS => 1,
+        _ => 2,
+    };
+    let sheet = Sheet { area, width, colours, clear: inks.clear, delay_cs, stripes };
     stripe::in_stripes(sheet, seen, |writer, top, seen| {
         let mut stripe = Stripe::new(inks, writer);
         for (y, seen) in (top..).zip(seen.chunks_exact_mut(width)) {

@@ -54,8 +54,6 @@ const AT_ONCE: f32 = 3.0;
 const STRIPE: usize = 160_000;
 /// Smaller ones are not worth a thread.
 const LEAST_STRIPE: usize = 30_000;
-/// From how many colours on a book is soon full, so that two stripes cost next to nothing.
-const MANY_COLOURS: usize = 4096;
 
 /// What a frame is drawn with.
 #[derive(Debug, Clone, Copy)]
@@ -81,8 +79,8 @@ pub(crate) struct Sheet<'a> {
     pub(crate) colours: &'a [[u8; 3]],
     pub(crate) clear: Option<u8>,
     pub(crate) delay_cs: u16,
-    /// Of how many colours the pixels are before they are drawn.
-    pub(crate) meant: usize,
+    /// The least number of stripes, as far as each is worth a thread.
+    pub(crate) stripes: usize,
 }
 
 /// Runs `draw` on stripes of whole rows of a sheet, side by side: with a writer, the first row and what is seen from it
@@ -92,18 +90,14 @@ pub(crate) fn in_stripes<R: Send>(
     seen: &mut [[u8; 3]],
     draw: impl Fn(&mut Writer, usize, &mut [[u8; 3]]) -> R + Sync,
 ) -> (Block, Vec<R>) {
-    let Sheet { area, width, colours, clear, delay_cs, meant } = sheet;
+    let Sheet { area, width, colours, clear, delay_cs, stripes } = sheet;
     let bits = block::bits(colours.len() + usize::from(clear.is_some()));
     let height = area.bottom - area.top;
     let pixels = (area.right - area.left) * height;
-    let least = match meant {
-        0..MANY_COLOURS => 1,
-        _ => 2,
-    };
     // An odd one out would be drawn while other threads wait.
     let count = match pixels.div_ceil(STRIPE) {
-        1 => least.min((pixels / LEAST_STRIPE).max(1)),
-        many => many.next_multiple_of(2).max(least),
+        1 => stripes.min((pixels / LEAST_STRIPE).max(1)),
+        many => many.next_multiple_of(2).max(stripes),
     };
     let rows = height.div_ceil(count);
     let stripes = seen[area.top * width..area.bottom * width].par_chunks_mut(rows * width).enumerate();
