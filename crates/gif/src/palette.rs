@@ -187,25 +187,32 @@ impl Neighbours {
             }
         }
         let each = points.len().saturating_sub(1).min(NEIGHBOURS);
+        let padded = points.len().next_multiple_of(16);
         let near = points.par_iter().enumerate().with_min_len(64).map(|(own, point)| {
             let mut apart = [0.0_f32; 256];
             for (column, at) in columns.iter().zip(point) {
-                for (sum, other) in apart.iter_mut().zip(column) {
+                for (sum, other) in apart[..padded].iter_mut().zip(column) {
                     *sum += (at - other) * (at - other);
                 }
             }
-            // Numbers above 0 have the order of their bits, the last of which are the index instead.
-            let mut near = [u32::MAX; NEIGHBOURS];
-            for (index, apart) in (0..).zip(&apart[..points.len()]) {
-                let key = apart.to_bits() & !0xFF | index;
-                if key < near[NEIGHBOURS - 1] && index != own as u32 {
-                    let mut at = NEIGHBOURS - 1;
-                    while at > 0 && near[at - 1] > key {
-                        near[at] = near[at - 1];
-                        at -= 1;
-                    }
-                    near[at] = key;
-                }
+            // The last bits are the index instead.
+            let mut keys = [f32::INFINITY; 256];
+            for (index, (key, apart)) in (0..).zip(keys.iter_mut().zip(&apart[..points.len()])) {
+                *key = f32::from_bits(apart.to_bits() & !0xFF | index);
+            }
+            keys[own] = f32::INFINITY;
+            // The least of each 16, of which the least is taken out again and again.
+            let (blocks, _) = keys.as_chunks_mut::<16>();
+            let mut leasts = [0.0; 16];
+            for (least_of, block) in leasts.iter_mut().zip(&*blocks) {
+                *least_of = least(block);
+            }
+            let mut near = [0; NEIGHBOURS];
+            for near in &mut near[..each] {
+                *near = least(&leasts).to_bits();
+                let (block, at) = ((*near & 0xFF) as usize / 16, *near as usize % 16);
+                blocks[block][at] = f32::INFINITY;
+                leasts[block] = least(&blocks[block]);
             }
             near
         });
@@ -256,6 +263,18 @@ impl Neighbours {
         }
         best
     }
+}
+
+/// Four at a time, which `fold` by itself would not do.
+fn least(numbers: &[f32; 16]) -> f32 {
+    let lesser = |a: f32, b: f32| if b < a { b } else { a };
+    let mut least = [f32::INFINITY; 4];
+    for four in numbers.as_chunks::<4>().0 {
+        for k in 0..4 {
+            least[k] = lesser(least[k], four[k]);
+        }
+    }
+    lesser(lesser(least[0], least[1]), lesser(least[2], least[3]))
 }
 
 /// Mean colours of the clusters; owners are renumbered so that no cluster is empty.
