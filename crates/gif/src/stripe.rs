@@ -46,7 +46,7 @@ const LEAST_PART: f32 = 0.4;
 const HANDED_ON: f32 = 0.8;
 const MOST_AMISS: f32 = 24.0;
 /// How much squared error a colour that is not the nearest must save to begin a new string.
-const FRESH: f32 = 34.0;
+const FRESH: f32 = 40.0;
 /// How much more squared error than it has by itself the nearest colour may have, with what is amiss, to be taken without
 /// a look at others if it continues the string.
 const AT_ONCE: f32 = 3.0;
