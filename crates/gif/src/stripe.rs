@@ -26,8 +26,8 @@ const LENIENCE: f32 = 6.0;
 const LENIENCE_BY_ERROR: f32 = 1.4;
 /// More of it there, where the surroundings are not smooth.
 const LENIENCE_IF_ROUGH: f32 = 10.0;
-/// A pixel that stays is drawn anew if its squared error becomes less than one in so many of what it was: less gained
-/// would not be worth the flicker.
+/// A pixel that stays is drawn anew only if its squared error becomes so many times smaller: less gained would not be worth
+/// the flicker.
 const MUCH_BETTER: f32 = 2.0;
 /// The level error against the pixels to the left and above, together, up to which the surroundings are smooth; more by
 /// `SMOOTH_BY_ERROR` for each unit of the nearest colour's squared error.
