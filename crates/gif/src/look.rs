@@ -3,6 +3,9 @@
 //! A frame is looked at before the one before it is drawn, so that both can be worked on at once. Where that one is left
 //! alone, what a viewer will see is known; where it is drawn, that each colour will be drawn with the palette's nearest
 //! is assumed, and the next look finds what was not.
+//!
+//! Of what stays and is seen wrong, the worst of a tile ask to be drawn better, and those far from all changes only
+//! when together they are worth the larger block.
 
 use rayon::prelude::*;
 

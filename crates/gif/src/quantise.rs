@@ -80,10 +80,16 @@ struct Paint {
     changed: f64,
     /// `None` if nothing is to be drawn.
     area: Option<Area>,
+    inked: Box<Inked>,
+    /// Mean level error of what is drawn.
+    level_error: f32,
+}
+
+/// A palette, which of its colours is nearest to each bin, and the mean squared error of what is drawn.
+#[derive(Debug)]
+struct Inked {
     palette: Palette,
     of_bins: Vec<Ink>,
-    /// Mean level error and mean squared error of what is drawn.
-    level_error: f32,
     error: f32,
 }
 
@@ -140,7 +146,7 @@ impl Quantiser {
                 tolerated: if drifts { TOLERATED_IF_EXACT } else { TOLERATED },
                 inks: match &before.plan {
                     Plan::Exactly(_) => None,
-                    Plan::With(paint) => Some((&before.histogram, &paint.of_bins)),
+                    Plan::With(paint) => Some((&before.histogram, &paint.inked.of_bins)),
                 },
             });
             let loan = match before {
@@ -229,49 +235,45 @@ impl Paint {
         let changed = needs.count(pixels, least, histogram, parts) as f64 / pixels.len() as f64;
         let area = Area::around(&needs.pixels, width, |need| matches!(need, Need::Draw | Need::Better));
         let bins = Sample::of_bins(histogram);
-        let (palette, of_bins) = match loan {
+        let inked = match loan {
             // A viewer may see it for long, or see nothing else.
-            None => inked(histogram, &bins, 256),
-            Some(_) => fewer_colours(histogram, &bins, inked(histogram, &bins, 255)),
+            None => Inked::new(histogram, &bins, 256),
+            Some(_) => Inked::new(histogram, &bins, 255).of_fewer_colours(histogram, &bins),
         };
-        let level_error = ink::mean_level_error(histogram, &of_bins, &palette);
+        let level_error = ink::mean_level_error(histogram, &inked.of_bins, &inked.palette);
+        Self { loan, changed, area, inked: Box::new(inked), level_error }
+    }
+}
+
+impl Inked {
+    /// With at most so many colours.
+    fn new(histogram: &Histogram, bins: &[Sample], size: usize) -> Self {
+        let (palette, guesses) = Palette::of_bins(histogram, bins, size);
+        let of_bins = Ink::of_bins(bins, &palette, &guesses);
         let error = ink::mean_error(histogram, &of_bins);
-        Self { loan, changed, area, palette, of_bins, level_error, error }
+        Self { palette, of_bins, error }
     }
-}
 
-/// A palette of at most so many colours, and which of them is nearest to each bin.
-fn inked(histogram: &Histogram, bins: &[Sample], size: usize) -> (Palette, Vec<Ink>) {
-    let (palette, guesses) = Palette::of_bins(histogram, bins, size);
-    let of_bins = Ink::of_bins(bins, &palette, &guesses);
-    (palette, of_bins)
-}
-
-/// Halves a palette as long as what it draws stays good enough; one index is left free.
-fn fewer_colours(
-    histogram: &Histogram,
-    bins: &[Sample],
-    mut best: (Palette, Vec<Ink>),
-) -> (Palette, Vec<Ink>) {
-    if histogram.bins().len() > MOST_BINS_HALVED {
-        return best;
-    }
-    let bound = GOOD_ENOUGH + (BY_PIXELS / histogram.pixels() as f32).min(AT_MOST);
-    let mut error = ink::mean_error(histogram, &best.1);
-    // Half as many colours draw with twice the error or more.
-    while error * 2.0 <= bound {
-        let size = (best.0.colours.len() + 1).next_power_of_two() / 2;
-        if size < FEWEST {
-            break;
+    /// Halves the palette as long as what it draws stays good enough; one index is left free.
+    fn of_fewer_colours(mut self, histogram: &Histogram, bins: &[Sample]) -> Self {
+        if bins.len() > MOST_BINS_HALVED {
+            return self;
         }
-        let fewer = inked(histogram, bins, size - 1);
-        error = ink::mean_error(histogram, &fewer.1);
-        if error > bound {
-            break;
+        let bound = GOOD_ENOUGH + (BY_PIXELS / histogram.pixels() as f32).min(AT_MOST);
+        // Half as many colours draw with twice the error or more.
+        while self.error * 2.0 <= bound {
+            let size = (self.palette.colours.len() + 1).next_power_of_two() / 2;
+            if size < FEWEST {
+                break;
+            }
+            let fewer = Self::new(histogram, bins, size - 1);
+            if fewer.error > bound {
+                break;
+            }
+            self = fewer;
         }
-        best = fewer;
+        self
     }
-    best
 }
 
 impl Waiting {
@@ -284,7 +286,8 @@ impl Waiting {
                 (exact::draw(pixels, width, self.first, seen, colours, self.delay_cs), Vec::new())
             }
             Plan::With(Paint { area: None, .. }) => (Block::nothing(self.delay_cs), Vec::new()),
-            Plan::With(Paint { area: Some(area), palette, of_bins, changed, error, .. }) => {
+            Plan::With(Paint { area: Some(area), inked, changed, .. }) => {
+                let Inked { palette, of_bins, error } = &**inked;
                 let clear = (!self.first).then_some(palette.colours.len() as u8);
                 let (changed, error) = (*changed, *error);
                 let inks = Inks { palette, of_bins, histogram: &self.histogram, clear, changed, error };

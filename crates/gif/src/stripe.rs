@@ -5,7 +5,8 @@
 //! for, the pixels to the right and below make good in part: the more, the farther off the palette's colours are, and
 //! only where the surroundings are smooth enough for the mean to be seen. Mostly that only tips the choice of what
 //! continues a string; a colour that is not the nearest begins a new one only when that saves much. So gradients are mixed
-//! for few bytes, and errors do not add up. Frames are worked on in stripes of rows side by side, each a part of the
+//! for few bytes, and errors do not add up. Where much changes, and more so in rough surroundings, the palette's own error
+//! is the measure of what is nearly as good. Frames are worked on in stripes of rows side by side, each a part of the
 //! image's data of its own.
 
 use rayon::prelude::*;
@@ -94,7 +95,7 @@ pub(crate) fn in_stripes<R: Send>(
     let bits = block::bits(colours.len() + usize::from(clear.is_some()));
     let height = area.bottom - area.top;
     let pixels = (area.right - area.left) * height;
-    // An odd one out would be drawn while other threads wait.
+    // By size alone, an odd one out would be drawn while other threads wait.
     let count = match pixels.div_ceil(STRIPE) {
         1 => stripes.min((pixels / LEAST_STRIPE).max(1)),
         many => many.next_multiple_of(2).max(stripes),
@@ -286,7 +287,7 @@ impl<'a> Stripe<'a> {
             return best.0;
         }
         let mut candidates = self.writer.may_continue(&around.indices);
-        let mut found = (best.0, best.1);
+        let mut found = best;
         if candidates != 0 || best.0 != ink.index {
             found.1 += self.lenience(row, k, ink);
             if !at_once && best.0 != ink.index && nearest < found.1 && self.writer.continues(ink.index) {
