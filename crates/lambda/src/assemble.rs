@@ -11,7 +11,7 @@ use crate::answer::{Answer, BatchItem, Failed, Outcome, chain, may_pass};
 use crate::context::{Call, Context};
 use crate::event::{Event, Message, Sweep};
 use crate::logs::ms;
-use crate::{Function, records};
+use crate::records;
 
 /// Works on a payload.
 ///
@@ -19,7 +19,9 @@ use crate::{Function, records};
 /// [`Failed`] when another try may end otherwise; for messages of the failure queue the answer says so instead.
 pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value) -> Result<Answer, Failed> {
     match Event::parse(payload) {
-        Ok(Event::Objects(objects)) => records::work(Function::Assemble, context, call, objects).await,
+        Ok(Event::Objects(objects)) => {
+            records::work(&context.bucket, &call.request_id, objects, |key| record(context, call, key)).await
+        }
         Ok(Event::Failures(messages)) => Ok(failures(context, call, messages).await),
         Ok(Event::Sweep(how)) => clean(context, call, how).await,
         Err(error) => {
@@ -30,8 +32,8 @@ pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value)
 }
 
 /// Works on one claim.
-pub(crate) async fn record<S: Store>(context: &Context<S>, call: &Call, key: &str) -> Result<String, Error> {
-    let assembled = assemble(&context.invocation(&context.policy, call), &context.studio, key).await?;
+async fn record<S: Store>(context: &Context<S>, call: &Call, key: String) -> Result<String, Error> {
+    let assembled = assemble(&context.invocation(&context.policy, call), &context.animator, &key).await?;
     log(call, &assembled);
     Ok(format!("{:?}", assembled.status).to_lowercase())
 }

@@ -25,7 +25,7 @@ use crate::{Clock, Error, Result, Timestamp};
 /// The name of the GIF's metadata that holds its generation.
 pub const GENERATION: &str = "generation";
 
-/// What encodes. The functions bring [`crate::studio::Studio`].
+/// What encodes. The assemble function brings a GIF encoder, the simulation something smaller.
 pub trait Animator: Send + Sync {
     /// An animation being encoded.
     type Encoding: Encoding;

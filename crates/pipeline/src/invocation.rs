@@ -51,10 +51,11 @@ pub struct Policy {
     pub draw_margin: Duration,
 }
 
-impl Default for Policy {
-    fn default() -> Self {
+impl Policy {
+    /// The usual numbers, for a renderer of this pixel version.
+    pub fn new(pixels: u32) -> Self {
         Policy {
-            pixels: rayfold_tracer::PIXEL_VERSION,
+            pixels,
             quiet: Duration::from_secs(5),
             pause_per_frame: Duration::from_millis(3),
             pause_cap: Duration::from_millis(500),

@@ -19,7 +19,6 @@ pub mod retry;
 #[cfg(any(test, feature = "simulation"))]
 pub mod simulation;
 pub mod store;
-pub mod studio;
 pub mod sweep;
 
 pub use assemble::{Animator, Encoding, assemble};

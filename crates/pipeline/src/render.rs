@@ -22,7 +22,7 @@ use crate::observe::Standing;
 use crate::store::{ETag, ListRequest, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
-/// What draws. The functions bring [`crate::studio::Studio`], the simulation something smaller.
+/// What draws. The render function brings a ray tracer, the simulation something smaller.
 pub trait Renderer: Send + Sync {
     /// Draws the script's one frame (`part` is `None`) or one of several.
     ///

@@ -33,7 +33,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     with_bucket(&args.bucket, async |store| {
         must_exist(store, &args.animation).await?;
         let (seed, request) = (fastrand::u64(..), format!("retry-{:016x}", fastrand::u64(..)));
-        let (random, policy) = (Randomness::seeded(seed), Policy::default());
+        let (random, policy) = (Randomness::seeded(seed), Policy::new(rayfold_tracer::PIXEL_VERSION));
         let invocation = Invocation::new(store, &SystemClock, &random, &policy, &request);
         let retried = retry(&invocation, &args.animation, scope).await?;
         if retried.woken == 0 && !retried.reassembled {

@@ -10,7 +10,7 @@ use super::bucket::{Actor, Faults, Grounds, Moment};
 use super::engine::{Engine, WorldClock, lock};
 use super::expected::Expected;
 use super::platform::{Chaos, Platform, Work};
-use super::{Run, Shared};
+use super::{PIXELS, Run, Shared};
 use crate::keys::{Animation, Key};
 use crate::manifest::Manifest;
 use crate::store::{Bucket, PutOptions};
@@ -46,7 +46,7 @@ pub(super) fn run(
         pause_per_frame: Duration::from_millis([0, 1, 20][pick(&random, 3)]),
         // Of most manifests here 800 bytes are the head and some of the frames.
         glimpse: [64, 800, 32 * 1024][pick(&random, 3)],
-        ..Policy::default()
+        ..Policy::new(PIXELS)
     };
     let concurrency = [1, 2, 4, 100][pick(&random, 4)];
     let platform = Platform::new(
