@@ -14,9 +14,20 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-gif", &[]),
     ("rayfold-tracer", &["rayfold-scene"]),
     ("rayfold-pipeline", &["rayfold-scene"]),
+    ("rayfold-client", &["rayfold-scene", "rayfold-pipeline"]),
     ("rayfold-lambda", &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline"]),
     ("rayfold-local", &["rayfold-pipeline"]),
-    ("rayfold", &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline", "rayfold-local"]),
+    (
+        "rayfold",
+        &[
+            "rayfold-scene",
+            "rayfold-tracer",
+            "rayfold-gif",
+            "rayfold-pipeline",
+            "rayfold-client",
+            "rayfold-local",
+        ],
+    ),
     ("rayfold-xtask", &[]),
     (
         "rayfold-bench",

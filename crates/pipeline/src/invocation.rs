@@ -12,7 +12,7 @@ use bytes::Bytes;
 use crate::keys::Animation;
 use crate::manifest::{Beginning, Fact, Head, Manifest, frames_of};
 use crate::store::{ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store};
-use crate::{Clock, Error, Randomness, Result, Timestamp};
+use crate::{Clock, Error, Randomness, Result, Timestamp, found};
 
 /// The numbers of the protocol. Each default has its reason; tests and the local invoker shorten some.
 #[derive(Debug, Clone, PartialEq)]
@@ -320,13 +320,5 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             }
         }
         request().await
-    }
-}
-
-fn found<T>(answer: Result<T>) -> Result<Option<T>> {
-    match answer {
-        Ok(value) => Ok(Some(value)),
-        Err(error) if error.is_not_found() => Ok(None),
-        Err(error) => Err(error),
     }
 }
