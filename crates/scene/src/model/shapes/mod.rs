@@ -1,0 +1,75 @@
+//! Objects: what a ray can hit.
+//!
+//! A shape is a file: its checked constructor, and how a script writes it. Here stands only which there are; the
+//! compiler lists what a new one lacks.
+
+mod cuboid;
+mod sphere;
+mod triangle;
+
+use std::fmt::{self, Formatter};
+
+pub use cuboid::Cuboid;
+pub use sphere::Sphere;
+pub use triangle::Triangle;
+
+use super::invalid::Doubt;
+use super::material::Material;
+use crate::form::write_line;
+
+/// Something that a ray can hit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Object {
+    /// A sphere.
+    Sphere(Sphere),
+    /// A triangle.
+    Triangle(Triangle),
+    /// An axis-aligned box.
+    Cuboid(Cuboid),
+}
+
+impl Object {
+    /// How its surface answers light.
+    pub fn material(&self) -> &Material {
+        match self {
+            Self::Sphere(o) => o.material(),
+            Self::Triangle(o) => o.material(),
+            Self::Cuboid(o) => o.material(),
+        }
+    }
+
+    /// What is hardly meant about it.
+    pub(crate) fn doubt(&self) -> Option<Doubt> {
+        match self {
+            Self::Triangle(o) => o.is_degenerate().then_some(Doubt::DegenerateTriangle),
+            Self::Sphere(_) | Self::Cuboid(_) => None,
+        }
+    }
+
+    /// As a line of a script.
+    pub(crate) fn write(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Sphere(o) => write_line(f, o),
+            Self::Triangle(o) => write_line(f, o),
+            Self::Cuboid(o) => write_line(f, o),
+        }
+    }
+}
+
+impl From<Sphere> for Object {
+    fn from(sphere: Sphere) -> Self {
+        Self::Sphere(sphere)
+    }
+}
+
+impl From<Triangle> for Object {
+    fn from(triangle: Triangle) -> Self {
+        Self::Triangle(triangle)
+    }
+}
+
+impl From<Cuboid> for Object {
+    fn from(cuboid: Cuboid) -> Self {
+        Self::Cuboid(cuboid)
+    }
+}
