@@ -46,6 +46,10 @@ impl Cuboid {
     pub fn material(&self) -> &Material {
         &self.material
     }
+
+    pub(super) fn placed(&self, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
+        Self::new(self.corners.map(place), self.material)
+    }
 }
 
 impl Scripted for Cuboid {

@@ -9,11 +9,13 @@ mod triangle;
 
 use std::fmt::{self, Formatter};
 
+use glam::DVec3;
+
 pub use cuboid::Cuboid;
 pub use sphere::Sphere;
 pub use triangle::Triangle;
 
-use super::invalid::Doubt;
+use super::invalid::{Doubt, InvalidValue};
 use super::material::Material;
 use crate::form::write_line;
 
@@ -35,6 +37,18 @@ impl Object {
             Self::Sphere(o) => o.material(),
             Self::Triangle(o) => o.material(),
             Self::Cuboid(o) => o.material(),
+        }
+    }
+
+    /// The same with every position moved by `place`, which scales all distances by `scale` and keeps directions.
+    ///
+    /// # Errors
+    /// When a number leaves the range of those that are finite, or a length vanishes.
+    pub fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
+        match self {
+            Self::Sphere(o) => o.placed(scale, place).map(Self::from),
+            Self::Triangle(o) => o.placed(place).map(Self::from),
+            Self::Cuboid(o) => o.placed(place).map(Self::from),
         }
     }
 

@@ -39,6 +39,10 @@ impl Sphere {
     pub fn material(&self) -> &Material {
         &self.material
     }
+
+    pub(super) fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
+        Self::new(scale * self.radius, place(self.center), self.material)
+    }
 }
 
 impl Scripted for Sphere {

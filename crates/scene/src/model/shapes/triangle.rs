@@ -50,6 +50,10 @@ impl Triangle {
     pub fn material(&self) -> &Material {
         &self.material
     }
+
+    pub(super) fn placed(&self, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
+        Self::new(self.vertices.map(place), self.material)
+    }
 }
 
 impl Scripted for Triangle {
