@@ -9,7 +9,7 @@ use rayfold_scene::{
     Sphere, Triangle, natural_cmp, parse,
 };
 
-use crate::tracers::Ray;
+use crate::backends::Ray;
 
 /// A camera at `eye` that looks at `target` and sees `width` world units a unit of distance from side to side.
 ///

@@ -56,9 +56,12 @@ fn shape(object: &Object) -> &dyn Shape {
 
 /// Distance to the nearest hit in front of the origin.
 pub(super) fn distance(object: &Object, ray: Ray) -> Option<f64> {
-    let distance = match Units::of(object, ray) {
-        Units::Own => shape(object).distance(ray)?,
-        Units::Scaled { object, ray, scale } => shape(&object?).distance(ray)? / scale,
+    let scale = scale(object, ray);
+    let distance = if scale == 1.0 {
+        shape(object).distance(ray)?
+    } else {
+        let (object, ray) = scaled(object, ray, scale)?;
+        shape(&object).distance(ray)? / scale
     };
     (distance > 0.0 && distance.is_finite()).then_some(distance)
 }
@@ -68,45 +71,31 @@ pub(super) fn distance(object: &Object, ray: Ray) -> Option<f64> {
 /// # Panics
 /// When the ray does not hit the object.
 pub(super) fn surface(object: &Object, ray: Ray, distance: f64) -> Surface {
-    match Units::of(object, ray) {
-        Units::Own => shape(object).surface(ray, distance),
-        Units::Scaled { object, ray, scale } => {
-            let Some(object) = object else { unreachable!("the ray hits the object at {distance}") };
-            let surface = shape(&object).surface(ray, distance * scale);
-            Surface { point: surface.point / scale, offset: surface.offset / scale, ..surface }
-        }
+    let scale = scale(object, ray);
+    if scale == 1.0 {
+        return shape(object).surface(ray, distance);
     }
+    let Some((object, ray)) = scaled(object, ray, scale) else {
+        unreachable!("the ray hits the object at {distance}")
+    };
+    let surface = shape(&object).surface(ray, distance * scale);
+    Surface { point: surface.point / scale, offset: surface.offset / scale, ..surface }
 }
 
 /// The largest exponent whose fourth power leaves room for sums of products.
 const ORDINARY: i32 = 200;
 
-/// Units in which no product overflows or vanishes.
-enum Units {
-    /// Those of the world.
-    Own,
-    /// Those of the world by a power of two.
-    Scaled {
-        /// `None` for one that is too small to be seen in the ray's units.
-        object: Option<Object>,
-        ray: Ray,
-        scale: f64,
-    },
+/// The power of two that scales world units to such in which no product overflows or vanishes, 1 for most.
+fn scale(object: &Object, ray: Ray) -> f64 {
+    let extent = shape(object).extent(ray.origin);
+    let ordinary = extent == 0.0 || (2f64.powi(-ORDINARY)..=2f64.powi(ORDINARY)).contains(&extent);
+    if ordinary { 1.0 } else { below_inverse(extent) }
 }
 
-impl Units {
-    fn of(object: &Object, ray: Ray) -> Self {
-        let extent = shape(object).extent(ray.origin);
-        if extent == 0.0 || (2f64.powi(-ORDINARY)..=2f64.powi(ORDINARY)).contains(&extent) {
-            return Self::Own;
-        }
-        let scale = below_inverse(extent);
-        Self::Scaled {
-            object: object.placed(scale, |position| position * scale).ok(),
-            ray: Ray { origin: ray.origin * scale, ..ray },
-            scale,
-        }
-    }
+/// Object and ray in units of 1 / scale; `None` for an object that is too small to be seen in the ray's units.
+fn scaled(object: &Object, ray: Ray, scale: f64) -> Option<(Object, Ray)> {
+    let object = object.placed(scale, |position| position * scale).ok()?;
+    Some((object, Ray { origin: ray.origin * scale, ..ray }))
 }
 
 /// The object in coordinates whose origin is the eye; `None` where it has none, or where rounding would change which
