@@ -1,6 +1,6 @@
-//! The ways to trace a scene that tests and measurements compare.
+//! The backends, each a way to trace a scene, that tests and measurements compare.
 //!
-//! A new way is one line in [`all`].
+//! A new backend is one line in [`all`].
 
 use glam::DVec3;
 use image::RgbImage;
@@ -27,7 +27,7 @@ pub struct Hit {
     pub normal: DVec3,
 }
 
-/// The numbers that a way computes with.
+/// The numbers that a backend computes with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arithmetic {
     /// Always `f32`.
@@ -43,7 +43,7 @@ type Nearest = Box<dyn Fn(&Scene, &[Ray]) -> Hits + Sync>;
 type Render = Box<dyn Fn(&Scene) -> anyhow::Result<RgbImage> + Sync>;
 
 /// A way to trace.
-pub struct Tracer {
+pub struct Backend {
     /// For people.
     pub name: String,
     /// What its errors are measured in.
@@ -52,7 +52,7 @@ pub struct Tracer {
     render: Render,
 }
 
-impl Tracer {
+impl Backend {
     pub(crate) fn new(
         name: impl Into<String>,
         arithmetic: Arithmetic,
@@ -88,9 +88,9 @@ impl Tracer {
     }
 }
 
-/// Every way that there is on this machine: each precision with each width of vectors, and what must not be seen in a
+/// Every backend that there is on this machine: each precision with each width of vectors, and what must not be seen in a
 /// picture (the tree, the tile's size, the number of threads) with the widest.
-pub fn all() -> Vec<Tracer> {
+pub fn all() -> Vec<Backend> {
     let mut all = vec![reference()];
     for ((precision, name), tile) in PRECISIONS.into_iter().zip([(4, 4), (64, 4), (8, 32)]) {
         let options = RenderOptions { precision, ..Default::default() };
@@ -106,8 +106,8 @@ pub fn all() -> Vec<Tracer> {
     all
 }
 
-/// The truth first, then the ways to compare with it, each following light through so many mirrors.
-pub(crate) fn for_pictures(bounces: u32) -> Vec<Tracer> {
+/// The truth first, then the backends to compare with it, each following light through so many mirrors.
+pub(crate) fn for_pictures(bounces: u32) -> Vec<Backend> {
     let options = RenderOptions { bounces: Some(bounces), ..Default::default() };
     let mut all = vec![reference_with(options), packets_by_the_textbook(options)];
     all.extend(PRECISIONS.map(|(precision, name)| packets(name, RenderOptions { precision, ..options })));
@@ -115,8 +115,8 @@ pub(crate) fn for_pictures(bounces: u32) -> Vec<Tracer> {
 }
 
 /// The packets with formulas that know nothing of rounding.
-fn packets_by_the_textbook(options: RenderOptions<'static>) -> Tracer {
-    Tracer::new(
+fn packets_by_the_textbook(options: RenderOptions<'static>) -> Backend {
+    Backend::new(
         "f32 naive",
         Arithmetic::Single,
         |_, _| anyhow::bail!("only whole pictures are drawn by the textbook"),
@@ -144,14 +144,14 @@ pub fn levels() -> Vec<(&'static str, Level)> {
 }
 
 /// The tracer that pictures are made with.
-pub(crate) fn packets(name: impl Into<String>, options: RenderOptions<'static>) -> Tracer {
+pub(crate) fn packets(name: impl Into<String>, options: RenderOptions<'static>) -> Backend {
     let arithmetic = match options.precision {
         Precision::Auto => Arithmetic::Chosen,
         Precision::F32 => Arithmetic::Single,
         Precision::F64 => Arithmetic::Double,
     };
     let nearest = move |scene: &Scene, rays: &[Ray]| packet_nearest(scene, rays, &options);
-    Tracer::new(name, arithmetic, nearest, move |scene| Ok(rayfold_tracer::render(scene, &options)?))
+    Backend::new(name, arithmetic, nearest, move |scene| Ok(rayfold_tracer::render(scene, &options)?))
 }
 
 fn packet_nearest(scene: &Scene, rays: &[Ray], options: &RenderOptions) -> Hits {
@@ -174,12 +174,12 @@ fn packet_nearest(scene: &Scene, rays: &[Ray], options: &RenderOptions) -> Hits 
 }
 
 /// The plain `f64` tracer.
-pub fn reference() -> Tracer {
+pub fn reference() -> Backend {
     reference_with(RenderOptions::default())
 }
 
-fn reference_with(options: RenderOptions<'static>) -> Tracer {
-    Tracer::new(
+fn reference_with(options: RenderOptions<'static>) -> Backend {
+    Backend::new(
         "reference",
         Arithmetic::Double,
         |scene, rays| Ok(rays.iter().map(|ray| reference_nearest(scene, *ray)).collect()),

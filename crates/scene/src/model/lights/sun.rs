@@ -1,15 +1,11 @@
-//! Lights.
+//! Suns: lights at infinity.
+
+use std::fmt;
 
 use glam::DVec3;
 
-use super::invalid::{self, InvalidValue, Parameter, finite};
-
-/// Something that lights the scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Light {
-    /// A light at infinity.
-    Directional(DirectionalLight),
-}
+use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
+use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite};
 
 /// A light at infinity.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +33,25 @@ impl DirectionalLight {
     /// The direction in which it travels, of any length but zero.
     pub fn direction(&self) -> DVec3 {
         self.direction
+    }
+}
+
+impl Scripted for DirectionalLight {
+    const FORM: Form = Form::new(
+        "Ilight",
+        &[
+            Field::new(Parameter::LightColor, &["lr", "lg", "lb"], Kind::Color, Values::Any),
+            Field::new(Parameter::LightDirection, &["dx", "dy", "dz"], Kind::Direction, Values::NotZero),
+        ],
+    );
+
+    fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        Ok(Self::new(numbers.vector(), numbers.vector())?)
+    }
+
+    fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        line.vector(self.color)?;
+        line.vector(self.direction)
     }
 }
 
