@@ -25,6 +25,7 @@
 mod error;
 mod host;
 mod options;
+pub mod policy;
 mod server;
 mod service;
 
