@@ -24,6 +24,7 @@
 
 mod error;
 mod host;
+mod identity;
 mod options;
 pub mod policy;
 mod server;

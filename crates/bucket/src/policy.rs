@@ -19,100 +19,18 @@
 //! # Ok::<(), serde_json::Error>(())
 //! ```
 
+mod access;
 mod actions;
 mod condition;
 mod document;
 #[cfg(test)]
 mod judge;
 mod pattern;
+mod statement;
 
-use std::str::FromStr;
-
+pub use access::{Access, Verdict};
 pub use actions::{Scope, needed};
-
-use condition::Condition;
-use pattern::Pattern;
-
-/// A policy document, checked.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Policy {
-    statements: Vec<Statement>,
-}
-
-/// Allows or denies some actions on some resources, under all of its conditions.
-#[derive(Clone, Debug, PartialEq, Eq)]
-struct Statement {
-    effect: Effect,
-    /// In lower case: the names of actions have none.
-    actions: Vec<Pattern>,
-    resources: Vec<Pattern>,
-    conditions: Vec<Condition>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
-enum Effect {
-    Allow,
-    Deny,
-}
-
-/// Something that a caller wants to do.
-#[derive(Clone, Copy, Debug)]
-pub struct Access<'a> {
-    /// `s3:GetObject`, for example.
-    pub action: &'a str,
-    /// The ARN of the bucket or object: `arn:aws:s3:::bucket/key`.
-    pub resource: &'a str,
-    /// The condition key `s3:prefix`: the prefix that a listing asks for.
-    pub prefix: Option<&'a str>,
-    /// The condition key `s3:delimiter`.
-    pub delimiter: Option<&'a str>,
-}
-
-/// What a policy says to an access.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// A statement allows it, and none denies it.
-    Allowed,
-    /// A statement denies it, whatever others allow.
-    Denied,
-    /// No statement allows it.
-    NotAllowed,
-}
-
-impl Policy {
-    /// May this be done?
-    pub fn verdict(&self, access: &Access<'_>) -> Verdict {
-        let action = access.action.to_ascii_lowercase();
-        let mut verdict = Verdict::NotAllowed;
-        for statement in self.statements.iter().filter(|statement| statement.applies(&action, access)) {
-            match statement.effect {
-                Effect::Deny => return Verdict::Denied,
-                Effect::Allow => verdict = Verdict::Allowed,
-            }
-        }
-        verdict
-    }
-}
-
-impl Statement {
-    fn applies(&self, action: &str, access: &Access<'_>) -> bool {
-        self.actions.iter().any(|pattern| pattern.matches(action))
-            && self.resources.iter().any(|pattern| pattern.matches(access.resource))
-            && self.conditions.iter().all(|condition| condition.holds(access))
-    }
-}
-
-impl FromStr for Policy {
-    type Err = serde_json::Error;
-
-    /// Reads a document.
-    ///
-    /// # Errors
-    /// What is wrong and where, also for whatever is valid in IAM and not understood here.
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        document::read(text)
-    }
-}
+pub use statement::Policy;
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,6 @@
 //! Conditions of a statement: operators on what a listing asks for.
 
-use super::Access;
+use super::access::Access;
 use super::pattern::Pattern;
 
 /// What a condition looks at.

@@ -2,18 +2,31 @@
 
 use std::fmt;
 use std::marker::PhantomData;
+use std::str::FromStr;
 
 use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
 use super::condition::{Condition, Key, Operator};
 use super::pattern::Pattern;
-use super::{Effect, Policy};
+use super::statement::{self, Effect, Policy};
 
 /// The start of the ARN of every bucket and object.
 const ARN: &str = "arn:aws:s3:::";
 
-pub(super) fn read(text: &str) -> Result<Policy, serde_json::Error> {
+impl FromStr for Policy {
+    type Err = serde_json::Error;
+
+    /// Reads a document.
+    ///
+    /// # Errors
+    /// What is wrong and where, also for whatever is valid in IAM and not understood here.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        read(text)
+    }
+}
+
+fn read(text: &str) -> Result<Policy, serde_json::Error> {
     let document: Document = serde_json::from_str(text)?;
     let Version::Current = document.version;
     let mut sids = Vec::new();
@@ -25,7 +38,7 @@ pub(super) fn read(text: &str) -> Result<Policy, serde_json::Error> {
             }
             sids.push(sid);
         }
-        statements.push(super::Statement {
+        statements.push(statement::Statement {
             effect,
             actions: action.0.into_iter().map(|Action(pattern)| pattern).collect(),
             resources: resource.0.into_iter().map(|Resource(pattern)| pattern).collect(),
