@@ -27,6 +27,7 @@ mod host;
 mod options;
 mod server;
 mod service;
+mod storage;
 
 pub use error::{Error, Result};
 pub use options::{Credentials, Options, QUEUE_ARN, Webhook};
