@@ -29,6 +29,7 @@ mod options;
 pub mod policy;
 mod server;
 mod service;
+mod storage;
 
 pub use error::{Error, Result};
 pub use options::{Credentials, Options, QUEUE_ARN, Webhook};

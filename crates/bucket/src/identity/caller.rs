@@ -84,6 +84,7 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
+    use crate::storage::Storage;
 
     fn owner() -> Credentials {
         Credentials { access_key: "owner".into(), secret_key: "secret".into() }
@@ -93,14 +94,15 @@ mod tests {
         result.err().map_or("none".to_owned(), |error| error.code().as_str().to_owned())
     }
 
-    #[test]
-    fn a_session_is_known_by_key_and_token_until_it_is_over() {
-        let database = Arc::new(super::super::session::in_memory());
-        let identities = Identities::new(owner(), Sessions::open(database, SystemTime::now()).unwrap());
+    #[tokio::test]
+    async fn a_session_is_known_by_key_and_token_until_it_is_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
         let now = SystemTime::now();
+        let identities = Identities::new(owner(), Sessions::open(storage, now).unwrap());
         let session = Session::example("KEY", now + Duration::from_secs(900));
         let token = session.token.clone();
-        identities.sessions.add("KEY", session, now).unwrap();
+        identities.sessions.add("KEY", session, now).await.unwrap();
         let later = now + Duration::from_secs(899);
         assert!(matches!(identities.caller("KEY", Some(&token), later), Ok(Caller::Session(_))));
         assert_eq!(code(identities.caller("KEY", Some("guess"), later)), "InvalidToken");
@@ -111,5 +113,7 @@ mod tests {
         assert_eq!(code(identities.secret("KEY", over)), "ExpiredToken");
         assert!(matches!(identities.caller("owner", None, over), Ok(Caller::Owner)));
         assert_eq!(code(identities.caller("owner", Some(&token), now)), "InvalidToken");
+        drop(identities);
+        writing.end();
     }
 }

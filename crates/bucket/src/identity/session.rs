@@ -5,13 +5,11 @@ use std::fmt;
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use redb::{Database, ReadableDatabase, ReadableTable, TableDefinition};
+use redb::StorageError;
 use serde::{Deserialize, Serialize};
 
 use crate::policy::Policy;
-
-/// From the access key to the session as JSON.
-const TABLE: TableDefinition<'_, &str, &[u8]> = TableDefinition::new("sessions");
+use crate::storage::{Kind, Storage, Table, Unavailable, View};
 
 /// What `AssumeRole` gave, and to whom.
 pub(crate) struct Session {
@@ -73,43 +71,42 @@ struct Kept {
 
 /// All sessions that are not over.
 pub(crate) struct Sessions {
-    database: Arc<Database>,
+    storage: Storage,
     by_key: RwLock<BTreeMap<String, Arc<Session>>>,
 }
 
 impl Sessions {
-    /// Those of the earlier runs that are not over yet; the others are forgotten.
+    /// Those of the earlier runs that are not over yet.
     ///
     /// # Errors
-    /// When the database cannot be read or written.
-    pub(crate) fn open(database: Arc<Database>, now: SystemTime) -> Result<Self, redb::Error> {
+    /// When the storage cannot be read.
+    pub(crate) fn open(storage: Storage, now: SystemTime) -> Result<Self, Unavailable> {
+        let failed = |error: StorageError| Unavailable::Failed(error.to_string().into());
         let mut by_key = BTreeMap::new();
-        let reading = database.begin_read()?;
-        match reading.open_table(TABLE) {
-            Ok(table) => {
-                for entry in table.iter()? {
-                    let (key, kept) = entry?;
-                    if let Some(session) = read(kept.value()) {
-                        by_key.insert(key.value().to_owned(), Arc::new(session));
-                    }
-                }
+        for row in storage.snapshot()?.from(Table::Sessions, b"").map_err(failed)? {
+            let (key, kept) = row.map_err(failed)?;
+            if let (Ok(key), Some(session)) = (String::from_utf8(key), read(&kept)) {
+                by_key.insert(key, Arc::new(session));
             }
-            Err(redb::TableError::TableDoesNotExist(_)) => {}
-            Err(error) => return Err(error.into()),
         }
         by_key.retain(|_, session| !session.is_over(now));
-        Ok(Self { database, by_key: RwLock::new(by_key) })
+        Ok(Self { storage, by_key: RwLock::new(by_key) })
     }
 
     pub(crate) fn get(&self, access_key: &str) -> Option<Arc<Session>> {
         self.by_key.read().unwrap_or_else(PoisonError::into_inner).get(access_key).cloned()
     }
 
-    /// Keeps a session, which is known from when this returns, also after a crash. Blocks on the disk.
+    /// Keeps a session, which is known from when this returns, also after a crash; those that are over are forgotten.
     ///
     /// # Errors
-    /// When the database cannot be written.
-    pub(crate) fn add(&self, access_key: &str, session: Session, now: SystemTime) -> Result<(), redb::Error> {
+    /// When the storage cannot be written.
+    pub(crate) async fn add(
+        &self,
+        access_key: &str,
+        session: Session,
+        now: SystemTime,
+    ) -> Result<(), Unavailable> {
         let expires = session.expires.duration_since(UNIX_EPOCH).unwrap_or_default().as_millis();
         let kept = Kept {
             secret_key: session.secret_key.clone(),
@@ -118,14 +115,23 @@ impl Sessions {
             arn: session.arn.clone(),
             expires_ms: u64::try_from(expires).unwrap_or(u64::MAX),
         };
-        let kept = serde_json::to_vec(&kept).map_err(std::io::Error::from)?;
-        let writing = self.database.begin_write()?;
-        {
-            let mut table = writing.open_table(TABLE)?;
-            table.retain(|_, kept| read(kept).is_some_and(|session| !session.is_over(now)))?;
-            table.insert(access_key, kept.as_slice())?;
-        }
-        writing.commit()?;
+        let kept =
+            serde_json::to_vec(&kept).map_err(|error| Unavailable::Failed(error.to_string().into()))?;
+        let key = access_key.as_bytes().to_vec();
+        let change = self.storage.change(Kind::Grows, move |batch| {
+            let mut over = Vec::new();
+            for row in batch.from(Table::Sessions, b"")? {
+                let (key, kept) = row?;
+                if read(&kept).is_none_or(|session| session.is_over(now)) {
+                    over.push(key);
+                }
+            }
+            for key in over {
+                batch.remove(Table::Sessions, &key)?;
+            }
+            batch.put(Table::Sessions, &key, &kept)
+        });
+        change.await?;
         let mut by_key = self.by_key.write().unwrap_or_else(PoisonError::into_inner);
         by_key.retain(|_, session| !session.is_over(now));
         by_key.insert(access_key.to_owned(), Arc::new(session));
@@ -141,11 +147,6 @@ fn read(kept: &[u8]) -> Option<Session> {
 }
 
 #[cfg(test)]
-pub(crate) fn in_memory() -> Database {
-    Database::builder().create_with_backend(redb::backends::InMemoryBackend::new()).unwrap()
-}
-
-#[cfg(test)]
 impl Session {
     pub(crate) fn example(name: &str, expires: SystemTime) -> Self {
         let policy = r#"{"Version":"2012-10-17","Statement":{"Effect":"Allow","Action":"*","Resource":"*"}}"#;
@@ -158,34 +159,33 @@ impl Session {
 mod tests {
     use super::*;
 
-    #[test]
-    fn sessions_survive_until_they_are_over_and_are_then_forgotten() {
-        let database = Arc::new(in_memory());
+    #[tokio::test]
+    async fn sessions_survive_until_they_are_over_and_are_then_forgotten() {
+        let folder = tempfile::tempdir().unwrap();
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
         let now = UNIX_EPOCH + Duration::from_secs(1_000_000);
         let after = |seconds| now + Duration::from_secs(seconds);
-        let sessions = Sessions::open(database.clone(), now).unwrap();
-        sessions.add("short", Session::example("short", after(10)), now).unwrap();
-        sessions.add("long", Session::example("long", after(20)), now).unwrap();
+        let sessions = Sessions::open(storage, now).unwrap();
+        sessions.add("short", Session::example("short", after(10)), now).await.unwrap();
+        sessions.add("long", Session::example("long", after(20)), now).await.unwrap();
         drop(sessions);
+        writing.end();
 
-        let again = Sessions::open(database.clone(), after(9)).unwrap();
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
+        let again = Sessions::open(storage.clone(), after(9)).unwrap();
         let (short, long) = (again.get("short").unwrap(), again.get("long").unwrap());
         assert!(long.has_token("token of long") && !long.has_token("token of short"));
         assert_eq!((short.secret_key.as_str(), short.expires), ("secret of short", after(10)));
         assert_eq!(short.policy, long.policy);
-        drop(again);
 
-        let last = Sessions::open(database.clone(), after(10)).unwrap();
+        let last = Sessions::open(storage.clone(), after(10)).unwrap();
         assert!(last.get("short").is_none() && last.get("long").is_some());
-        last.add("new", Session::example("new", after(30)), after(10)).unwrap();
-        let reading = database.begin_read().unwrap();
-        let keys: Vec<String> = reading
-            .open_table(TABLE)
-            .unwrap()
-            .iter()
-            .unwrap()
-            .map(|entry| entry.unwrap().0.value().to_owned())
-            .collect();
-        assert_eq!(keys, ["long", "new"]);
+        last.add("new", Session::example("new", after(30)), after(10)).await.unwrap();
+        let snapshot = storage.snapshot().unwrap();
+        let keys: Vec<Vec<u8>> =
+            snapshot.from(Table::Sessions, b"").unwrap().map(|row| row.unwrap().0).collect();
+        assert_eq!(keys, [&b"long"[..], b"new"]);
+        drop((again, last, storage));
+        writing.end();
     }
 }

@@ -178,11 +178,8 @@ impl AssumeRole {
                 let message = format!("the policy is refused: {error}");
                 Refusal::new(StatusCode::BAD_REQUEST, "MalformedPolicyDocument", message)
             })?;
-        let (sessions, key) = (self.0.sessions.clone(), access_key.clone());
-        tokio::task::spawn_blocking(move || sessions.add(&key, session, now))
-            .await
-            .map_err(|error| broken(error.to_string()))?
-            .map_err(|error| broken(format!("the session cannot be kept: {error}")))?;
+        let kept = self.0.sessions.add(&access_key, session, now).await;
+        kept.map_err(|error| broken(format!("the session cannot be kept: {error}")))?;
         let mut expiration = Vec::new();
         Timestamp::from(expires)
             .format(TimestampFormat::DateTime, &mut expiration)
