@@ -32,7 +32,7 @@ pub enum Error {
         /// Its width and height.
         found: (u32, u32),
     },
-    /// [`Encoder::finish`] was called before any [`Encoder::push`].
+    /// [`Encoder::finish`](crate::Encoder::finish) was called before any [`Encoder::push`](crate::Encoder::push).
     #[error("an animation needs at least one frame")]
     NoFrames,
     /// The writer failed.

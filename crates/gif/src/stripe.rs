@@ -26,7 +26,7 @@ use crate::nearest::Nearest;
 use crate::needs::Need;
 use crate::palette::Palette;
 
-/// The additional squared error (see [`colour`](crate::colour)) that an index may have if it makes the file smaller.
+/// The additional squared error (see [`colour`]) that an index may have if it makes the file smaller.
 const TOLERANCE: f32 = 6.0;
 /// The same where much of the frame changes, for each unit of the palette's mean error; the larger of the two holds. Such
 /// pixels are soon drawn anew, and need no better colours than the palette has.
