@@ -20,7 +20,7 @@ pub(crate) async fn work<S: Store>(
     let (mut answer, mut failed) = (Answer::default(), Vec::new());
     for ObjectEvent { bucket, key } in objects {
         if bucket != context.bucket {
-            tracing::error!(request_id = %call.request_id, bucket, key, "an event of another bucket");
+            tracing::error!(request_id = %call.request_id, unhandled = true, bucket, key, "an event of another bucket");
             answer.outcomes.push(Outcome { of: key, what: "of another bucket".into() });
             continue;
         }
