@@ -12,6 +12,7 @@ use serde_json::Value;
 const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-scene", &[]),
     ("rayfold-gif", &[]),
+    ("rayfold-bucket", &[]),
     ("rayfold-tracer", &["rayfold-scene"]),
     ("rayfold-pipeline", &["rayfold-scene", "rayfold-tracer", "rayfold-gif"]),
     ("rayfold-lambda", &["rayfold-pipeline"]),
