@@ -42,6 +42,7 @@ resource "aws_cloudwatch_log_group" "this" {
 }
 
 resource "aws_lambda_function" "this" {
+  #checkov:skip=CKV_AWS_115:Optional (reserved_concurrency): a new account can set none aside
   #checkov:skip=CKV_AWS_116:The on-failure destination takes the place of a dead-letter queue and says more: the error too
   #checkov:skip=CKV_AWS_117:Optional (vpc): the functions speak with AWS services only, and in a VPC need an endpoint for that
   #checkov:skip=CKV_AWS_272:Optional (code_signing_config_arn): the packages are built from this source by whoever applies it
