@@ -14,7 +14,7 @@ use rayfold_local::invoker::Settings;
 use rayfold_pipeline::manifest::Status;
 use rayfold_pipeline::store::{ListRequest, Store};
 use stage::stores::on_every_store;
-use stage::{PATIENCE, Stage, built, drawn, scene};
+use stage::{PATIENCE, Stage, built, drawn, functions_beside, scene};
 
 const RAYFOLD: &str = env!("CARGO_BIN_EXE_rayfold");
 
@@ -25,24 +25,8 @@ struct Cloud {
 }
 
 async fn cloud(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Cloud {
-    let functions = Path::new(RAYFOLD).parent().unwrap();
-    if !functions.join("rayfold-render").exists() || !functions.join("rayfold-assemble").exists() {
-        build(functions);
-    }
+    let functions = functions_beside(Path::new(RAYFOLD));
     Cloud { stage: stage::stage(store, functions, change).await, folder: tempfile::tempdir().unwrap() }
-}
-
-/// `cargo test -p rayfold` alone does not build what belongs to another package.
-fn build(folder: &Path) {
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo
-        .args(["build", "--locked", "-p", "rayfold-lambda", "--bins", "--target-dir"])
-        .arg(folder.parent().unwrap());
-    cargo.current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."));
-    if folder.ends_with("release") {
-        cargo.arg("--release");
-    }
-    assert!(cargo.status().unwrap().success(), "the function binaries do not build");
 }
 
 impl Cloud {

@@ -9,6 +9,7 @@ pub mod stores;
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
@@ -31,6 +32,25 @@ pub struct Stage {
     sender: UnboundedSender<Observation>,
     seen: UnboundedReceiver<Observation>,
     data: tempfile::TempDir,
+}
+
+/// The folder of the function binaries, where the program is. `cargo test` for one package alone does not build what belongs
+/// to another: then they are built here.
+pub fn functions_beside(program: &Path) -> &Path {
+    let folder = program.parent().unwrap();
+    if folder.join("rayfold-render").exists() && folder.join("rayfold-assemble").exists() {
+        return folder;
+    }
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo
+        .args(["build", "--locked", "-p", "rayfold-lambda", "--bins", "--target-dir"])
+        .arg(folder.parent().unwrap());
+    cargo.current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."));
+    if folder.ends_with("release") {
+        cargo.arg("--release");
+    }
+    assert!(cargo.status().unwrap().success(), "the function binaries do not build");
+    folder
 }
 
 /// Starts everything; `change` alters the invoker's settings.

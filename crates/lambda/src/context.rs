@@ -9,6 +9,7 @@ use rayfold_pipeline::store::{S3Store, Store};
 use rayfold_pipeline::{Invocation, Policy, Randomness, SystemClock, Timestamp};
 
 use crate::animator::GifAnimator;
+use crate::limits::limits;
 use crate::raytracer::RayTracer;
 
 /// The store's client and what the steps are given.
@@ -40,7 +41,7 @@ pub struct Call {
 impl Context<S3Store> {
     /// From the function's environment: `RAYFOLD_BUCKET`, and the standard AWS variables for who and where.
     ///
-    /// `RAYFOLD_QUIET_MS` and `RAYFOLD_STUCK_AFTER_MS` change the pauses of the protocol, `RAYFOLD_ATTEMPTS` how often
+    /// `RAYFOLD_MAX_OBJECTS` and its like bound what a script may ask for. `RAYFOLD_QUIET_MS` and `RAYFOLD_STUCK_AFTER_MS` change the pauses of the protocol, `RAYFOLD_ATTEMPTS` how often
     /// the sweep wakes a frame before it gives it up; `RAYFOLD_SEED` makes random pauses repeatable.
     ///
     /// # Errors
@@ -62,14 +63,8 @@ impl Context<S3Store> {
             Some(seed) => seed,
             None => getrandom::u64().context("no randomness from the system")?,
         };
-        Ok(Self {
-            store,
-            bucket,
-            renderer: RayTracer::default(),
-            animator: GifAnimator,
-            policy,
-            random: Randomness::seeded(seed),
-        })
+        let renderer = RayTracer { limits: limits(|name| env::var(name).ok())? };
+        Ok(Self { store, bucket, renderer, animator: GifAnimator, policy, random: Randomness::seeded(seed) })
     }
 }
 

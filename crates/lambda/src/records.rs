@@ -21,7 +21,7 @@ where
     let (mut answer, mut failed) = (Answer::default(), Vec::new());
     for ObjectEvent { bucket: of, key } in objects {
         if of != bucket {
-            tracing::error!(request_id, bucket = of, key, "an event of another bucket");
+            tracing::error!(request_id, unhandled = true, bucket = of, key, "an event of another bucket");
             answer.outcomes.push(Outcome { of: key, what: "of another bucket".into() });
             continue;
         }

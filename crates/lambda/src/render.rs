@@ -23,7 +23,7 @@ pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value)
             Vec::new()
         }
         Err(error) => {
-            tracing::error!(request_id = %call.request_id, error = %error, "unreadable event");
+            tracing::error!(request_id = %call.request_id, unhandled = true, error = %error, "unreadable event");
             Vec::new()
         }
     };
