@@ -98,6 +98,13 @@ pub enum Key {
         /// The animation.
         animation: Animation,
     },
+    /// `manifests/<animation>.json~<version>`: a manifest that could not be read, set aside when it was made anew.
+    SetAside {
+        /// The animation.
+        animation: Animation,
+        /// The version that it had in its place.
+        version: ETag,
+    },
     /// `assemblies/<animation>/<revision>-<generation>.json`
     Claim {
         /// The animation.
@@ -292,6 +299,7 @@ impl Key {
             | Key::Part { animation, .. }
             | Key::Receipt { animation, .. }
             | Key::Manifest { animation }
+            | Key::SetAside { animation, .. }
             | Key::Claim { animation, .. }
             | Key::Retry { animation, .. }
             | Key::Gif { animation } => animation,
@@ -318,8 +326,14 @@ impl FromStr for Key {
                 Key::Receipt { animation: Animation::new(animation)?, receipt }
             }
             "manifests" => {
-                let animation = rest.strip_suffix(".json").ok_or_else(unknown)?;
-                Key::Manifest { animation: Animation::new(animation)? }
+                // An escaped version has no full stop, so that no key is both.
+                if let Some(animation) = rest.strip_suffix(".json") {
+                    Key::Manifest { animation: Animation::new(animation)? }
+                } else {
+                    let (animation, version) = rest.rsplit_once(".json~").ok_or_else(unknown)?;
+                    let version = unescape(version).ok_or_else(unknown)?;
+                    Key::SetAside { animation: Animation::new(animation)?, version }
+                }
             }
             "assemblies" => {
                 let (animation, file) = rest.rsplit_once('/').ok_or_else(unknown)?;
@@ -352,6 +366,18 @@ impl FromStr for Key {
             _ => return Err(unknown()),
         };
         Ok(key)
+    }
+}
+
+impl Receipt {
+    /// Whether it is about this version of a script, whatever drew it.
+    pub fn is_of(&self, script: &ScriptName, version: &ETag) -> bool {
+        match self {
+            Receipt::Frame { name, tag, .. }
+            | Receipt::Fault { name, tag, .. }
+            | Receipt::Split { name, tag, .. } => name == script && tag.version == *version,
+            Receipt::Refusal { .. } => false,
+        }
     }
 }
 
@@ -407,8 +433,10 @@ fn name_and_tag(text: &str) -> Option<(ScriptName, Tag)> {
 fn receipt(rest: &str) -> Option<(&str, Receipt)> {
     let (above, file) = rest.rsplit_once('/')?;
     if file.contains('@') {
-        if let Some(generation) = file.strip_prefix('@').and_then(|f| f.strip_suffix(".error.json")) {
-            return Some((above, Receipt::Refusal { generation: Generation::new(generation).ok()? }));
+        // A script's name may start with `@`, too; but what follows a generation is nothing more.
+        let refused = file.strip_prefix('@').and_then(|file| file.strip_suffix(".error.json"));
+        if let Some(generation) = refused.and_then(|text| Generation::new(text).ok()) {
+            return Some((above, Receipt::Refusal { generation }));
         }
         let receipt = if let Some(stem) = file.strip_suffix(".png") {
             let (name, tag) = name_and_tag(stem)?;
@@ -476,6 +504,9 @@ impl fmt::Display for Key {
             }
             Key::Receipt { animation, receipt } => f.write_str(&animation.receipt(receipt)),
             Key::Manifest { animation } => f.write_str(&animation.manifest()),
+            Key::SetAside { animation, version } => {
+                write!(f, "{}~{}", animation.manifest(), escape(version))
+            }
             Key::Claim { animation, revision, generation } => {
                 write!(f, "assemblies/{animation}/{revision}-{generation}.json")
             }

@@ -24,6 +24,9 @@ pub const SCHEMA: u32 = 1;
 /// How many diagnostics of a script the manifest repeats; the receipt has more.
 pub const DIAGNOSTICS_SHOWN: usize = 3;
 
+/// The largest `animation.json` that is read: thousands of times what its fields need.
+pub const MOST_SETTINGS_BYTES: u64 = 64 * 1024;
+
 /// The manifest of an animation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Manifest {
@@ -277,6 +280,12 @@ impl Settings {
         Settings { version: None, value: Some(AnimationSettings::default()), fault: None }
     }
 
+    /// Of an `animation.json` that is too large to be one.
+    pub fn too_large(version: ETag, size: u64) -> Self {
+        let message = format!("{SETTINGS_FILE} has {size} bytes: expected at most {MOST_SETTINGS_BYTES}");
+        Settings { version: Some(version), value: None, fault: Some(Reason::new(message)) }
+    }
+
     /// Reads `animation.json`.
     pub fn parse(version: ETag, body: &[u8]) -> Self {
         let parsed = parse_settings(SETTINGS_FILE, body);
@@ -289,6 +298,15 @@ impl Settings {
 }
 
 impl Reason {
+    /// Of an error receipt that cannot be read. The sweep deletes it, and has the frame drawn again.
+    pub const UNREADABLE: &str =
+        "the error receipt cannot be read: the frame is drawn again at the next sweep";
+
+    /// What an error receipt says.
+    pub(crate) fn of_receipt(body: &[u8]) -> Self {
+        serde_json::from_slice(body).unwrap_or_else(|_| Reason::new(Reason::UNREADABLE))
+    }
+
     /// A reason without diagnostics.
     pub fn new(message: impl Into<String>) -> Self {
         Reason { message: message.into(), diagnostics: Vec::new(), omitted: 0 }
