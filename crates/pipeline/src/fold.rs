@@ -155,6 +155,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let before = known.map(|known| &known.manifest);
         next.head.revision = before.map_or(0, |manifest| manifest.head.revision) + 1;
         next.head.writer = self.request_id().to_owned();
+        next.head.removed_at = next.removed_at(before, self.clock.now());
         invariants::check(&next, before)?;
         let options = match known {
             _ if self.breaks(Mutation::DropIfMatch) => PutOptions::always(),

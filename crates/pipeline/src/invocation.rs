@@ -102,7 +102,7 @@ pub enum Mutation {
     NeverClaim,
     /// The assembler leaves as soon as a frame is pending, though it has just written.
     AssemblerLeavesEarly,
-    /// The assembler does not look again after it has put the GIF.
+    /// The assembler does not look again after it has put the GIF, nor after it has given back the lease.
     AssemblerDoesNotLookAgain,
     /// The GIF is put without its condition.
     DropGifCondition,

@@ -33,6 +33,9 @@ pub const SCRIPTS: &str = "scripts/";
 /// What the manifests' folder is called.
 pub const MANIFESTS: &str = "manifests/";
 
+/// What a lease's file is called. No receipt ends like this.
+const LEASE_FILE: &str = "@assembler.json";
+
 /// An animation's name: path segments joined by `/`, none of them empty, `.` or `..`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
@@ -92,6 +95,11 @@ pub enum Key {
         animation: Animation,
         /// Which receipt.
         receipt: Receipt,
+    },
+    /// `frames/<animation>/@assembler.json`: which invocation waits for the set to settle, or builds its GIF.
+    Lease {
+        /// The animation.
+        animation: Animation,
     },
     /// `manifests/<animation>.json`
     Manifest {
@@ -298,6 +306,7 @@ impl Key {
             | Key::Settings { animation }
             | Key::Part { animation, .. }
             | Key::Receipt { animation, .. }
+            | Key::Lease { animation }
             | Key::Manifest { animation }
             | Key::SetAside { animation, .. }
             | Key::Claim { animation, .. }
@@ -320,6 +329,10 @@ impl FromStr for Key {
                 let (name, tag) = name_and_tag(scripted).ok_or_else(unknown)?;
                 let number = file.strip_suffix(".json").and_then(canonical).ok_or_else(unknown)?;
                 Key::Part { animation: Animation::new(animation)?, name, tag, number }
+            }
+            "frames" if rest.ends_with(LEASE_FILE) => {
+                let animation = rest.strip_suffix(LEASE_FILE).and_then(|above| above.strip_suffix('/'));
+                Key::Lease { animation: Animation::new(animation.ok_or_else(unknown)?)? }
             }
             "frames" => {
                 let (animation, receipt) = receipt(rest).ok_or_else(unknown)?;
@@ -503,6 +516,7 @@ impl fmt::Display for Key {
                 write!(f, "parts/{animation}/{name}@{tag}/{number}.json")
             }
             Key::Receipt { animation, receipt } => f.write_str(&animation.receipt(receipt)),
+            Key::Lease { animation } => write!(f, "{}{LEASE_FILE}", animation.frames()),
             Key::Manifest { animation } => f.write_str(&animation.manifest()),
             Key::SetAside { animation, version } => {
                 write!(f, "{}~{}", animation.manifest(), escape(version))

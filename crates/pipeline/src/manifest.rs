@@ -6,11 +6,13 @@
 //! Its first line is the [`Head`], whose size does not grow with the number of frames; the frames follow, a line each,
 //! and the first line tells where.
 
+use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 
 use rayfold_scene::{AnimationSettings, Diagnostic, SETTINGS_FILE, parse_settings};
 use serde::{Deserialize, Serialize};
 
+use crate::Timestamp;
 use crate::keys::{Animation, Generation, Part, ScriptName};
 use crate::store::ETag;
 
@@ -69,6 +71,9 @@ pub struct Head {
     /// Why this generation gives no GIF though all its frames are there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refusal: Option<Fault>,
+    /// When a script was last found to be gone, by the clock of the function that found it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub removed_at: Option<Timestamp>,
     /// Every 1,000th script's name: where listings in ranges start.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub marks: Vec<ScriptName>,
@@ -218,6 +223,14 @@ impl Manifest {
         let mut parts = frames.filter_map(|frame| Some((frame.part?, &frame.state))).peekable();
         parts.peek()?;
         Some(parts.filter(|(_, state)| **state == FrameState::Pending).map(|(part, _)| part).collect())
+    }
+
+    /// When a script was last found to be gone, if this manifest is written `now` over `before`.
+    pub(crate) fn removed_at(&self, before: Option<&Manifest>, now: Timestamp) -> Option<Timestamp> {
+        let before = before?;
+        let left: BTreeSet<&ScriptName> = self.frames.iter().map(|frame| &frame.script).collect();
+        let is_gone = before.frames.iter().any(|frame| !left.contains(&frame.script));
+        if is_gone { Some(now) } else { before.head.removed_at }
     }
 
     /// Whether it shows the fact.
@@ -393,4 +406,37 @@ pub fn part(number: u64) -> Part {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
 fn is_zero(number: &usize) -> bool {
     *number == 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reconcile::{Results, ScriptFound, Scripts, reconcile};
+
+    fn manifest(names: &[&str], removed_at: Option<u64>) -> Manifest {
+        let found = names.iter().map(|name| ScriptFound {
+            name: ScriptName::new(name).unwrap(),
+            version: ETag::new("v"),
+            modified: Timestamp(0),
+        });
+        let scripts = Scripts { found: found.collect(), rejected: Vec::new() };
+        let animation = Animation::new("film").unwrap();
+        let mut manifest = reconcile(&animation, &scripts, &Results::default(), &Settings::absent());
+        manifest.head.removed_at = removed_at.map(Timestamp);
+        manifest
+    }
+
+    #[test]
+    fn a_manifest_remembers_when_a_script_was_last_gone() {
+        let check = |before: Option<&Manifest>, names: &[&str], expected: Option<u64>| {
+            let next = manifest(names, None);
+            assert_eq!(next.removed_at(before, Timestamp(9)), expected.map(Timestamp), "{names:?}");
+        };
+        check(None, &["1"], None);
+        check(Some(&manifest(&["1", "2"], None)), &["1", "2", "3"], None);
+        check(Some(&manifest(&["1", "2"], None)), &["2", "3"], Some(9));
+        check(Some(&manifest(&["1", "2"], Some(4))), &["1", "2", "3"], Some(4));
+        check(Some(&manifest(&["1"], Some(4))), &[], Some(9));
+        assert!(manifest(&["1"], Some(4)).agrees_with(&manifest(&["1"], None)));
+    }
 }

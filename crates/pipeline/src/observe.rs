@@ -20,6 +20,8 @@ pub(crate) struct Observation {
     pub(crate) scripts: Scripts,
     pub(crate) results: Results,
     pub(crate) manifest: Manifest,
+    /// An assembler waits or builds, or died in it.
+    pub(crate) has_lease: bool,
 }
 
 impl Observation {
@@ -35,7 +37,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     pub(crate) async fn observe(&self, animation: &Animation, known: Option<&Known>) -> Result<Observation> {
         loop {
             let marks = known.map_or(&[][..], |known| &known.manifest.head.marks);
-            let (scripts, receipts) =
+            let (scripts, (receipts, has_lease)) =
                 try_join(self.list_scripts(animation, marks), self.list_receipts(animation, marks)).await?;
             let (scripts, settings) = scripts;
             let settings = self.settings(animation, settings, known).await?;
@@ -43,7 +45,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             self.add_parts(animation, &scripts, &mut results).await?;
             let mut manifest = reconcile(animation, &scripts, &results, &settings);
             if self.add_reasons(animation, &results, known, &mut manifest).await? {
-                return Ok(Observation { scripts, results, manifest });
+                return Ok(Observation { scripts, results, manifest, has_lease });
             }
         }
     }
@@ -71,11 +73,19 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok((scripts, settings))
     }
 
-    async fn list_receipts(&self, animation: &Animation, marks: &[ScriptName]) -> Result<Vec<ReceiptFound>> {
+    /// The receipts, and whether there is a lease among them.
+    async fn list_receipts(
+        &self,
+        animation: &Animation,
+        marks: &[ScriptName],
+    ) -> Result<(Vec<ReceiptFound>, bool)> {
         let prefix = animation.frames();
         let bounds = marks.iter().map(|name| format!("{prefix}{name}@")).collect();
-        let listed = self.list_level(prefix, bounds).await?.into_iter();
-        Ok(listed.filter_map(|listed| receipt(animation, listed)).collect())
+        let listed = self.list_level(prefix, bounds).await?;
+        let lease = Key::Lease { animation: animation.clone() }.to_string();
+        let has_lease = listed.iter().any(|listed| listed.key == lease);
+        let receipts = listed.into_iter().filter_map(|listed| receipt(animation, listed)).collect();
+        Ok((receipts, has_lease))
     }
 
     /// The objects right below a prefix, the ranges between the bounds side by side.

@@ -160,6 +160,7 @@ impl Subject {
             }
             Key::Settings { .. }
             | Key::Receipt { .. }
+            | Key::Lease { .. }
             | Key::Manifest { .. }
             | Key::SetAside { .. }
             | Key::Claim { .. }

@@ -82,6 +82,13 @@ fn names_that_start_with_an_at_sign_have_receipts_like_all_others() {
 }
 
 #[test]
+fn leases_are_no_receipts() {
+    check("frames/a/b/@assembler.json", Key::Lease { animation: animation("a/b") });
+    rejects("frames/@assembler.json", "not a key of the pipeline");
+    rejects("frames/a/x@assembler.json", "not a key of the pipeline");
+}
+
+#[test]
 fn manifests_that_are_set_aside_are_told_from_manifests() {
     let version = ETag::new("d41.8~c");
     check("manifests/a.json~d41~2e8~7ec", Key::SetAside { animation: animation("a"), version });
