@@ -22,9 +22,12 @@
 //! # Ok(()) }
 //! ```
 
+mod checksum;
 mod error;
+mod front;
 mod host;
 mod options;
+mod records;
 mod server;
 mod service;
 mod storage;
