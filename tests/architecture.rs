@@ -12,11 +12,12 @@ use serde_json::Value;
 const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-scene", &[]),
     ("rayfold-gif", &[]),
+    ("rayfold-bucket", &[]),
     ("rayfold-tracer", &["rayfold-scene"]),
     ("rayfold-pipeline", &["rayfold-scene"]),
     ("rayfold-client", &["rayfold-scene", "rayfold-pipeline"]),
     ("rayfold-lambda", &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline"]),
-    ("rayfold-local", &["rayfold-pipeline"]),
+    ("rayfold-local", &["rayfold-bucket", "rayfold-pipeline"]),
     (
         "rayfold",
         &[

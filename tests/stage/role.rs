@@ -1,11 +1,10 @@
-//! Taking a function's role, as Lambda does, by STS: MinIO then allows what the document says and no more.
+//! Taking a function's role, as Lambda does, by STS: the store then allows what the document says and no more.
 
 use std::path::Path;
 
 use aws_sdk_sts::config::{BehaviorVersion, Credentials, Region};
 use aws_smithy_http_client::Builder as HttpBuilder;
-use rayfold_local::connection;
-use rayfold_local::minio::Minio;
+use rayfold_local::S3Server;
 use rayfold_local::routes::Function;
 use rayfold_pipeline::store::Connection;
 
@@ -19,8 +18,8 @@ pub fn policy(role: Function, bucket: &str) -> String {
 }
 
 /// Temporary credentials with the role's policy.
-pub async fn assume(minio: &Minio, role: Function, bucket: &str) -> Connection {
-    let owner = connection(minio);
+pub async fn assume(server: &S3Server, role: Function, bucket: &str) -> Connection {
+    let owner = server.connection();
     let document: serde_json::Value = serde_json::from_str(&policy(role, bucket)).unwrap();
     let config = aws_sdk_sts::Config::builder()
         .behavior_version(BehaviorVersion::latest())
@@ -48,8 +47,8 @@ pub async fn assume(minio: &Minio, role: Function, bucket: &str) -> Connection {
 }
 
 /// The same for a function's process, in the variables that Lambda sets.
-pub async fn environment(minio: &Minio, role: Function, bucket: &str) -> Vec<(String, String)> {
-    let Connection { access_key, secret_key, session_token, .. } = assume(minio, role, bucket).await;
+pub async fn environment(server: &S3Server, role: Function, bucket: &str) -> Vec<(String, String)> {
+    let Connection { access_key, secret_key, session_token, .. } = assume(server, role, bucket).await;
     [
         ("AWS_ACCESS_KEY_ID", access_key),
         ("AWS_SECRET_ACCESS_KEY", secret_key),

@@ -1,0 +1,171 @@
+//! What a request asks for, and whether its caller may do it.
+//!
+//! Everything but a copy's source and the keys of a multi-delete is known before the operation's input is read.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+use std::time::SystemTime;
+
+use hyper::http::Extensions;
+use s3s::access::{S3Access, S3AccessContext};
+use s3s::dto::{CopyObjectInput, CopySource, DeleteObjectsInput, UploadPartCopyInput};
+use s3s::path::S3Path;
+use s3s::{S3Error, S3ErrorCode, S3Request, S3Result, s3_error};
+
+use super::caller::{Caller, Identities};
+use super::session::Session;
+use crate::policy::{self, Scope, Verdict, needed};
+
+/// Where a session's token is, unless it is in the URL.
+const TOKEN: &str = "x-amz-security-token";
+
+/// Asks the identities at each request.
+pub(crate) struct Access(pub(crate) Identities);
+
+/// The keys of a multi-delete that the caller may not delete.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct DeniedKeys(pub(crate) HashSet<String>);
+
+/// The caller may not list the bucket that is read from.
+#[derive(Clone, Copy)]
+struct MayNotList;
+
+/// Whoever may not list a bucket is not told that an object is absent, but what S3 says of one that is there: no.
+pub(crate) fn discreetly(extensions: &Extensions) -> impl Fn(S3Error) -> S3Error + use<> {
+    let may_list = extensions.get::<MayNotList>().is_none();
+    move |error| {
+        if may_list || *error.code() != S3ErrorCode::NoSuchKey {
+            error
+        } else {
+            s3_error!(AccessDenied, "Access Denied")
+        }
+    }
+}
+
+#[async_trait::async_trait]
+impl S3Access for Access {
+    async fn check(&self, cx: &mut S3AccessContext<'_>) -> S3Result<()> {
+        let Some(credentials) = cx.credentials() else {
+            return Err(s3_error!(AccessDenied, "Access Denied: requests must be signed"));
+        };
+        let query = cx.uri().query().unwrap_or_default();
+        let query: Vec<(String, String)> =
+            serde_urlencoded::from_str(query).map_err(|e| s3_error!(e, InvalidURI))?;
+        let token = match cx.headers().get(TOKEN) {
+            Some(token) => Some(token.to_str().map_err(|e| s3_error!(e, InvalidToken))?),
+            None => parameter(&query, "X-Amz-Security-Token")?,
+        };
+        let session = match self.0.caller(&credentials.access_key, token, SystemTime::now())? {
+            Caller::Owner => return Ok(()),
+            Caller::Session(session) => session,
+        };
+        let operation = cx.s3_op().name();
+        // Key by key, when they are known.
+        if operation != "DeleteObjects" {
+            let Some((scope, actions)) = needed(operation) else {
+                return Err(denied(&session, operation, "no policy can allow it"));
+            };
+            let lists = matches!(operation, "ListObjects" | "ListObjectsV2" | "ListObjectVersions");
+            let listed = |name| if lists { parameter(&query, name) } else { Ok(None) };
+            let (prefix, delimiter) = (listed("prefix")?, listed("delimiter")?);
+            let resource = resource(scope, cx.s3_path())?;
+            for action in actions {
+                ask(&session, &policy::Access { action, resource: &resource, prefix, delimiter })?;
+            }
+            // A canned list of who may do what is a right of its own.
+            if cx.headers().contains_key("x-amz-acl") && scope == Scope::Object {
+                ask(&session, &plainly("s3:PutObjectAcl", &resource))?;
+            }
+        }
+        if let Some(bucket) = cx.s3_path().get_bucket_name().map(str::to_owned) {
+            note_listing(&session, &bucket, cx.extensions_mut());
+        }
+        cx.extensions_mut().insert(session);
+        Ok(())
+    }
+
+    async fn copy_object(&self, req: &mut S3Request<CopyObjectInput>) -> S3Result<()> {
+        may_read(&mut req.extensions, &req.input.copy_source)
+    }
+
+    async fn upload_part_copy(&self, req: &mut S3Request<UploadPartCopyInput>) -> S3Result<()> {
+        may_read(&mut req.extensions, &req.input.copy_source)
+    }
+
+    async fn delete_objects(&self, req: &mut S3Request<DeleteObjectsInput>) -> S3Result<()> {
+        let Some(session) = req.extensions.get::<Arc<Session>>().cloned() else { return Ok(()) };
+        let is_denied = |key: &&str| {
+            let resource = arn(&req.input.bucket, Some(key));
+            session.policy.verdict(&plainly("s3:DeleteObject", &resource)) != Verdict::Allowed
+        };
+        let keys = req.input.delete.objects.iter().map(|object| object.key.as_str());
+        let denied = DeniedKeys(keys.filter(is_denied).map(str::to_owned).collect());
+        req.extensions.insert(denied);
+        Ok(())
+    }
+}
+
+fn may_read(extensions: &mut Extensions, source: &CopySource) -> S3Result<()> {
+    let Some(session) = extensions.get::<Arc<Session>>().cloned() else { return Ok(()) };
+    match source {
+        CopySource::Bucket { bucket, key, .. } => {
+            note_listing(&session, bucket, extensions);
+            ask(&session, &plainly("s3:GetObject", &arn(bucket, Some(key))))
+        }
+        _ => Err(denied(&session, "s3:GetObject", "its source is no bucket of this store")),
+    }
+}
+
+/// For [`discreetly`].
+fn note_listing(session: &Session, bucket: &str, extensions: &mut Extensions) {
+    let resource = arn(bucket, None);
+    match session.policy.verdict(&plainly("s3:ListBucket", &resource)) {
+        Verdict::Allowed => drop(extensions.remove::<MayNotList>()),
+        Verdict::Denied | Verdict::NotAllowed => drop(extensions.insert(MayNotList)),
+    }
+}
+
+fn ask(session: &Session, access: &policy::Access<'_>) -> S3Result<()> {
+    match session.policy.verdict(access) {
+        Verdict::Allowed => Ok(()),
+        Verdict::Denied => Err(denied(session, access.action, "its policy denies it")),
+        Verdict::NotAllowed => Err(denied(session, access.action, "its policy does not allow it")),
+    }
+}
+
+fn denied(session: &Session, action: &str, why: &str) -> S3Error {
+    let message = format!("{} is not authorized to perform {action}: {why}", session.arn);
+    S3Error::with_message(S3ErrorCode::AccessDenied, message)
+}
+
+/// Without what only a listing asks for.
+fn plainly<'a>(action: &'a str, resource: &'a str) -> policy::Access<'a> {
+    policy::Access { action, resource, prefix: None, delimiter: None }
+}
+
+fn resource(scope: Scope, path: &S3Path) -> S3Result<String> {
+    let bucket = path.get_bucket_name();
+    match (scope, bucket, path.get_object_key()) {
+        (Scope::Account, ..) => Ok(arn("*", None)),
+        (Scope::Bucket, Some(bucket), _) => Ok(arn(bucket, None)),
+        (Scope::Object, Some(bucket), Some(key)) => Ok(arn(bucket, Some(key))),
+        (Scope::Bucket | Scope::Object, ..) => Err(s3_error!(AccessDenied, "Access Denied")),
+    }
+}
+
+fn arn(bucket: &str, key: Option<&str>) -> String {
+    match key {
+        Some(key) => format!("arn:aws:s3:::{bucket}/{key}"),
+        None => format!("arn:aws:s3:::{bucket}"),
+    }
+}
+
+/// A parameter that may stand there once: with two, one would be judged and the other be used.
+fn parameter<'a>(query: &'a [(String, String)], name: &str) -> S3Result<Option<&'a str>> {
+    let mut found = query.iter().filter(|(other, _)| other == name).map(|(_, value)| value.as_str());
+    let first = found.next();
+    if found.next().is_some() {
+        return Err(s3_error!(InvalidArgument, "{name} stands there twice"));
+    }
+    Ok(first)
+}
