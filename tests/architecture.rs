@@ -17,7 +17,7 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-pipeline", &["rayfold-scene"]),
     ("rayfold-client", &["rayfold-scene", "rayfold-pipeline"]),
     ("rayfold-lambda", &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline"]),
-    ("rayfold-local", &["rayfold-pipeline"]),
+    ("rayfold-local", &["rayfold-bucket", "rayfold-pipeline"]),
     (
         "rayfold",
         &[
