@@ -16,7 +16,7 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-tracer", &["rayfold-scene"]),
     ("rayfold-pipeline", &["rayfold-scene", "rayfold-tracer", "rayfold-gif"]),
     ("rayfold-lambda", &["rayfold-pipeline"]),
-    ("rayfold-local", &["rayfold-pipeline"]),
+    ("rayfold-local", &["rayfold-bucket", "rayfold-pipeline"]),
     ("rayfold", &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline", "rayfold-local"]),
     ("rayfold-xtask", &[]),
     (

@@ -16,7 +16,7 @@ struct Cli {
 enum Measurement {
     /// Error and speed of every way to trace, and the hard cases at full size
     Accuracy(accuracy::Args),
-    /// The paper's table: scenes from upload to GIF on MinIO and the local invoker
+    /// The paper's table: scenes from upload to GIF, in a local bucket and by the local invoker
     #[cfg(feature = "bucket")]
     Pipeline(pipeline::Args),
     /// Size of the functions, and how soon a new process asks for its first invocation

@@ -22,11 +22,14 @@
 //! # Ok(()) }
 //! ```
 
+mod checksum;
 mod error;
+mod front;
 mod host;
 mod identity;
 mod options;
 pub mod policy;
+mod records;
 mod server;
 mod service;
 mod storage;
