@@ -16,10 +16,9 @@ use hyper_util::rt::TokioExecutor;
 use percent_encoding::percent_decode_str;
 use tokio::sync::Notify;
 
-use crate::Result;
-use crate::http::{Body, Server, full, listen};
-use crate::invoker::{Fate, Fates};
-use crate::minio::any_port;
+use super::chaos::{Fate, Fates};
+use crate::error::Result;
+use crate::http::{Body, Server, any_port, full, listen};
 use crate::observation::{Attempt, Observer, RequestKind, Requests, Seen, StoreRequest};
 
 /// Between one process and the store.

@@ -4,21 +4,20 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
+use rayfold_lambda::animator::GifAnimator;
+use rayfold_lambda::raytracer::RayTracer;
 use rayfold_pipeline::keys::{Animation, Key};
 use rayfold_pipeline::manifest::{FrameState, Manifest, Status};
 use rayfold_pipeline::render::Outcome;
 use rayfold_pipeline::retry::{Scope, retry};
 use rayfold_pipeline::store::{ListRequest, MemoryStore, PutOptions, Store};
-use rayfold_pipeline::studio::Studio;
 use rayfold_pipeline::{
     Clock, Invocation, Policy, Randomness, Result, Timestamp, assemble, render_frame, sweep,
 };
-
-static STUDIO: LazyLock<Studio> = LazyLock::new(Studio::default);
 
 /// A clock that jumps to wherever someone waits for.
 #[derive(Clone, Default)]
@@ -51,7 +50,7 @@ impl World {
             store: MemoryStore::new(clock.clone()),
             clock,
             random: Randomness::seeded(1),
-            policy: Policy::default(),
+            policy: Policy::new(rayfold_tracer::PIXEL_VERSION),
             delivered: BTreeSet::new(),
             events: 0,
         }
@@ -73,7 +72,7 @@ impl World {
         let id = format!("request-{}", self.events);
         let invocation = Invocation::new(&self.store, &self.clock, &self.random, &self.policy, &id);
         // The functions run on runtimes that move futures between threads.
-        let rendering = require_send(render_frame(&invocation, &*STUDIO, key)).await;
+        let rendering = require_send(render_frame(&invocation, &RayTracer::default(), key)).await;
         let outcome = rendering.unwrap().outcome;
         Box::pin(self.deliver()).await;
         outcome
@@ -89,7 +88,7 @@ impl World {
                 if prefix == "assemblies/" {
                     let invocation =
                         Invocation::new(&self.store, &self.clock, &self.random, &self.policy, &listed.key);
-                    require_send(assemble(&invocation, &*STUDIO, &listed.key)).await.unwrap();
+                    require_send(assemble(&invocation, &GifAnimator, &listed.key)).await.unwrap();
                 } else {
                     self.event(&listed.key).await;
                 }

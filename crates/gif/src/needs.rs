@@ -1,66 +1,66 @@
-//! What of a frame needs to be drawn.
+//! Which pixels of a frame need to be drawn.
 //!
-//! A frame is looked at before the one before it is drawn, so that both can be worked on at once. Where that one is left
-//! alone, what a viewer will see is known; where it is drawn, that each colour will be drawn with the palette's nearest
-//! is assumed, and the next look finds what was not.
+//! A frame is compared with what a viewer will see before it. That is known before the previous frame is drawn, so both
+//! frames can be worked on at once: where the previous frame leaves a pixel, the viewer sees what was seen before; where
+//! it draws one, the palette's nearest entry is assumed. Where another index was chosen, the next comparison finds it.
 //!
-//! Of what stays and is seen wrong, the worst of a tile ask to be drawn better, and those far from all changes only
-//! when together they are worth the larger block.
+//! The frame is divided into tiles. A tile whose changes are small is left as a whole. Of the pixels that stay as they were
+//! but are seen wrong, the worst of each tile are refined: drawn once more with a better colour. Tiles apart from all
+//! changes are refined only when together they are worth the larger block.
 
 use rayon::prelude::*;
 
-use crate::allowance::Still;
+use crate::allowance::StaticPixels;
 use crate::block::Area;
-use crate::colour::{self, Near};
+use crate::colour::{self, LocalMetric};
 use crate::histogram::Histogram;
-use crate::ink::Ink;
+use crate::nearest::Nearest;
 
-/// Width and height of what is drawn or left as a whole: single pixels drawn among others that are left cost as much
-/// as if all were drawn.
+/// Width and height of a tile, which is drawn or left as a whole: single pixels drawn among others that are left cost as
+/// many bytes as if all were drawn.
 const TILE: usize = 8;
-/// [Level error](colour::level_error) beyond that of a drawn pixel, in the mean of a tile, up to which the tile is left.
-pub(crate) const TOLERATED: f32 = 20.0;
-/// The same where the palette has all colours: there an error is seen more easily.
-pub(crate) const TOLERATED_IF_EXACT: f32 = 6.0;
-/// The level error of a pixel above which its tile is drawn in any case: almost three levels.
+/// A tile is left if its mean [level error](colour::level_error), beyond that of a drawn pixel, is at most this.
+pub(crate) const LEFT_ERROR: f32 = 20.0;
+/// The same where the palette has all colours of the frame: there an error is seen more easily.
+pub(crate) const LEFT_ERROR_IF_EXACT: f32 = 6.0;
+/// A tile with a pixel of a larger level error is never left: almost three levels.
 pub(crate) const GLARING: f32 = 50.0;
 /// The level error up to which a pixel that changes may be left in a tile that is drawn.
 const SEEN_RIGHT: f32 = 2.0;
-/// The squared error (see [`colour`]) above which a pixel that stays asks for a better colour.
+/// The squared error (see [`colour`]) above which a pixel that stays needs a better colour.
 const SEEN_WRONG: f32 = 1.5;
-
-/// The same, in parts of the mean of those of its tile: the worst are worth their flicker.
+/// Of these, the worst of a tile are refined: from this part of the tile's mean error on. Only they are worth the flicker.
 const AMONG_WORST: f32 = 0.8;
-/// How many pixels the area of a frame may grow by for each pixel that stays and is drawn better. Runs of pixels that are
-/// left are not for nothing: LZW learns their lengths one by one.
+/// How many pixels the area of a frame may grow by for each pixel that is refined. Even pixels that are left cost bytes:
+/// LZW learns the lengths of their runs one by one.
 const GROWN_BY: usize = 6;
 
-/// What a pixel asks for.
+/// What a pixel needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Need {
-    /// To be left alone.
-    Nothing,
-    /// Nothing, but may be drawn if that is no worse.
-    Free,
-    /// It stays as it was but is seen wrong: to be drawn if that is much better.
-    Better,
+    /// To be left as it is seen.
+    Keep,
+    /// To be left or drawn, whichever makes the file smaller.
+    Either,
+    /// It stays but is seen wrong: to be drawn with a colour that is much better, else left.
+    Refine,
     /// To be drawn.
     Draw,
 }
 
-/// The frame before, which is about to be drawn.
+/// The previous frame, which is about to be drawn.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Before<'a> {
+pub(crate) struct Previous<'a> {
     pub(crate) frame: &'a [[u8; 3]],
     pub(crate) needs: &'a [Need],
-    /// What a viewer sees until then.
+    /// What a viewer sees before it.
     pub(crate) seen: &'a [[u8; 3]],
-    /// Mean level error of what will be drawn.
+    /// Mean level error of what it draws.
     pub(crate) error: f32,
-    /// [Level error](colour::level_error) beyond that, in the mean of a tile, up to which the tile is left.
-    pub(crate) tolerated: f32,
-    /// What will be drawn with which squared error; `None`: all of it with none.
-    pub(crate) inks: Option<(&'a Histogram, &'a [Ink])>,
+    /// [`LEFT_ERROR`] or [`LEFT_ERROR_IF_EXACT`].
+    pub(crate) left_error: f32,
+    /// Its colours, and the nearest palette entry of each; `None`: it is drawn without error.
+    pub(crate) nearest: Option<(&'a Histogram, &'a [Nearest])>,
 }
 
 /// What pixels need, row by row.
@@ -76,61 +76,65 @@ pub(crate) struct Needs {
 struct TileNeeds {
     /// Whether any of it is to be drawn because it changes.
     changes: bool,
-    /// How many pixels stay, are seen wrong and ask for a better colour, and the mean of their squared errors.
+    /// How many pixels are to be refined, and the mean of their squared errors.
     wrong: u32,
     error: f32,
 }
 
 impl Needs {
     /// All of a frame is to be drawn.
-    pub(crate) fn want_all(&mut self, width: usize, pixels: usize) {
+    pub(crate) fn draw_all(&mut self, width: usize, pixels: usize) {
         self.width = width;
         self.pixels.clear();
         self.pixels.resize(pixels, Need::Draw);
         self.tiles.clear();
     }
 
-    /// Looks at a frame; `refining`: whether pixels that stay may be drawn better.
-    pub(crate) fn look(
+    /// Compares a frame with the one before it. `refining`: whether pixels that stay may be refined. Returns those that
+    /// stay.
+    pub(crate) fn compare(
         &mut self,
         pixels: &[[u8; 3]],
         width: usize,
-        before: Before<'_>,
+        previous: Previous<'_>,
         refining: bool,
-    ) -> Still {
+    ) -> StaticPixels {
         self.width = width;
         self.pixels.resize(pixels.len(), Need::Draw);
         self.tiles.resize(width.div_ceil(TILE) * pixels.len().div_ceil(TILE * width), TileNeeds::default());
-        let refine = refining.then(Near::new);
+        let metric = refining.then(LocalMetric::new);
         let bands =
             self.pixels.par_chunks_mut(TILE * width).zip(self.tiles.par_chunks_mut(width.div_ceil(TILE)));
-        let looked = bands.enumerate().fold(Still::none, |mut still, (number, (needs, tiles))| {
+        let compared = bands.enumerate().fold(StaticPixels::none, |mut still, (number, (needs, tiles))| {
             let start = number * TILE * width;
             let part = &pixels[start..start + needs.len()];
-            look_at_band(part, width, before.part(start, needs.len()), refine, needs, tiles, &mut still);
+            compare_band(part, width, previous.part(start, needs.len()), metric, needs, tiles, &mut still);
             still
         });
-        looked.reduce(Still::none, Still::join)
+        compared.reduce(StaticPixels::none, StaticPixels::join)
     }
 
-    /// Leaves what stays alone where it lies apart from what changes, unless it is much for the area that it adds, or has
-    /// `waited` for so many frames. `least`: the error from which a tile may be drawn better. Gives how long it has waited.
+    /// Refines no tile outside of the area that changes, unless what is refined there is worth the pixels that the area
+    /// grows by. It becomes worth more with each frame that it has waited for.
+    ///
+    /// `least`: the error from which a tile may be refined. `waited`: frames in a row that refined nothing outside, plus
+    /// one. Returns the new `waited`.
     pub(crate) fn confine(&mut self, least: f32, waited: usize) -> usize {
         let columns = self.width.div_ceil(TILE);
         let Some(inside) = Area::around(&self.tiles, columns, |tile| tile.changes) else { return waited };
-        let (mut all, mut apart) = (inside, 0);
+        let (mut all, mut outside) = (inside, 0);
         for (at, tile) in self.tiles.iter().enumerate() {
             let (x, y) = (at % columns, at / columns);
             if tile.wrong > 0 && tile.error >= least && !inside.contains(x, y) {
-                apart += tile.wrong as usize;
+                outside += tile.wrong as usize;
                 all = all.with(x, y);
             }
         }
         let added = (all.size() - inside.size()) * TILE * TILE;
-        if apart == 0 {
+        if outside == 0 {
             return waited;
         }
-        if apart * waited * GROWN_BY >= added {
+        if outside * waited * GROWN_BY >= added {
             return 1;
         }
         for (at, tile) in self.tiles.iter_mut().enumerate() {
@@ -141,8 +145,9 @@ impl Needs {
         waited + 1
     }
 
-    /// Counts the colours that are to be drawn, those of pixels that stay only from an error of their tile on. Gives the
-    /// number of pixels that are drawn because they changed.
+    /// Counts the colours of the pixels that are to be drawn or refined, into `all` with the help of `others`, each of
+    /// which takes a part of the frame. Pixels of tiles with an error below `least` are not refined, but kept. Returns how
+    /// many pixels are to be drawn.
     pub(crate) fn count(
         &mut self,
         pixels: &[[u8; 3]],
@@ -160,12 +165,12 @@ impl Needs {
             let (mut last, mut run) = ([0; 3], 0);
             for (at, need) in (number * part..).zip(needs) {
                 match need {
-                    Need::Nothing | Need::Free => continue,
-                    Need::Better if tiles[at / width / TILE * columns + at % width / TILE].error < least => {
-                        *need = Need::Nothing;
+                    Need::Keep | Need::Either => continue,
+                    Need::Refine if tiles[at / width / TILE * columns + at % width / TILE].error < least => {
+                        *need = Need::Keep;
                         continue;
                     }
-                    Need::Better => (),
+                    Need::Refine => (),
                     Need::Draw => changed += 1,
                 }
                 if pixels[at] != last {
@@ -186,11 +191,11 @@ impl Needs {
     }
 }
 
-impl<'a> Before<'a> {
+impl<'a> Previous<'a> {
     /// The squared error with which a colour will be drawn.
     fn error_of(&self, rgb: [u8; 3]) -> f32 {
-        let ink = self.inks.and_then(|(histogram, inks)| inks.get(histogram.find(rgb)?));
-        ink.map_or(0.0, |ink| ink.error)
+        let entry = self.nearest.and_then(|(histogram, nearest)| nearest.get(histogram.find(rgb)?));
+        entry.map_or(0.0, |entry| entry.error)
     }
 
     fn part(self, start: usize, count: usize) -> Self {
@@ -200,24 +205,24 @@ impl<'a> Before<'a> {
             needs: &self.needs[range.clone()],
             seen: &self.seen[range],
             error: self.error,
-            tolerated: self.tolerated,
-            inks: self.inks,
+            left_error: self.left_error,
+            nearest: self.nearest,
         }
     }
 }
 
-/// Looks at a row of tiles.
-fn look_at_band(
+/// Compares a row of tiles.
+fn compare_band(
     pixels: &[[u8; 3]],
     width: usize,
-    before: Before<'_>,
-    refine: Option<Near>,
+    previous: Previous<'_>,
+    refine: Option<LocalMetric>,
     needs: &mut [Need],
     tiles: &mut [TileNeeds],
-    still: &mut Still,
+    still: &mut StaticPixels,
 ) {
-    if refine.is_none() && pixels == before.frame {
-        needs.fill(Need::Nothing);
+    if refine.is_none() && pixels == previous.frame {
+        needs.fill(Need::Keep);
         tiles.fill(TileNeeds::default());
         still.count(needs.len());
         return;
@@ -228,21 +233,21 @@ fn look_at_band(
         let rows = (left..needs.len()).step_by(width);
         for (row, start) in rows.clone().enumerate() {
             let part = start..start + count;
-            tile.look(row, &pixels[part.clone()], before.part(start, count), &mut needs[part], still);
+            tile.compare(row, &pixels[part.clone()], previous.part(start, count), &mut needs[part], still);
         }
         *needed = tile.needs();
         if tile.wrong > 0 {
             for (row, start) in rows.clone().enumerate() {
-                tile.leave_the_rest(row, &mut needs[start..start + count], still);
+                tile.keep_the_rest(row, &mut needs[start..start + count], still);
             }
             still.count_wrong(u64::from(needed.wrong), needed.error);
         }
-        if tile.may_be_left(before.tolerated) {
+        if tile.may_be_left(previous.left_error) {
             needed.changes = false;
             for start in rows {
                 for need in &mut needs[start..start + count] {
-                    if matches!(need, Need::Draw | Need::Free) {
-                        *need = Need::Nothing;
+                    if matches!(need, Need::Draw | Need::Either) {
+                        *need = Need::Keep;
                     }
                 }
             }
@@ -253,10 +258,10 @@ fn look_at_band(
 /// What is known of a tile's pixels.
 #[derive(Debug)]
 struct Tile {
-    /// Given where pixels that stay may be drawn better.
-    refine: Option<Near>,
+    /// Given if pixels that stay may be refined.
+    refine: Option<LocalMetric>,
     pixels: usize,
-    /// Level error beyond that of a drawn pixel, of all that changed, and the largest level error of one.
+    /// The sum of the level errors of all that changed, beyond that of a drawn pixel, and the largest level error of one.
     excess: f32,
     worst: f32,
     /// Pixels that stay and are seen wrong, the sum of their squared errors, and each of these.
@@ -266,7 +271,7 @@ struct Tile {
 }
 
 impl Tile {
-    fn new(refine: Option<Near>) -> Self {
+    fn new(refine: Option<LocalMetric>) -> Self {
         Self {
             refine,
             pixels: 0,
@@ -278,60 +283,61 @@ impl Tile {
         }
     }
 
-    /// Notes what the pixels of a row need.
-    fn look(
+    /// Decides what the pixels of a row need.
+    fn compare(
         &mut self,
         row: usize,
         pixels: &[[u8; 3]],
-        before: Before<'_>,
+        previous: Previous<'_>,
         needs: &mut [Need],
-        still: &mut Still,
+        still: &mut StaticPixels,
     ) {
         self.pixels += pixels.len();
-        if self.refine.is_none() && pixels == before.frame {
-            needs.fill(Need::Nothing);
+        if self.refine.is_none() && pixels == previous.frame {
+            needs.fill(Need::Keep);
             still.count(needs.len());
             return;
         }
-        // By number: five iterators in one are not always inlined, which costs a tenth of the encoder's time.
+        // By index: five zipped iterators are not always inlined, which costs a tenth of the encoder's time.
         let count = pixels.len();
-        let (frame, shown, drawn) = (&before.frame[..count], &before.seen[..count], &before.needs[..count]);
+        let (frame, shown, drawn) =
+            (&previous.frame[..count], &previous.seen[..count], &previous.needs[..count]);
         for (k, need) in needs[..count].iter_mut().enumerate() {
             let (now, was, seen) = (pixels[k], frame[k], shown[k]);
-            let left = drawn[k] == Need::Nothing;
+            let left = drawn[k] == Need::Keep;
             *need = if now == was {
                 let error = match self.refine {
-                    Some(near) if left && now != seen => near.error(now, seen),
-                    Some(_) if !left => before.error_of(now),
+                    Some(metric) if left && now != seen => metric.error(now, seen),
+                    Some(_) if !left => previous.error_of(now),
                     _ => 0.0,
                 };
                 if error > SEEN_WRONG {
                     self.wrong += 1;
                     self.sum_wrong += error;
                     self.errors[row * TILE + k] = error;
-                    Need::Better
+                    Need::Refine
                 } else {
                     still.count(1);
-                    Need::Nothing
+                    Need::Keep
                 }
             } else {
                 let error = colour::level_error(now, if left { seen } else { was }) as f32;
                 if left {
-                    self.excess += (error - before.error).max(0.0);
+                    self.excess += (error - previous.error).max(0.0);
                 } else {
                     self.excess += error;
                 }
                 self.worst = self.worst.max(error);
                 match error {
-                    0.0 => Need::Nothing,
+                    0.0 => Need::Keep,
                     error if error > SEEN_RIGHT => Need::Draw,
-                    _ => Need::Free,
+                    _ => Need::Either,
                 }
             };
         }
     }
 
-    /// The error from which on pixels that stay are among the worst.
+    /// The error from which on a pixel that stays is among the worst.
     fn least_wrong(&self) -> f32 {
         AMONG_WORST * self.sum_wrong / self.wrong.max(1) as f32
     }
@@ -347,19 +353,19 @@ impl Tile {
         TileNeeds { changes, wrong, error: sum / wrong as f32 }
     }
 
-    /// Leaves those of a row alone that are not among the worst.
-    fn leave_the_rest(&self, row: usize, needs: &mut [Need], still: &mut Still) {
+    /// Keeps the pixels of a row that are not among the worst.
+    fn keep_the_rest(&self, row: usize, needs: &mut [Need], still: &mut StaticPixels) {
         let least = self.least_wrong();
         for (need, &error) in needs.iter_mut().zip(&self.errors[row * TILE..]) {
-            if *need == Need::Better && error < least {
-                *need = Need::Nothing;
+            if *need == Need::Refine && error < least {
+                *need = Need::Keep;
                 still.count(1);
             }
         }
     }
 
-    fn may_be_left(&self, tolerated: f32) -> bool {
-        self.excess <= tolerated * self.pixels as f32 && self.worst <= GLARING
+    fn may_be_left(&self, left_error: f32) -> bool {
+        self.excess <= left_error * self.pixels as f32 && self.worst <= GLARING
     }
 }
 
@@ -367,7 +373,7 @@ impl Tile {
 mod tests {
     use super::*;
 
-    /// 20 x 20 tiles, of which the first changes and those given ask for better colours.
+    /// 20 x 20 tiles, of which the first changes and those given are to be refined.
     fn needs(wrong: &[(usize, usize)]) -> Needs {
         let mut tiles = vec![TileNeeds::default(); 400];
         tiles[0].changes = true;
@@ -400,34 +406,34 @@ mod tests {
         beside.tiles[0].changes = true;
         assert_eq!(beside.confine(2.0, 3), 4);
         assert!(beside.tiles[0].error >= 2.0 && beside.tiles[399].error < 2.0);
-        // Nothing asks, or not enough.
+        // There is nothing to refine, or its error is too small.
         assert_eq!(needs(&[]).confine(2.0, 3), 3);
         assert_eq!(needs(&[(19, 19)]).confine(10.0, 3), 3);
     }
 
     #[test]
-    fn the_worst_of_a_tile_are_drawn_better() {
+    fn the_worst_of_a_tile_are_refined() {
         let pixels = [[100; 3]; 64];
         let mut seen = pixels;
         // Half of the tile is a little wrong, the other half much.
         seen[..32].fill([103, 100, 100]);
         seen[32..].fill([112, 100, 100]);
-        let needs = [Need::Nothing; 64];
-        let before = Before {
+        let needs = [Need::Keep; 64];
+        let previous = Previous {
             frame: &pixels,
             needs: &needs,
             seen: &seen,
             error: 0.0,
-            tolerated: TOLERATED,
-            inks: None,
+            left_error: LEFT_ERROR,
+            nearest: None,
         };
         let mut found = Needs::default();
-        let _ = found.look(&pixels, 8, before, true);
-        assert!(found.pixels[..32].iter().all(|&need| need == Need::Nothing));
-        assert!(found.pixels[32..].iter().all(|&need| need == Need::Better));
+        let _ = found.compare(&pixels, 8, previous, true);
+        assert!(found.pixels[..32].iter().all(|&need| need == Need::Keep));
+        assert!(found.pixels[32..].iter().all(|&need| need == Need::Refine));
         let [tile] = found.tiles[..] else { panic!("{:?}", found.tiles) };
         assert_eq!((tile.changes, tile.wrong), (false, 32));
-        let error = Near::new().error(pixels[0], seen[63]);
+        let error = LocalMetric::new().error(pixels[0], seen[63]);
         assert!((tile.error - error).abs() < 0.001 * error, "{} for {error}", tile.error);
     }
 }
