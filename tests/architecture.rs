@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
+#[path = "architecture/circles.rs"]
+mod circles;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -63,6 +66,9 @@ const OUTSIDE_THE_CORE: &[&str] = &[
     "getrandom",
 ];
 
+/// Crates whose modules still use one another in circles. None is added here: a circle is cut.
+const STILL_IN_CIRCLES: &[&str] = &["tracer"];
+
 /// Lines of a source file; beyond it a file holds more than one responsibility.
 const LONGEST_FILE: usize = 800;
 
@@ -110,6 +116,24 @@ fn the_core_sees_no_runtime_network_clock_or_randomness() {
             "{core} has no dependencies at all: is this test still looking in the right place?"
         );
     }
+}
+
+#[test]
+fn no_modules_use_one_another_in_a_circle() {
+    let read = |path: &Path| std::fs::read_to_string(path).ok();
+    let mut told = Vec::new();
+    for folder in std::fs::read_dir(root().join("crates")).unwrap().map(|entry| entry.unwrap()) {
+        let name = folder.file_name().into_string().unwrap();
+        let roots = crate_roots(&folder.path().join("src"));
+        assert!(!roots.is_empty(), "crates/{name} has neither a library nor a program");
+        let circles: Vec<_> = roots.iter().flat_map(|root| circles::circles(root, &read)).collect();
+        if STILL_IN_CIRCLES.contains(&name.as_str()) {
+            assert!(!circles.is_empty(), "crates/{name} has no circle any more: take it off the list");
+        } else {
+            told.extend(circles.into_iter().map(|circle| format!("crates/{name}: {circle}")));
+        }
+    }
+    assert!(told.is_empty(), "modules that use one another in a circle:\n{}", told.join("\n"));
 }
 
 #[test]
@@ -211,6 +235,12 @@ fn every_crate_takes_lints_and_dependencies_from_the_workspace() {
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
+}
+
+/// The files that crates in `src` begin with: a library, a program, or several.
+fn crate_roots(src: &Path) -> Vec<PathBuf> {
+    let named = ["lib.rs", "main.rs"].map(|name| src.join(name)).into_iter().filter(|path| path.exists());
+    named.chain(rust_files(&src.join("bin"))).collect()
 }
 
 /// Of this machine's platform alone: the packages of others need not be on the disk.

@@ -14,15 +14,17 @@ use rayfold_tracer::MAX_BOUNCES;
 
 use crate::backends;
 use crate::cpu_time::{self, median};
-use crate::hard_cases::{CASES, SEED, Size, one_of_each};
+use crate::hard_cases::{CASES, Report, Run, Size, one_of_each};
 use crate::plot::{Labels, Series, log_log};
 use crate::scenes::{EXAMPLES, example, rock, table};
+pub(crate) use naive::NAME as NAIVE;
+
 use images::{Comparison, DEEPEST, Measurement, Subject, compare};
 
 /// What to measure.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that receives accuracy.md, or hard-cases.md, and plots
+    /// The folder that receives accuracy.md and plots, or hard-cases.md and the figures of its cases
     #[arg(long, default_value = "docs/reports")]
     output: PathBuf,
     /// Small images, each drawn once; hard cases at the sizes of the tests
@@ -34,6 +36,9 @@ pub struct Args {
     /// Of the hard cases only this one
     #[arg(long, requires = "hard_cases")]
     case: Option<String>,
+    /// Measure nothing: write the page on the hard cases anew from the figures beside it
+    #[arg(long, requires = "hard_cases", conflicts_with = "case")]
+    page: bool,
 }
 
 /// Measures and writes the report.
@@ -42,9 +47,10 @@ pub struct Args {
 /// When a scene cannot be rendered or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     std::fs::create_dir_all(&args.output)?;
-    let (name, report) = if args.hard_cases {
-        ("hard-cases.md", hard_cases(if args.quick { Size::Quick } else { Size::Full }, args)?)
-    } else {
+    if args.hard_cases {
+        return hard_cases(args);
+    }
+    let report = {
         let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
         let subjects = subjects(args.quick)?;
         let mut comparisons = Vec::new();
@@ -54,9 +60,9 @@ pub fn run(args: &Args) -> Result<()> {
         }
         let cost = one.install(|| cost_of_robustness(&subjects, args.quick))?;
         let plots = plots(&args.output, &comparisons)?;
-        ("accuracy.md", introduction(args.quick) + &cost + &plots + &tables(&comparisons)?)
+        introduction(args.quick) + &cost + &plots + &tables(&comparisons)?
     };
-    let path = args.output.join(name);
+    let path = args.output.join("accuracy.md");
     std::fs::write(&path, report).with_context(|| path.display().to_string())
 }
 
@@ -225,49 +231,24 @@ fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
     Ok(text)
 }
 
-/// The hard cases as a table.
-fn hard_cases(size: Size, args: &Args) -> Result<String> {
-    let mut backends = backends::all();
-    backends.push(naive::backend());
-    let textbook = naive::backend().name;
-    let quick = if size == Size::Quick { " --quick" } else { "" };
-    let mut text = String::from(
-        "| case | what | way | figure | bound | of | |\n| --- | --- | --- | --- | --- | --- | --- |\n",
-    );
-    let head = format!(
-        "# Hard cases\n\nWritten by `cargo run --release -p rayfold-bench -- accuracy --hard-cases{quick}`; all figures are \
-         of one run. Seed {SEED}. A figure is the worst or the count found. The bounds are those of \
-         `tests/hard_cases.rs`, which holds every way but the naive one to them at quick sizes. `f32 naive, scalar` is a \
-         tracer of textbook formulas with an absolute epsilon, written for this table.\n\n"
-    );
-    let chosen = |number: &str| args.case.as_ref().is_none_or(|case| case == number);
-    let mut beyond: Vec<String> = Vec::new();
-    let mut times = String::from("\nSeconds by the clock that each case took, all ways together:");
-    for case in CASES.iter().filter(|case| chosen(case.number)) {
-        let began = Instant::now();
-        for figure in case.figures(&backends, size)? {
-            let bound = figure.bound.map_or("none".into(), |bound| format!("{bound:.1e}"));
-            let verdict = if figure.passes() { "ok" } else { "**fails**" };
-            if !figure.passes() && figure.backend != textbook {
-                beyond.push(format!(
-                    "- {} {}, {}: {}, {:.2e} where {bound} is asked for, of {}\n",
-                    case.number, case.title, figure.backend, figure.what, figure.measured, figure.samples
-                ));
-            }
-            writeln!(
-                text,
-                "| {} {} | {} | {} | {:.2e} | {bound} | {} | {verdict} |",
-                case.number, case.title, figure.what, figure.backend, figure.measured, figure.samples
-            )?;
+/// Measures the hard cases, or one of them, and writes their report: the page and the files beside it.
+fn hard_cases(args: &Args) -> Result<()> {
+    let size = if args.quick { Size::Quick } else { Size::Full };
+    let folder = args.output.join("hard-cases");
+    let mut report = Report::read(&folder)?;
+    if !args.page {
+        let mut backends = backends::all();
+        backends.push(naive::backend());
+        let chosen = |number: &str| args.case.as_ref().is_none_or(|case| case == number);
+        for case in CASES.iter().filter(|case| chosen(case.number)) {
+            let began = Instant::now();
+            let figures = case.figures(&backends, size)?;
+            let seconds = began.elapsed().as_secs_f64();
+            eprintln!("hard case {}: {}, {seconds:.1} s", case.number, case.title);
+            report.add(Run::now(case, size, seconds), figures);
         }
-        eprintln!("hard case {}: {}, {:.1} s", case.number, case.title, began.elapsed().as_secs_f64());
-        write!(times, " {}: {:.0};", case.number, began.elapsed().as_secs_f64())?;
+        report.write(&folder)?;
     }
-    let verdict = match beyond.len() {
-        0 => "All figures of the other ways are within their bounds.\n\n".to_owned(),
-        count => {
-            format!("Of the other ways {count} figures are beyond their bounds:\n\n{}\n", beyond.concat())
-        }
-    };
-    Ok(head + &verdict + &text + times.trim_end_matches(';') + ".\n")
+    let path = args.output.join("hard-cases.md");
+    std::fs::write(&path, report.page(NAIVE)?).with_context(|| path.display().to_string())
 }

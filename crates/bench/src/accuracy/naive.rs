@@ -14,10 +14,13 @@ use crate::scenes::pixel_ray;
 /// How far from a surface a ray starts, in world units, as if all scenes had the same size.
 const EPSILON: f32 = 1e-4;
 
+/// What reports call it.
+pub(crate) const NAME: &str = "f32 naive, scalar";
+
 /// The backend itself.
 pub(crate) fn backend() -> Backend {
     Backend::new(
-        "f32 naive, scalar",
+        NAME,
         Arithmetic::Single,
         |scene, rays| {
             let objects: Vec<Shape> = scene.objects.iter().map(Shape::from).collect();

@@ -12,6 +12,7 @@ mod extremes;
 mod figures;
 mod images;
 mod nasty;
+mod report;
 mod searched;
 mod setup;
 mod spheres;
@@ -24,6 +25,7 @@ use crate::backends::Backend;
 
 pub use figures::{Figure, Size};
 pub(crate) use nasty::one_of_each;
+pub use report::{Report, Run};
 
 use figures::Figures;
 
@@ -36,6 +38,8 @@ pub struct Case {
     pub number: &'static str,
     /// What makes it hard.
     pub title: &'static str,
+    /// What must be right all the same.
+    pub asked: &'static str,
     run: fn(&[Backend], Size, &mut Figures) -> Result<()>,
 }
 
@@ -53,29 +57,154 @@ impl Case {
 
 /// All hard cases.
 pub const CASES: &[Case] = &[
-    Case { number: "1-2", title: "a sphere at 10 to 1e6 radii", run: spheres::distant },
-    Case { number: "3", title: "a sphere of radius 1e7 from height 1", run: spheres::horizon },
-    Case { number: "4", title: "tangent rays", run: spheres::tangent },
-    Case { number: "5", title: "an origin on or in a sphere or box", run: spheres::inside },
-    Case { number: "6", title: "radii 1e7 : 1 in one scene", run: spheres::giant_and_dwarf },
-    Case { number: "7", title: "scaled by powers of two", run: images::scaled_by_two },
-    Case { number: "8", title: "scaled by powers of ten", run: images::scaled_by_ten },
-    Case { number: "9", title: "a scene of size 1 at offset 1e6", run: images::far_from_the_origin },
-    Case { number: "10", title: "shared edges", run: triangles::shared_edges },
-    Case { number: "11", title: "shared vertices", run: triangles::shared_vertices },
-    Case { number: "12", title: "a needle triangle 1e6 : 1", run: triangles::needles },
-    Case { number: "13", title: "degenerate triangles", run: triangles::degenerate },
-    Case { number: "14", title: "rays in a triangle's plane", run: triangles::in_plane },
-    Case { number: "15-16", title: "rays parallel to slabs, with +0 and -0", run: boxes::parallel },
-    Case { number: "17", title: "a BVH against brute force", run: triangles::tree_or_not },
-    Case { number: "18", title: "flat boxes", run: boxes::flat },
-    Case { number: "19", title: "subnormal, huge and infinite inputs", run: extremes::inputs },
-    Case { number: "20", title: "lit convex objects", run: images::acne },
-    Case { number: "21", title: "a contact shadow", run: images::contact_shadow },
-    Case { number: "22", title: "grazing light on a coarse mesh", run: images::grazing_light },
-    Case { number: "23", title: "mirror spheres face to face", run: bounces::face_to_face },
-    Case { number: "24", title: "identical objects", run: ties::identical },
-    Case { number: "25", title: "random scenes", run: nasty::scenes },
-    Case { number: "26", title: "random scenes as people write them", run: everyday::scenes },
-    Case { number: "27", title: "random scenes searched in every way", run: searched::scenes },
+    Case {
+        number: "1-2",
+        title: "a sphere at 10 to 1e6 radii",
+        asked: "hit or miss right but for 4 ulp of the distance beside the limb, distances to 1e-6 of themselves (f64: 1e-8 of the radius)",
+        run: spheres::distant,
+    },
+    Case {
+        number: "3",
+        title: "a sphere of radius 1e7 from height 1",
+        asked: "the distance to the ground to 5 parts in a million, down to the horizon",
+        run: spheres::horizon,
+    },
+    Case {
+        number: "4",
+        title: "tangent rays",
+        asked: "hit or miss right but for 4 ulp of the radius, along the axes and askew",
+        run: spheres::tangent,
+    },
+    Case {
+        number: "5",
+        title: "an origin on or in a sphere or box",
+        asked: "of two roots the right one",
+        run: spheres::inside,
+    },
+    Case {
+        number: "6",
+        title: "radii 1e7 : 1 in one scene",
+        asked: "each pixel shows what the oracle sees within half a pixel of it",
+        run: spheres::giant_and_dwarf,
+    },
+    Case {
+        number: "7",
+        title: "scaled by powers of two",
+        asked: "the same picture bit for bit",
+        run: images::scaled_by_two,
+    },
+    Case {
+        number: "8",
+        title: "scaled by powers of ten",
+        asked: "the same picture but for 0.05 % of its pixels",
+        run: images::scaled_by_ten,
+    },
+    Case {
+        number: "9",
+        title: "a scene of size 1 at offset 1e6",
+        asked: "the same picture but for 0.05 % of its pixels",
+        run: images::far_from_the_origin,
+    },
+    Case {
+        number: "10",
+        title: "shared edges",
+        asked: "no ray slips through a closed surface at an edge",
+        run: triangles::shared_edges,
+    },
+    Case {
+        number: "11",
+        title: "shared vertices",
+        asked: "no ray slips through a closed surface at a corner",
+        run: triangles::shared_vertices,
+    },
+    Case {
+        number: "12",
+        title: "a needle triangle 1e6 : 1",
+        asked: "hit or miss right but for 4 ulp beside the edge, distances to 16 ulp",
+        run: triangles::needles,
+    },
+    Case {
+        number: "13",
+        title: "degenerate triangles",
+        asked: "never hit, and told when the script is read",
+        run: triangles::degenerate,
+    },
+    Case {
+        number: "14",
+        title: "rays in a triangle's plane",
+        asked: "never a hit",
+        run: triangles::in_plane,
+    },
+    Case {
+        number: "15-16",
+        title: "rays parallel to slabs, with +0 and -0",
+        asked: "hits, misses and normals right, distances to 4 ulp",
+        run: boxes::parallel,
+    },
+    Case {
+        number: "17",
+        title: "a BVH against brute force",
+        asked: "the same object, whichever way it is looked for",
+        run: triangles::tree_or_not,
+    },
+    Case {
+        number: "18",
+        title: "flat boxes",
+        asked: "a rectangle, a segment or a point: hits, misses and normals right, distances to 4 ulp",
+        run: boxes::flat,
+    },
+    Case {
+        number: "19",
+        title: "subnormal, huge and infinite inputs",
+        asked: "what is infinite is refused, everything else is drawn as by the oracle",
+        run: extremes::inputs,
+    },
+    Case {
+        number: "20",
+        title: "lit convex objects",
+        asked: "no spot in the shadow of its own surface",
+        run: images::acne,
+    },
+    Case {
+        number: "21",
+        title: "a contact shadow",
+        asked: "no light leaks in under a body that all but touches the floor",
+        run: images::contact_shadow,
+    },
+    Case {
+        number: "22",
+        title: "grazing light on a coarse mesh",
+        asked: "no facet shades itself",
+        run: images::grazing_light,
+    },
+    Case {
+        number: "23",
+        title: "mirror spheres face to face",
+        asked: "the direction after 5 bounces right to 1e-4 of what a small change grows to",
+        run: bounces::face_to_face,
+    },
+    Case {
+        number: "24",
+        title: "identical objects",
+        asked: "the first in the script is seen, on any number of threads",
+        run: ties::identical,
+    },
+    Case {
+        number: "25",
+        title: "random scenes",
+        asked: "at most 0.01 % of the pixels other than the oracle's",
+        run: nasty::scenes,
+    },
+    Case {
+        number: "26",
+        title: "random scenes as people write them",
+        asked: "at most 0.01 % of the pixels other than the oracle's",
+        run: everyday::scenes,
+    },
+    Case {
+        number: "27",
+        title: "random scenes searched in every way",
+        asked: "the same picture bit for bit",
+        run: searched::scenes,
+    },
 ];

@@ -38,7 +38,7 @@ use aws_smithy_http_client::tls::{Provider, rustls_provider::CryptoMode};
 use aws_types::service_config::ServiceConfigKey;
 use bytes::{Bytes, BytesMut};
 
-use super::{Condition, ETag, ListPage, ListRequest, Listed, Object, ObjectInfo, PAGE, PutOptions, Store};
+use super::{ETag, ListPage, ListRequest, Listed, Object, ObjectInfo, PAGE, PutOptions, Store};
 use crate::clock::Timestamp;
 use crate::{Error, Result};
 
@@ -46,6 +46,7 @@ pub use admin::Notification;
 pub use upload::S3Upload;
 
 use answers::{decoded, error_of, status};
+use upload::headers;
 
 /// Of one request, the repetitions not counted in: longer than any object of the pipeline takes.
 const READ_TIMEOUT: Duration = Duration::from_secs(30);
@@ -255,15 +256,6 @@ impl Store for S3Store {
 
     async fn upload(&self, key: &str, options: PutOptions) -> Result<Self::Upload> {
         Ok(S3Upload::new(self.clone(), key, options))
-    }
-}
-
-/// `If-None-Match` and `If-Match`.
-fn headers(condition: &Condition) -> (Option<String>, Option<String>) {
-    match condition {
-        Condition::Always => (None, None),
-        Condition::IfAbsent => (Some("*".to_owned()), None),
-        Condition::IfMatch(etag) => (None, Some(format!("\"{etag}\""))),
     }
 }
 

@@ -6,9 +6,9 @@ use aws_sdk_s3::primitives::ByteStream;
 use aws_sdk_s3::types::{CompletedMultipartUpload, CompletedPart};
 use bytes::{Bytes, BytesMut};
 
+use super::S3Store;
 use super::answers::error_of;
-use super::{S3Store, headers};
-use crate::store::{ETag, PutOptions, Store, Upload};
+use crate::store::{Condition, ETag, PutOptions, Store, Upload};
 use crate::{Error, Result};
 
 /// Of all parts but the last. S3 allows 10,000 parts of at least 5 MiB: this allows objects of 78 GiB.
@@ -146,5 +146,14 @@ impl Upload for S3Upload {
             Some(id) => self.give_up(id).await,
             None => Ok(()),
         }
+    }
+}
+
+/// `If-None-Match` and `If-Match`.
+pub(super) fn headers(condition: &Condition) -> (Option<String>, Option<String>) {
+    match condition {
+        Condition::Always => (None, None),
+        Condition::IfAbsent => (Some("*".to_owned()), None),
+        Condition::IfMatch(etag) => (None, Some(format!("\"{etag}\""))),
     }
 }
