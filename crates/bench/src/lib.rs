@@ -10,6 +10,7 @@ pub mod accuracy;
 #[cfg(feature = "bucket")]
 pub mod cold_start;
 pub mod cpu_time;
+pub mod fingerprints;
 pub mod gif;
 pub mod hard_cases;
 pub mod measure;
