@@ -72,6 +72,8 @@ pub(super) struct Hits<E> {
     pub(super) color: Columns<E>,
     /// For each packet with hits: where it begins, and the spheres that can be in its light, as bits.
     pub(super) packets: Vec<(usize, u64)>,
+    /// For each packet with mirrors: where it begins, and the lanes that meet them, as bits.
+    pub(super) mirrors: Vec<(usize, u64)>,
 }
 
 impl<E: Real> Hits<E> {
@@ -84,6 +86,7 @@ impl<E: Real> Hits<E> {
             diffuse: columns(),
             color: columns(),
             packets: Vec::with_capacity(PIXELS),
+            mirrors: Vec::new(),
         }
     }
 

@@ -124,32 +124,36 @@ impl<E: Real, By: Formulas<E>> Kernel<E> for Unfitted<By> {
     const FITTED: bool = false;
 }
 
-/// Calls a step in the variant that fits the kinds that are looked for, and whether on lists and down a tree:
-/// `fitted!(N, kinds, tree, C T D => step::<Variant<By, C, T, D>>(...))` evaluates the last with the constants `C`, `T`
-/// and `D` of the variant that fits, in the kernel `N`.
+/// Calls a step in the variant that fits the kinds that are looked for: `fitted!(N, kinds, C T => step::<Variant<By, C, T,
+/// false>>(...))` evaluates the last with the constants `C` and `T` of that variant, in the kernel `N`. A step that looks
+/// for objects itself also fits whether it does on lists and down a tree: `fitted!(N, kinds, tree, C T D => ...)`.
 macro_rules! fitted {
     ($kernel:ident, $kinds:expr, $tree:expr, $c:ident $t:ident $d:ident => $step:expr) => {
+        if $kernel::FITTED && !$tree {
+            const $d: bool = false;
+            fitted!($kernel, $kinds, $c $t => $step)
+        } else {
+            const $d: bool = true;
+            fitted!($kernel, $kinds, $c $t => $step)
+        }
+    };
+    ($kernel:ident, $kinds:expr, $c:ident $t:ident => $step:expr) => {
         if $kernel::FITTED {
             // Kinds that are not named here are looked for by what looks for all.
             let $crate::fast::kind::ByKind { spheres: _, cuboids, triangles } = $kinds;
-            match ($tree, cuboids, triangles) {
-                (false, false, false) => fitted!(@ $c $t $d, false, false, false => $step),
-                (false, false, true) => fitted!(@ $c $t $d, false, true, false => $step),
-                (false, true, false) => fitted!(@ $c $t $d, true, false, false => $step),
-                (false, true, true) => fitted!(@ $c $t $d, true, true, false => $step),
-                (true, false, false) => fitted!(@ $c $t $d, false, false, true => $step),
-                (true, false, true) => fitted!(@ $c $t $d, false, true, true => $step),
-                (true, true, false) => fitted!(@ $c $t $d, true, false, true => $step),
-                (true, true, true) => fitted!(@ $c $t $d, true, true, true => $step),
+            match (cuboids, triangles) {
+                (false, false) => fitted!(@ $c false, $t false => $step),
+                (false, true) => fitted!(@ $c false, $t true => $step),
+                (true, false) => fitted!(@ $c true, $t false => $step),
+                (true, true) => fitted!(@ $c true, $t true => $step),
             }
         } else {
-            fitted!(@ $c $t $d, true, true, true => $step)
+            fitted!(@ $c true, $t true => $step)
         }
     };
-    (@ $c:ident $t:ident $d:ident, $cuboids:literal, $triangles:literal, $tree:literal => $step:expr) => {{
+    (@ $c:ident $cuboids:literal, $t:ident $triangles:literal => $step:expr) => {{
         const $c: bool = $cuboids;
         const $t: bool = $triangles;
-        const $d: bool = $tree;
         $step
     }};
 }

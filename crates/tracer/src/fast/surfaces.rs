@@ -97,10 +97,17 @@ impl<S: Simd, E: Real> Share<S, E> {
     }
 }
 
-/// The colour of hits without light, and how their surfaces lie: those of all, if light is to fall on them (`LIT`), or of
-/// mirrors alone.
+/// The colour of hits without light, and how their surfaces lie: those of all, if light is to fall on them (`LIT`), or
+/// those alone that send rays on. Which lanes do is noted if any can (`MIRRORS`).
 #[inline(never)]
-pub(super) fn surfaces<S: Simd, E: Real, F: Features<E>, const EYE: bool, const LIT: bool>(
+pub(super) fn surfaces<
+    S: Simd,
+    E: Real,
+    F: Features<E>,
+    const EYE: bool,
+    const LIT: bool,
+    const MIRRORS: bool,
+>(
     simd: S,
     scene: &Prepared<E>,
     background: [E; 3],
@@ -110,11 +117,13 @@ pub(super) fn surfaces<S: Simd, E: Real, F: Features<E>, const EYE: bool, const 
     simd.vectorize(
         #[inline(always)]
         || {
-            let Hits { distance, order, start, normal, diffuse, color, packets } = hits;
+            let Hits { distance, order, start, normal, diffuse, color, packets, mirrors } = hits;
+            mirrors.clear();
             let zero = Vec3::zero(simd);
             for (at, others) in packets {
                 let at = *at;
                 let met = Met::<S, E>::new(simd, at, distance, order);
+                let mut mirror_bits = 0;
                 met.each_object(
                     simd,
                     scene,
@@ -124,7 +133,9 @@ pub(super) fn surfaces<S: Simd, E: Real, F: Features<E>, const EYE: bool, const 
                         let bits = same.to_bitmask();
                         let behind = weigh::<S, E, EYE>(simd, background, queue, at);
                         share.put(simd, weigh::<S, E, EYE>(simd, entry.ambient, queue, at), behind, color);
-                        if !LIT && !entry.mirrors {
+                        if MIRRORS && entry.mirrors {
+                            mirror_bits |= bits;
+                        } else if !LIT {
                             return;
                         }
                         let origin = if EYE { zero } else { Vec3::load(simd, &queue.origin, at) };
@@ -147,6 +158,9 @@ pub(super) fn surfaces<S: Simd, E: Real, F: Features<E>, const EYE: bool, const 
                         share.put(simd, surface.start, Vec3::splat(simd, [x[lane], y[lane], z[lane]]), start);
                     },
                 );
+                if MIRRORS && mirror_bits != 0 {
+                    mirrors.push((at, mirror_bits));
+                }
             }
         },
     );
@@ -164,26 +178,15 @@ pub(super) fn reflect<S: Simd, E: Real, const EYE: bool>(
     simd.vectorize(
         #[inline(always)]
         || {
-            for &(at, _) in &hits.packets {
+            for &(at, mut bits) in &hits.mirrors {
                 let met = Met::<S, E>::new(simd, at, &hits.distance, &hits.order);
                 let mut mirror = Vec3::<S, E>::zero(simd);
                 let mut mirrors = met.hit & !met.hit;
-                let mut any = false;
-                met.each_object(
-                    simd,
-                    scene,
-                    #[inline(always)]
-                    |entry, same, _| {
-                        if entry.mirrors {
-                            any = true;
-                            mirrors |= same;
-                            let weighed = weigh::<S, E, EYE>(simd, entry.mirror, queue, at);
-                            mirror = Vec3::select(same, weighed, mirror);
-                        }
-                    },
-                );
-                if !any {
-                    continue;
+                while bits != 0 {
+                    let (entry, same) = met.object(simd, scene, bits.trailing_zeros());
+                    mirrors |= same;
+                    mirror = Vec3::select(same, weigh::<S, E, EYE>(simd, entry.mirror, queue, at), mirror);
+                    bits &= !same.to_bitmask();
                 }
                 let normal = Vec3::<S, E>::load(simd, &hits.normal, at);
                 let incoming = Vec3::load(simd, &queue.direction, at);

@@ -144,9 +144,15 @@ fn shade<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     let mirrors = BUILT.mirrors && scene.needs.mirrors;
     if !scene.suns.is_empty() {
         // Whether objects are found down a tree makes no difference to surfaces.
-        fitted!(N, kinds, false, C T D => {
-            surfaces::<S, E, Variant<N::By, C, T, D>, EYE, true>(simd, scene, background, queue, hits)
-        });
+        if mirrors {
+            fitted!(N, kinds, C T => {
+                surfaces::<S, E, Variant<N::By, C, T, false>, EYE, true, true>(simd, scene, background, queue, hits)
+            });
+        } else {
+            fitted!(N, kinds, C T => {
+                surfaces::<S, E, Variant<N::By, C, T, false>, EYE, true, false>(simd, scene, background, queue, hits)
+            });
+        }
         if BUILT.shadows && scene.needs.shadows {
             let kinds = in_the_way.find(simd, scene, hits);
             let tree = BUILT.tree && scene.tree.is_some();
@@ -157,8 +163,8 @@ fn shade<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
             light_up::<S, E, Variant<N::By, false, false, false>, false>(simd, scene, hits, in_the_way);
         }
     } else if mirrors {
-        fitted!(N, kinds, false, C T D => {
-            surfaces::<S, E, Variant<N::By, C, T, D>, EYE, false>(simd, scene, background, queue, hits)
+        fitted!(N, kinds, C T => {
+            surfaces::<S, E, Variant<N::By, C, T, false>, EYE, false, true>(simd, scene, background, queue, hits)
         });
     } else {
         ambient::<S, E, EYE>(simd, scene, background, queue, hits);
