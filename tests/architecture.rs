@@ -12,11 +12,23 @@ use serde_json::Value;
 const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-scene", &[]),
     ("rayfold-gif", &[]),
+    ("rayfold-bucket", &[]),
     ("rayfold-tracer", &["rayfold-scene"]),
-    ("rayfold-pipeline", &["rayfold-scene", "rayfold-tracer", "rayfold-gif"]),
-    ("rayfold-lambda", &["rayfold-pipeline"]),
+    ("rayfold-pipeline", &["rayfold-scene"]),
+    ("rayfold-client", &["rayfold-scene", "rayfold-pipeline"]),
+    ("rayfold-lambda", &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline"]),
     ("rayfold-local", &["rayfold-pipeline"]),
-    ("rayfold", &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline", "rayfold-local"]),
+    (
+        "rayfold",
+        &[
+            "rayfold-scene",
+            "rayfold-tracer",
+            "rayfold-gif",
+            "rayfold-pipeline",
+            "rayfold-client",
+            "rayfold-local",
+        ],
+    ),
     ("rayfold-xtask", &[]),
     (
         "rayfold-bench",

@@ -1,6 +1,6 @@
-//! The subcommands that talk to a bucket, against MinIO, the local invoker and the unmodified function binaries.
+//! The subcommands that talk to a bucket, against an S3 server, the local invoker and the unmodified function binaries.
 
-#![allow(clippy::print_stderr, reason = "installing MinIO takes minutes and says so")]
+#![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
 mod stage;
@@ -9,10 +9,12 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use rayfold_local::StoreKind;
 use rayfold_local::invoker::Settings;
 use rayfold_pipeline::manifest::Status;
 use rayfold_pipeline::store::{ListRequest, Store};
-use stage::{PATIENCE, Stage, built, drawn, scene};
+use stage::stores::on_every_store;
+use stage::{PATIENCE, Stage, built, drawn, functions_beside, scene};
 
 const RAYFOLD: &str = env!("CARGO_BIN_EXE_rayfold");
 
@@ -22,25 +24,9 @@ struct Cloud {
     folder: tempfile::TempDir,
 }
 
-async fn cloud(change: impl FnOnce(&mut Settings)) -> Cloud {
-    let functions = Path::new(RAYFOLD).parent().unwrap();
-    if !functions.join("rayfold-render").exists() || !functions.join("rayfold-assemble").exists() {
-        build(functions);
-    }
-    Cloud { stage: stage::stage(functions, change).await, folder: tempfile::tempdir().unwrap() }
-}
-
-/// `cargo test -p rayfold` alone does not build what belongs to another package.
-fn build(folder: &Path) {
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo
-        .args(["build", "--locked", "-p", "rayfold-lambda", "--bins", "--target-dir"])
-        .arg(folder.parent().unwrap());
-    cargo.current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."));
-    if folder.ends_with("release") {
-        cargo.arg("--release");
-    }
-    assert!(cargo.status().unwrap().success(), "the function binaries do not build");
+async fn cloud(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Cloud {
+    let functions = functions_beside(Path::new(RAYFOLD));
+    Cloud { stage: stage::stage(store, functions, change).await, folder: tempfile::tempdir().unwrap() }
 }
 
 impl Cloud {
@@ -63,7 +49,7 @@ impl Cloud {
         command
             .args(args.split_whitespace())
             .current_dir(self.folder.path())
-            .envs(self.stage.platform.minio().environment())
+            .envs(self.stage.platform.server().environment())
             .env("RAYFOLD_BUCKET", self.stage.store().bucket())
             .stdin(Stdio::null());
         command
@@ -103,171 +89,193 @@ impl Cloud {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_submitted_folder_becomes_the_gif_that_render_makes() {
-    let mut cloud = cloud(|_| {}).await;
-    for (name, x) in [("f1", 8.0), ("f2", 12.0), ("f10", 16.0)] {
-        cloud.write(&format!("film/{name}.txt"), scene(x));
-    }
-    cloud.write("film/notes.md", "not a script");
-    let said = cloud.says("submit film", 0);
-    assert!(said.contains("scripts/film/: 3 scripts uploaded"), "{said}");
-    cloud.rayfold("render film -o local.gif", 0);
-    assert!(cloud.read("film.gif") == cloud.read("local.gif"), "the GIF is not the local one");
-    assert_eq!(cloud.work().await, (3, 1), "no quiet period was waited for, nothing done twice");
-    let files = ["animation.json", "f1.txt", "f10.txt", "f2.txt"];
-    assert_eq!(cloud.keys("scripts/").await, files.map(|name| format!("scripts/film/{name}")));
+    on_every_store(async |store| {
+        let mut cloud = cloud(store, |_| {}).await;
+        for (name, x) in [("f1", 8.0), ("f2", 12.0), ("f10", 16.0)] {
+            cloud.write(&format!("film/{name}.txt"), scene(x));
+        }
+        cloud.write("film/notes.md", "not a script");
+        let said = cloud.says("submit film", 0);
+        assert!(said.contains("scripts/film/: 3 scripts uploaded"), "{said}");
+        cloud.rayfold("render film -o local.gif", 0);
+        assert!(cloud.read("film.gif") == cloud.read("local.gif"), "the GIF is not the local one");
+        assert_eq!(cloud.work().await, (3, 1), "no quiet period was waited for, nothing done twice");
+        let files = ["animation.json", "f1.txt", "f10.txt", "f2.txt"];
+        assert_eq!(cloud.keys("scripts/").await, files.map(|name| format!("scripts/film/{name}")));
 
-    // The same again: no upload, no work.
-    let said = cloud.says("submit film -o again.gif", 0);
-    assert!(said.contains("up to date"), "{said}");
-    assert_eq!(cloud.read("again.gif"), cloud.read("film.gif"));
-    assert_eq!(cloud.work().await, (0, 0));
+        // The same again: no upload, no work.
+        let said = cloud.says("submit film -o again.gif", 0);
+        assert!(said.contains("up to date"), "{said}");
+        assert_eq!(cloud.read("again.gif"), cloud.read("film.gif"));
+        assert_eq!(cloud.work().await, (0, 0));
 
-    // One changed, one added, one deleted: two frames are drawn.
-    cloud.write("film/f2.txt", scene(13.0));
-    cloud.write("film/f11.txt", scene(20.0));
-    cloud.delete("film/f1.txt");
-    let said = cloud.says("submit film", 0);
-    assert!(said.contains("1 script no longer in the folder, deleted"), "{said}");
-    assert!(said.contains("2 scripts uploaded") && said.contains("unchanged"), "{said}");
-    cloud.rayfold("render film -o local.gif", 0);
-    assert!(cloud.read("film.gif") == cloud.read("local.gif"), "the GIF is not the local one");
-    assert_eq!(cloud.work().await.0, 2);
+        // One changed, one added, one deleted: two frames are drawn.
+        cloud.write("film/f2.txt", scene(13.0));
+        cloud.write("film/f11.txt", scene(20.0));
+        cloud.delete("film/f1.txt");
+        let said = cloud.says("submit film", 0);
+        assert!(said.contains("1 script no longer in the folder, deleted"), "{said}");
+        assert!(said.contains("2 scripts uploaded") && said.contains("unchanged"), "{said}");
+        cloud.rayfold("render film -o local.gif", 0);
+        assert!(cloud.read("film.gif") == cloud.read("local.gif"), "the GIF is not the local one");
+        assert_eq!(cloud.work().await.0, 2);
 
-    // Status, for people and for programs.
-    let table = cloud.prints("status");
-    assert!(table.starts_with("film  done       3 of 3 frames, GIF of "), "{table}");
-    assert_eq!(cloud.prints("status film --watch"), table);
-    let report: serde_json::Value = serde_json::from_str(&cloud.prints("status film --format json")).unwrap();
-    let film = &report["animations"][0];
-    assert_eq!((&film["animation"], &film["status"]), (&"film".into(), &"done".into()));
-    assert_eq!((&film["done"], &film["gif"]["current"]), (&3.into(), &true.into()));
+        // Status, for people and for programs.
+        let table = cloud.prints("status");
+        assert!(table.starts_with("film  done       3 of 3 frames, GIF of "), "{table}");
+        assert_eq!(cloud.prints("status film --watch"), table);
+        let report: serde_json::Value =
+            serde_json::from_str(&cloud.prints("status film --format json")).unwrap();
+        let film = &report["animations"][0];
+        assert_eq!((&film["animation"], &film["status"]), (&"film".into(), &"done".into()));
+        assert_eq!((&film["done"], &film["gif"]["current"]), (&3.into(), &true.into()));
 
-    // Fetch: the GIF, and the frames as they are drawn locally.
-    cloud.rayfold("fetch film -o fetched.gif", 0);
-    assert_eq!(cloud.read("fetched.gif"), cloud.read("film.gif"));
-    cloud.rayfold("fetch film -o c%d.png", 0);
-    cloud.rayfold("render film -o l%d.png", 0);
-    for number in 1..=3 {
-        let image = |side| image::load_from_memory(&cloud.read(&format!("{side}{number}.png"))).unwrap();
-        assert_eq!(image("c"), image("l"), "frame {number}");
-    }
+        // Fetch: the GIF, and the frames as they are drawn locally.
+        cloud.rayfold("fetch film -o fetched.gif", 0);
+        assert_eq!(cloud.read("fetched.gif"), cloud.read("film.gif"));
+        cloud.rayfold("fetch film -o c%d.png", 0);
+        cloud.rayfold("render film -o l%d.png", 0);
+        for number in 1..=3 {
+            let image = |side| image::load_from_memory(&cloud.read(&format!("{side}{number}.png"))).unwrap();
+            assert_eq!(image("c"), image("l"), "frame {number}");
+        }
 
-    // Drawn anew on demand, to the same picture.
-    let said = cloud.says("retry film", 0);
-    assert!(said.contains("nothing failed and nothing is missing"), "{said}");
-    let said = cloud.says("retry film --all", 0);
-    assert!(said.contains("3 frames rendered again"), "{said}");
-    cloud.stage.until("film", Status::Done).await;
-    assert_eq!(cloud.work().await.0, 3);
-    cloud.rayfold("fetch film -o fetched.gif", 0);
-    assert_eq!(cloud.read("fetched.gif"), cloud.read("film.gif"));
+        // Drawn anew on demand, to the same picture.
+        let said = cloud.says("retry film", 0);
+        assert!(said.contains("nothing failed and nothing is missing"), "{said}");
+        let said = cloud.says("retry film --all", 0);
+        assert!(said.contains("3 frames rendered again"), "{said}");
+        cloud.stage.until("film", Status::Done).await;
+        assert_eq!(cloud.work().await.0, 3);
+        cloud.rayfold("fetch film -o fetched.gif", 0);
+        assert_eq!(cloud.read("fetched.gif"), cloud.read("film.gif"));
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn removing_leaves_nothing_of_an_animation_and_everything_of_others() {
-    let mut cloud = cloud(|_| {}).await;
-    cloud.write("a/f.txt", scene(8.0));
-    cloud.write("b/f.txt", scene(9.0) + "Background 1 0 0\nTrace\n");
-    cloud.rayfold("submit a --name film", 0);
-    cloud.rayfold("submit b --name film/two", 0);
-    let said = cloud.says("submit b/f.txt", 2);
-    assert!(said.contains("b/f.txt is a file: expected a folder"), "{said}");
-    let said = cloud.says("remove film", 0);
-    assert!(said.starts_with("film: ") && said.contains("removed"), "{said}");
-    cloud.stage.settle().await;
-    let left = cloud.keys("").await;
-    assert!(!left.is_empty() && left.iter().all(|key| key.contains("film/two")), "{left:?}");
-    let table = cloud.prints("status");
-    assert!(table.starts_with("film/two  done       2 of 2 frames"), "{table}");
-    for command in ["remove film", "status film", "fetch film -o film.gif", "retry film"] {
-        let said = cloud.says(command, 1);
-        assert_eq!(said, format!("error: there is no animation film in {}\n", cloud.stage.store().bucket()));
-    }
+    on_every_store(async |store| {
+        let mut cloud = cloud(store, |_| {}).await;
+        cloud.write("a/f.txt", scene(8.0));
+        cloud.write("b/f.txt", scene(9.0) + "Background 1 0 0\nTrace\n");
+        cloud.rayfold("submit a --name film", 0);
+        cloud.rayfold("submit b --name film/two", 0);
+        let said = cloud.says("submit b/f.txt", 2);
+        assert!(said.contains("b/f.txt is a file: expected a folder"), "{said}");
+        let said = cloud.says("remove film", 0);
+        assert!(said.starts_with("film: ") && said.contains("removed"), "{said}");
+        cloud.stage.settle().await;
+        let left = cloud.keys("").await;
+        assert!(!left.is_empty() && left.iter().all(|key| key.contains("film/two")), "{left:?}");
+        let table = cloud.prints("status");
+        assert!(table.starts_with("film/two  done       2 of 2 frames"), "{table}");
+        for command in ["remove film", "status film", "fetch film -o film.gif", "retry film"] {
+            let said = cloud.says(command, 1);
+            assert_eq!(
+                said,
+                format!("error: there is no animation film in {}\n", cloud.stage.store().bucket())
+            );
+        }
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_bad_script_uploads_nothing() {
-    let cloud = cloud(|_| {}).await;
-    cloud.write("film/f1.txt", scene(8.0));
-    cloud.write("film/f2.txt", "Screen 24 18\nSpere 1\nTrace\n");
-    let said = cloud.says("submit film", 1);
-    assert!(said.contains("film/f2.txt:2:1") && said.contains("did you mean `Sphere`?"), "{said}");
-    assert!(said.ends_with("error: nothing was uploaded: 1 error in 1 of 2 files\n"), "{said}");
-    assert!(cloud.keys("").await.is_empty());
+    on_every_store(async |store| {
+        let cloud = cloud(store, |_| {}).await;
+        cloud.write("film/f1.txt", scene(8.0));
+        cloud.write("film/f2.txt", "Screen 24 18\nSpere 1\nTrace\n");
+        let said = cloud.says("submit film", 1);
+        assert!(said.contains("film/f2.txt:2:1") && said.contains("did you mean `Sphere`?"), "{said}");
+        assert!(said.ends_with("error: nothing was uploaded: 1 error in 1 of 2 files\n"), "{said}");
+        assert!(cloud.keys("").await.is_empty());
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_fails_in_the_cloud_is_named_with_its_reason() {
-    let mut cloud = cloud(|_| {}).await;
-    cloud.write("film/f1.txt", scene(8.0));
-    cloud.write("film/f2.txt", scene(9.0));
-    cloud.rayfold("submit film", 0);
-    // Somebody uploads a script that nobody has checked.
-    cloud.stage.put("scripts/film/f2.txt", "Screen 24 18\nSpere 1\nTrace\n").await;
-    cloud.stage.until("film", Status::Failed).await;
-    let output = cloud.rayfold("status film --watch", 1);
-    let (said, table) =
-        (String::from_utf8(output.stderr).unwrap(), String::from_utf8(output.stdout).unwrap());
-    assert!(table.starts_with("film  failed     1 of 2 frames, 1 failed, no GIF"), "{table}");
-    assert!(said.contains("f2.txt:2:1") && said.contains("did you mean `Sphere`?"), "{said}");
-    let said = cloud.says("fetch film -o film.gif", 1);
-    assert!(
-        said.contains("there is no GIF of film as it is now: failed (1 of 2 frames, 1 failed)"),
-        "{said}"
-    );
-    let said = cloud.says("fetch film -o %d.png", 1);
-    assert!(said.contains("f2.txt is not drawn"), "{said}");
-    // The same command as in the beginning mends it.
-    cloud.rayfold("submit film", 0);
-    cloud.rayfold("render film -o local.gif", 0);
-    assert!(cloud.read("film.gif") == cloud.read("local.gif"), "the GIF is not the local one");
+    on_every_store(async |store| {
+        let mut cloud = cloud(store, |_| {}).await;
+        cloud.write("film/f1.txt", scene(8.0));
+        cloud.write("film/f2.txt", scene(9.0));
+        cloud.rayfold("submit film", 0);
+        // Somebody uploads a script that nobody has checked.
+        cloud.stage.put("scripts/film/f2.txt", "Screen 24 18\nSpere 1\nTrace\n").await;
+        cloud.stage.until("film", Status::Failed).await;
+        let output = cloud.rayfold("status film --watch", 1);
+        let (said, table) =
+            (String::from_utf8(output.stderr).unwrap(), String::from_utf8(output.stdout).unwrap());
+        assert!(table.starts_with("film  failed     1 of 2 frames, 1 failed, no GIF"), "{table}");
+        assert!(said.contains("f2.txt:2:1") && said.contains("did you mean `Sphere`?"), "{said}");
+        let said = cloud.says("fetch film -o film.gif", 1);
+        assert!(
+            said.contains("there is no GIF of film as it is now: failed (1 of 2 frames, 1 failed)"),
+            "{said}"
+        );
+        let said = cloud.says("fetch film -o %d.png", 1);
+        assert!(said.contains("f2.txt is not drawn"), "{said}");
+        // The same command as in the beginning mends it.
+        cloud.rayfold("submit film", 0);
+        cloud.rayfold("render film -o local.gif", 0);
+        assert!(cloud.read("film.gif") == cloud.read("local.gif"), "the GIF is not the local one");
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_frame_that_takes_too_long_is_named_and_retried() {
-    let mut cloud = cloud(|settings| settings.timeout = Duration::from_secs(2)).await;
-    let light = "Ilight .001 .001 .001 .2 -.3 -1\n";
-    let sphere = "Sphere 6000 4000 4000 -9000 .2 .2 .2 .7 .6 .5\n";
-    cloud.write("film/f1.txt", format!("Screen 8000 8000\n{sphere}{}Trace\n", light.repeat(1000)));
-    let said = cloud.says("submit film", 1);
-    assert!(
-        said.contains("error: f1.txt: ") && said.contains("film is failed (0 of 1 frame, 1 failed)"),
-        "{said}"
-    );
-    let said = cloud.says("retry film", 0);
-    assert!(said.contains("film: 1 frame rendered again"), "{said}");
-    cloud.stage.platform.settings_mut().timeout = Duration::from_secs(60);
-    cloud.stage.restart_invoker().await;
-    cloud.write("film/f1.txt", scene(8.0));
-    cloud.rayfold("submit film", 0);
+    on_every_store(async |store| {
+        let mut cloud = cloud(store, |settings| settings.timeout = Duration::from_secs(2)).await;
+        let light = "Ilight .001 .001 .001 .2 -.3 -1\n";
+        let sphere = "Sphere 6000 4000 4000 -9000 .2 .2 .2 .7 .6 .5\n";
+        cloud.write("film/f1.txt", format!("Screen 8000 8000\n{sphere}{}Trace\n", light.repeat(1000)));
+        let said = cloud.says("submit film", 1);
+        assert!(
+            said.contains("error: f1.txt: ") && said.contains("film is failed (0 of 1 frame, 1 failed)"),
+            "{said}"
+        );
+        let said = cloud.says("retry film", 0);
+        assert!(said.contains("film: 1 frame rendered again"), "{said}");
+        cloud.stage.platform.settings_mut().timeout = Duration::from_secs(60);
+        cloud.stage.restart_invoker().await;
+        cloud.write("film/f1.txt", scene(8.0));
+        cloud.rayfold("submit film", 0);
+    })
+    .await;
 }
 
 #[cfg(unix)]
 #[tokio::test(flavor = "multi_thread")]
 async fn an_interrupted_submission_is_picked_up() {
-    let mut cloud = cloud(|_| {}).await;
-    cloud.stage.platform.stop_invoker().await;
-    cloud.write("film/f1.txt", scene(8.0));
-    cloud.write("film/f2.txt", scene(9.0));
-    let mut submission = cloud.command("submit film").stderr(Stdio::piped()).spawn().unwrap();
-    let start = Instant::now();
-    while cloud.keys("scripts/").await.len() < 3 {
-        assert!(start.elapsed() < PATIENCE, "nothing is uploaded");
-        tokio::time::sleep(Duration::from_millis(20)).await;
-    }
-    // Every script is there; what follows is waiting, for nobody draws.
-    tokio::time::sleep(Duration::from_millis(500)).await;
-    assert!(submission.try_wait().unwrap().is_none(), "it does not wait");
-    let id = submission.id().to_string();
-    assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
-    let output = submission.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(130));
-    assert!(!cloud.folder.path().join("film.gif").exists());
+    on_every_store(async |store| {
+        let mut cloud = cloud(store, |_| {}).await;
+        cloud.stage.platform.stop_invoker().await;
+        cloud.write("film/f1.txt", scene(8.0));
+        cloud.write("film/f2.txt", scene(9.0));
+        let mut submission = cloud.command("submit film").stderr(Stdio::piped()).spawn().unwrap();
+        let start = Instant::now();
+        while cloud.keys("scripts/").await.len() < 3 {
+            assert!(start.elapsed() < PATIENCE, "nothing is uploaded");
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+        // Every script is there; what follows is waiting, for nobody draws.
+        tokio::time::sleep(Duration::from_millis(500)).await;
+        assert!(submission.try_wait().unwrap().is_none(), "it does not wait");
+        let id = submission.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+        let output = submission.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(130));
+        assert!(!cloud.folder.path().join("film.gif").exists());
 
-    cloud.stage.restart_invoker().await;
-    let said = cloud.says("submit film", 0);
-    assert!(said.contains("up to date"), "{said}");
-    cloud.rayfold("render film -o local.gif", 0);
-    assert!(cloud.read("film.gif") == cloud.read("local.gif"), "the GIF is not the local one");
-    assert_eq!(cloud.work().await, (2, 1));
+        cloud.stage.restart_invoker().await;
+        let said = cloud.says("submit film", 0);
+        assert!(said.contains("up to date"), "{said}");
+        cloud.rayfold("render film -o local.gif", 0);
+        assert!(cloud.read("film.gif") == cloud.read("local.gif"), "the GIF is not the local one");
+        assert_eq!(cloud.work().await, (2, 1));
+    })
+    .await;
 }

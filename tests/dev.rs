@@ -1,6 +1,10 @@
 //! `rayfold dev` as a user meets it: started, fed by the SDK, interrupted, killed, started again.
 
+#![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
+
+#[path = "stage/stores.rs"]
+mod stores;
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
@@ -8,7 +12,9 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use rayfold_local::StoreKind;
 use rayfold_pipeline::store::{Connection, PutOptions, S3Store, Store};
+use stores::on_every_store;
 
 const RAYFOLD: &str = env!("CARGO_BIN_EXE_rayfold");
 
@@ -22,9 +28,14 @@ struct Dev {
 }
 
 impl Dev {
-    fn start(data: &Path) -> Self {
+    fn start(store: StoreKind, data: &Path) -> Self {
         let mut command = Command::new(RAYFOLD);
         command.arg("dev").arg("--data").arg(data).args(["--address", "127.0.0.1:0", "--concurrency", "4"]);
+        match store {
+            // What a user gets who says nothing.
+            StoreKind::BuiltIn => {}
+            StoreKind::Minio => drop(command.args(["--store", "minio"])),
+        }
         let beside = Path::new(RAYFOLD).parent().unwrap();
         if beside.join("rayfold-render").is_file() && beside.join("rayfold-assemble").is_file() {
             // Built with this test; without them `rayfold dev` builds them itself.
@@ -84,41 +95,44 @@ async fn gif(store: &S3Store, key: &str) -> bytes::Bytes {
     }
 }
 
-/// MinIO's answer to anybody; none when it is gone.
+/// The S3 server's answer; none when it is gone.
 async fn answers(store: &S3Store) -> bool {
     store.check().await.is_ok()
 }
 
 #[tokio::test]
 async fn it_goes_on_where_it_was_after_a_kill_and_leaves_nothing_behind() {
-    let folder = tempfile::tempdir().unwrap();
-    let data = folder.path().join("data");
-    let ball = "Screen 24 16\nBackground .2 .2 .2\nSphere 6 12 8 -9 .2 .2 .2 .7 .6 .5\nTrace\n";
+    on_every_store(async |store| {
+        let folder = tempfile::tempdir().unwrap();
+        let data = folder.path().join("data");
+        let ball = "Screen 24 16\nBackground .2 .2 .2\nSphere 6 12 8 -9 .2 .2 .2 .7 .6 .5\nTrace\n";
 
-    let dev = Dev::start(&data);
-    assert_eq!(dev.sync, "aws s3 sync scenes/hello s3://rayfold/scripts/hello/");
-    let store = dev.store();
-    put(&store, "scripts/ball/animation.json", b"{\"frames\": 2}".to_vec()).await;
-    put(&store, "scripts/ball/a.txt", ball.into()).await;
-    dev.signal("-KILL");
-    let start = Instant::now();
-    while answers(&store).await {
-        assert!(start.elapsed() < PATIENCE, "MinIO outlives a killed `rayfold dev`");
-        tokio::time::sleep(Duration::from_millis(50)).await;
-    }
-    let exports = dev.exports.clone();
-    drop(dev);
+        let dev = Dev::start(store, &data);
+        assert_eq!(dev.sync, "aws s3 sync scenes/hello s3://rayfold/scripts/hello/");
+        let bucket = dev.store();
+        put(&bucket, "scripts/ball/animation.json", b"{\"frames\": 2}".to_vec()).await;
+        put(&bucket, "scripts/ball/a.txt", ball.into()).await;
+        dev.signal("-KILL");
+        let start = Instant::now();
+        while answers(&bucket).await {
+            assert!(start.elapsed() < PATIENCE, "the S3 server outlives a killed `rayfold dev`");
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+        let exports = dev.exports.clone();
+        drop(dev);
 
-    let mut dev = Dev::start(&data);
-    assert_eq!(
-        dev.exports["AWS_SECRET_ACCESS_KEY"], exports["AWS_SECRET_ACCESS_KEY"],
-        "credentials are kept"
-    );
-    let store = dev.store();
-    assert_eq!(store.get("scripts/ball/a.txt").await.unwrap().body, ball, "objects are kept");
-    put(&store, "scripts/ball/b.txt", ball.replace("12 8", "8 8").into()).await;
-    assert!(gif(&store, "animations/ball.gif").await.starts_with(b"GIF89a"));
-    dev.signal("-INT");
-    assert!(dev.child.wait().unwrap().success());
-    assert!(!answers(&store).await, "Ctrl-C stops MinIO too");
+        let mut dev = Dev::start(store, &data);
+        assert_eq!(
+            dev.exports["AWS_SECRET_ACCESS_KEY"], exports["AWS_SECRET_ACCESS_KEY"],
+            "credentials are kept"
+        );
+        let bucket = dev.store();
+        assert_eq!(bucket.get("scripts/ball/a.txt").await.unwrap().body, ball, "objects are kept");
+        put(&bucket, "scripts/ball/b.txt", ball.replace("12 8", "8 8").into()).await;
+        assert!(gif(&bucket, "animations/ball.gif").await.starts_with(b"GIF89a"));
+        dev.signal("-INT");
+        assert!(dev.child.wait().unwrap().success());
+        assert!(!answers(&bucket).await, "Ctrl-C stops the S3 server too");
+    })
+    .await;
 }

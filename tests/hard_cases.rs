@@ -1,19 +1,19 @@
-//! The hard cases at their quick sizes, every way to trace within its bounds: a test a case. The figures are printed:
+//! The hard cases at their quick sizes, every backend within its bounds: a test a case. The figures are printed:
 //! `cargo test --test hard_cases -- --nocapture`.
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
+use rayfold_bench::backends;
 use rayfold_bench::hard_cases::{CASES, SEED, Size};
-use rayfold_bench::tracers;
 
 #[test]
 fn hard_cases_keep_their_bounds() {
-    let tracers = tracers::all();
+    let backends = backends::all();
     let mut failed = Vec::new();
     println!("seed {SEED}");
     for case in CASES {
         let began = std::time::Instant::now();
-        let figures = case.figures(&tracers, Size::Quick).unwrap();
+        let figures = case.figures(&backends, Size::Quick).unwrap();
         println!("\n{} {} ({:.1} s)", case.number, case.title, began.elapsed().as_secs_f64());
         assert!(!figures.is_empty(), "case {} measures nothing", case.number);
         for figure in figures {

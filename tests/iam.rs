@@ -1,7 +1,7 @@
-//! The roles' policies, enforced by MinIO: every operation on a key of every kind, by either role. What the protocol
+//! The roles' policies, enforced by the store: every operation on a key of every kind, by either role. What the protocol
 //! needs is allowed, all else is denied. That it is enough the end-to-end tests show, which run under the same documents.
 
-#![allow(clippy::print_stderr, reason = "installing MinIO takes minutes and says so")]
+#![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
 mod stage;
@@ -9,13 +9,12 @@ mod stage;
 use std::collections::BTreeSet;
 
 use bytes::Bytes;
-use rayfold_local::connection;
-use rayfold_local::minio::{Minio, any_port, find_or_install};
-use rayfold_local::routes::Function;
+use rayfold_local::{S3Server, StoreKind, any_port};
 use rayfold_pipeline::store::{ListRequest, PutOptions, S3Store, Store, Upload};
 use rayfold_pipeline::{Error, Result};
 
 use stage::role::assume;
+use stage::stores::on_every_store;
 
 const BUCKET: &str = "films";
 
@@ -51,8 +50,11 @@ const PREFIXES: [&str; 10] = [
     "frames",
 ];
 
+/// The functions, and the kinds of users.
+const ROLES: [&str; 5] = ["render", "assemble", "viewer", "uploader", "operator"];
+
 /// What a role may do, operation by operation. Whatever is not here must be denied.
-fn allowed(role: Function) -> Vec<(&'static str, Vec<&'static str>)> {
+fn allowed(role: &str) -> Vec<(&'static str, Vec<&'static str>)> {
     let keys = |starts: &[&str]| -> Vec<&'static str> {
         KEYS.into_iter()
             .chain(PREFIXES)
@@ -61,14 +63,14 @@ fn allowed(role: Function) -> Vec<(&'static str, Vec<&'static str>)> {
     };
     let errors = ["frames/a/1@v-p1.error.json", "frames/a/1@v-p1/2.error.json"];
     match role {
-        Function::Render => vec![
+        "render" => vec![
             ("list", keys(&["scripts/", "parts/", "frames/"])),
             ("read", [keys(&["scripts/", "parts/", "manifests/"]), errors.to_vec()].concat()),
             ("put", keys(&["parts/", "frames/", "manifests/", "assemblies/"])),
             ("upload", keys(&["parts/", "frames/", "manifests/", "assemblies/"])),
             ("delete", vec![]),
         ],
-        Function::Assemble => {
+        "assemble" => {
             let written =
                 [keys(&["manifests/", "animations/", "retries/", "assemblies/"]), errors.to_vec()].concat();
             vec![
@@ -79,6 +81,33 @@ fn allowed(role: Function) -> Vec<(&'static str, Vec<&'static str>)> {
                 ("delete", keys(&["parts/", "frames/", "animations/"])),
             ]
         }
+        "viewer" => vec![
+            ("list", keys(&["scripts/", "manifests/"])),
+            ("read", keys(&["frames/", "manifests/", "animations/"])),
+            ("put", vec![]),
+            ("upload", vec![]),
+            ("delete", vec![]),
+        ],
+        "uploader" => vec![
+            ("list", keys(&["scripts/", "manifests/"])),
+            ("read", keys(&["scripts/", "frames/", "manifests/", "animations/"])),
+            ("put", keys(&["scripts/"])),
+            ("upload", keys(&["scripts/"])),
+            ("delete", keys(&["scripts/"])),
+        ],
+        "operator" => {
+            let written = keys(&["scripts/", "retries/", "manifests/", "assemblies/"]);
+            let ours =
+                ["scripts/", "parts/", "frames/", "manifests/", "assemblies/", "retries/", "animations/"];
+            vec![
+                ("list", PREFIXES.to_vec()),
+                ("read", keys(&["scripts/", "frames/", "manifests/", "animations/"])),
+                ("put", written.clone()),
+                ("upload", written),
+                ("delete", keys(&ours)),
+            ]
+        }
+        other => panic!("no role {other}"),
     }
 }
 
@@ -106,14 +135,15 @@ async fn attempt(store: &S3Store, operation: &str, key: &str) -> Result<()> {
     }
 }
 
-async fn started() -> (Minio, tempfile::TempDir) {
+async fn started(store: StoreKind) -> (S3Server, tempfile::TempDir) {
     let data = tempfile::tempdir().unwrap();
-    let binary = find_or_install(&mut |line| eprintln!("{line}")).unwrap();
-    (Minio::start(&binary, data.path(), any_port(), None).await.unwrap(), data)
+    let mut say = |line: &str| eprintln!("{line}");
+    let server = S3Server::start(store, data.path(), any_port(), None, &mut say).await.unwrap();
+    (server, data)
 }
 
-async fn filled(minio: &Minio, bucket: &str) -> S3Store {
-    let owner = S3Store::at(&connection(minio), bucket);
+async fn filled(server: &S3Server, bucket: &str) -> S3Store {
+    let owner = S3Store::at(&server.connection(), bucket);
     owner.create_bucket().await.unwrap();
     for key in KEYS {
         owner.put(key, Bytes::from_static(b"old"), PutOptions::always()).await.unwrap();
@@ -123,76 +153,91 @@ async fn filled(minio: &Minio, bucket: &str) -> S3Store {
 
 #[tokio::test]
 async fn a_role_may_do_what_it_needs_and_nothing_else() {
-    let (minio, _data) = started().await;
-    let owner = filled(&minio, BUCKET).await;
-    for role in Function::ALL {
-        let store = S3Store::at(&assume(&minio, role, BUCKET).await, BUCKET);
-        for (operation, keys) in allowed(role) {
-            let keys: BTreeSet<&str> = keys.into_iter().collect();
-            let tried: &[&str] = if operation == "list" { &PREFIXES } else { &KEYS };
-            for key in tried {
-                let outcome = attempt(&store, operation, key).await;
-                match outcome {
-                    Ok(()) => assert!(keys.contains(key), "{role} may {operation} {key}"),
-                    Err(error) => {
-                        assert!(is_denial(&error), "{role}, {operation} {key}: {error:?}");
-                        assert!(!keys.contains(key), "{role} may not {operation} {key}");
+    on_every_store(async |store| {
+        let (server, _data) = started(store).await;
+        let owner = filled(&server, BUCKET).await;
+        for role in ROLES {
+            let of_role = S3Store::at(&assume(&server, role, BUCKET).await, BUCKET);
+            for (operation, keys) in allowed(role) {
+                let keys: BTreeSet<&str> = keys.into_iter().collect();
+                let tried: &[&str] = if operation == "list" { &PREFIXES } else { &KEYS };
+                for key in tried {
+                    let outcome = attempt(&of_role, operation, key).await;
+                    match outcome {
+                        Ok(()) => assert!(keys.contains(key), "{role} may {operation} {key}"),
+                        Err(error) => {
+                            assert!(is_denial(&error), "{role}, {operation} {key}: {error:?}");
+                            assert!(!keys.contains(key), "{role} may not {operation} {key}");
+                        }
                     }
-                }
-                let body =
-                    if operation == "list" { Ok("old".into()) } else { owner.get(key).await.map(|o| o.body) };
-                let is_old = body.is_ok_and(|body| body == "old");
-                let writes = matches!(operation, "put" | "upload" | "delete");
-                assert_eq!(
-                    is_old,
-                    !(writes && keys.contains(key)),
-                    "{role}, {operation} {key}: what is there now"
-                );
-                if !is_old {
-                    owner.put(key, Bytes::from_static(b"old"), PutOptions::always()).await.unwrap();
+                    let body = if operation == "list" {
+                        Ok("old".into())
+                    } else {
+                        owner.get(key).await.map(|o| o.body)
+                    };
+                    let is_old = body.is_ok_and(|body| body == "old");
+                    let writes = matches!(operation, "put" | "upload" | "delete");
+                    assert_eq!(
+                        is_old,
+                        !(writes && keys.contains(key)),
+                        "{role}, {operation} {key}: what is there now"
+                    );
+                    if !is_old {
+                        owner.put(key, Bytes::from_static(b"old"), PutOptions::always()).await.unwrap();
+                    }
                 }
             }
         }
-    }
+    })
+    .await;
 }
 
 #[tokio::test]
 async fn a_role_ends_at_its_bucket() {
-    let (minio, _data) = started().await;
-    filled(&minio, BUCKET).await;
-    let other = filled(&minio, "films-of-others").await;
-    for role in Function::ALL {
-        let store = S3Store::at(&assume(&minio, role, BUCKET).await, "films-of-others");
-        for operation in ["list", "read", "put", "upload", "delete"] {
-            let tried: &[&str] = if operation == "list" { &PREFIXES } else { &KEYS };
-            for key in tried {
-                let error = attempt(&store, operation, key).await.expect_err(key);
-                assert!(is_denial(&error), "{role}, {operation} {key}: {error:?}");
+    on_every_store(async |store| {
+        let (server, _data) = started(store).await;
+        filled(&server, BUCKET).await;
+        let other = filled(&server, "films-of-others").await;
+        for role in ROLES {
+            let of_role = S3Store::at(&assume(&server, role, BUCKET).await, "films-of-others");
+            for operation in ["list", "read", "put", "upload", "delete"] {
+                let tried: &[&str] = if operation == "list" { &PREFIXES } else { &KEYS };
+                for key in tried {
+                    let error = attempt(&of_role, operation, key).await.expect_err(key);
+                    assert!(is_denial(&error), "{role}, {operation} {key}: {error:?}");
+                }
             }
         }
-    }
-    for key in KEYS {
-        assert_eq!(other.get(key).await.unwrap().body, "old");
-    }
+        for key in KEYS {
+            assert_eq!(other.get(key).await.unwrap().body, "old");
+        }
+    })
+    .await;
 }
 
 /// A function that is told "forbidden" where nothing is would take each first manifest for a failure.
 #[tokio::test]
 async fn what_is_not_there_is_said_to_be_absent() {
-    let (minio, _data) = started().await;
-    filled(&minio, BUCKET).await;
-    for (role, keys) in [
-        (Function::Render, ["scripts/b/1.txt", "scripts/b/animation.json", "manifests/b.json"]),
-        (Function::Assemble, ["animations/b.gif", "scripts/b/animation.json", "manifests/b.json"]),
-    ] {
-        let store = S3Store::at(&assume(&minio, role, BUCKET).await, BUCKET);
-        for key in keys {
-            let error = store.get(key).await.expect_err(key);
-            assert!(error.is_not_found(), "{role}, {key}: {error:?}");
-            let error = store.head(key).await.expect_err(key);
-            assert!(error.is_not_found(), "{role}, {key}: {error:?}");
+    on_every_store(async |store| {
+        let (server, _data) = started(store).await;
+        filled(&server, BUCKET).await;
+        for (role, keys) in [
+            ("render", ["scripts/b/1.txt", "scripts/b/animation.json", "manifests/b.json"]),
+            ("assemble", ["animations/b.gif", "scripts/b/animation.json", "manifests/b.json"]),
+            ("viewer", ["animations/b.gif", "frames/b/1@v-p1.png", "manifests/b.json"]),
+            ("uploader", ["animations/b.gif", "scripts/b/1.txt", "manifests/b.json"]),
+            ("operator", ["animations/b.gif", "scripts/b/1.txt", "manifests/b.json"]),
+        ] {
+            let of_role = S3Store::at(&assume(&server, role, BUCKET).await, BUCKET);
+            for key in keys {
+                let error = of_role.get(key).await.expect_err(key);
+                assert!(error.is_not_found(), "{role}, {key}: {error:?}");
+                let error = of_role.head(key).await.expect_err(key);
+                assert!(error.is_not_found(), "{role}, {key}: {error:?}");
+            }
         }
-    }
+    })
+    .await;
 }
 
 fn is_denial(error: &Error) -> bool {

@@ -7,11 +7,10 @@ use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use rayfold_local::Functions;
 use rayfold_local::invoker::{Chaos, Invoker, Ramp, Settings};
-use rayfold_local::minio::any_port;
 use rayfold_local::observation::{Observation, Outcome, Seen};
 use rayfold_local::routes::Function;
+use rayfold_local::{Functions, any_port};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 

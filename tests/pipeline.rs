@@ -1,6 +1,6 @@
-//! The pipeline from end to end: uploads through the SDK, events through MinIO's webhook, unmodified function binaries.
+//! The pipeline from end to end: uploads through the SDK, events through the store's webhook, unmodified function binaries.
 
-#![allow(clippy::print_stderr, reason = "installing MinIO takes minutes and says so")]
+#![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
 mod stage;
@@ -8,17 +8,19 @@ mod stage;
 use std::path::Path;
 use std::time::Duration;
 
+use rayfold_local::StoreKind;
 use rayfold_local::invoker::{Chaos, Settings};
 use rayfold_local::observation::{RequestKind, Seen};
 use rayfold_local::routes::Function;
 use rayfold_pipeline::manifest::{FrameState, Manifest, Reason, Status};
 use rayfold_pipeline::store::{ListRequest, Store};
+use stage::stores::on_every_store;
 use stage::{Stage, built, drawn, frames, outcomes, requests, scene};
 
-async fn stage(change: impl FnOnce(&mut Settings)) -> Stage {
+async fn stage(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Stage {
     let functions = Path::new(env!("CARGO_BIN_EXE_rayfold-render")).parent().unwrap();
     assert!(Path::new(env!("CARGO_BIN_EXE_rayfold-assemble")).parent() == Some(functions));
-    stage::stage(functions, change).await
+    stage::stage(store, functions, change).await
 }
 
 fn failures(manifest: &Manifest) -> Vec<(&str, &Reason)> {
@@ -31,282 +33,330 @@ fn failures(manifest: &Manifest) -> Vec<(&str, &Reason)> {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn hello_uploaded_file_by_file_is_the_gif_that_is_made_locally() {
-    let mut stage = stage(|_| {}).await;
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/hello");
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let entry = entry.unwrap();
-        let name: &'static str = entry.file_name().into_string().unwrap().leak();
-        files.push((name, std::fs::read_to_string(entry.path()).unwrap()));
-    }
-    assert_eq!(files.len(), 51, "50 scripts and animation.json");
-    for file in &files {
-        stage.upload("hello", std::slice::from_ref(file)).await;
-    }
-    stage.until_gif_of("hello", &files).await;
-    let seen = stage.seen();
-    assert_eq!((drawn(&seen), built(&seen)), (50, 1));
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/hello");
+        let mut files = Vec::new();
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let entry = entry.unwrap();
+            let name: &'static str = entry.file_name().into_string().unwrap().leak();
+            files.push((name, std::fs::read_to_string(entry.path()).unwrap()));
+        }
+        assert_eq!(files.len(), 51, "50 scripts and animation.json");
+        for file in &files {
+            stage.upload("hello", std::slice::from_ref(file)).await;
+        }
+        stage.until_gif_of("hello", &files).await;
+        let seen = stage.seen();
+        assert_eq!((drawn(&seen), built(&seen)), (50, 1));
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn only_what_changed_is_drawn_again() {
-    let mut stage = stage(|_| {}).await;
-    let mut files = vec![("f1.txt", scene(8.0)), ("f2.txt", scene(12.0)), ("f10.txt", scene(16.0))];
-    stage.upload("film", &files).await;
-    stage.until_gif_of("film", &files).await;
-    assert_eq!(drawn(&stage.seen()), 3);
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let mut files = vec![("f1.txt", scene(8.0)), ("f2.txt", scene(12.0)), ("f10.txt", scene(16.0))];
+        stage.upload("film", &files).await;
+        stage.until_gif_of("film", &files).await;
+        assert_eq!(drawn(&stage.seen()), 3);
 
-    // One changed: one rendering, a new GIF.
-    files[1].1 = scene(13.0);
-    stage.upload("film", &files[1..2]).await;
-    stage.until_gif_of("film", &files).await;
-    let seen = stage.seen();
-    assert_eq!((drawn(&seen), built(&seen)), (1, 1));
+        // One changed: one rendering, a new GIF.
+        files[1].1 = scene(13.0);
+        stage.upload("film", &files[1..2]).await;
+        stage.until_gif_of("film", &files).await;
+        let seen = stage.seen();
+        assert_eq!((drawn(&seen), built(&seen)), (1, 1));
 
-    // One deleted: the animation is assembled without it.
-    let deleted = files.remove(0);
-    stage.remove("film", deleted.0).await;
-    let manifest = stage.until_gif_of("film", &files).await;
-    assert_eq!(manifest.head.total, 2);
-    let seen = stage.seen();
-    assert_eq!((drawn(&seen), built(&seen)), (0, 1));
+        // One deleted: the animation is assembled without it.
+        let deleted = files.remove(0);
+        stage.remove("film", deleted.0).await;
+        let manifest = stage.until_gif_of("film", &files).await;
+        assert_eq!(manifest.head.total, 2);
+        let seen = stage.seen();
+        assert_eq!((drawn(&seen), built(&seen)), (0, 1));
 
-    // One added later.
-    files.push(("f11.txt", scene(20.0)));
-    stage.upload("film", &files[2..]).await;
-    stage.until_gif_of("film", &files).await;
-    assert_eq!(drawn(&stage.seen()), 1);
+        // One added later.
+        files.push(("f11.txt", scene(20.0)));
+        stage.upload("film", &files[2..]).await;
+        stage.until_gif_of("film", &files).await;
+        assert_eq!(drawn(&stage.seen()), 1);
 
-    // The same folder again: no work, no new GIF, and at most four requests an event.
-    let before = stage.gif_info("film").await.unwrap();
-    stage.upload("film", &files).await;
-    stage.settle().await;
-    let seen = stage.seen();
-    assert_eq!((drawn(&seen), built(&seen)), (0, 0));
-    assert_eq!(outcomes(&seen).get("present"), Some(&3));
-    for requests in requests(&seen, Function::Render) {
-        assert!(requests.billed() <= 4, "{requests:?}");
-    }
-    assert_eq!(stage.gif_info("film").await.unwrap(), before);
+        // The same folder again: no work, no new GIF, and at most four requests an event.
+        let before = stage.gif_info("film").await.unwrap();
+        stage.upload("film", &files).await;
+        stage.settle().await;
+        let seen = stage.seen();
+        assert_eq!((drawn(&seen), built(&seen)), (0, 0));
+        assert_eq!(outcomes(&seen).get("present"), Some(&3));
+        for requests in requests(&seen, Function::Render) {
+            assert!(requests.billed() <= 4, "{requests:?}");
+        }
+        assert_eq!(stage.gif_info("film").await.unwrap(), before);
 
-    // The last one gone: no GIF.
-    for (name, _) in &files {
-        stage.remove("film", name).await;
-    }
-    stage.until("film", Status::Empty).await;
-    assert_eq!(stage.gif_info("film").await, None);
+        // The last one gone: no GIF.
+        for (name, _) in &files {
+            stage.remove("film", name).await;
+        }
+        stage.until("film", Status::Empty).await;
+        assert_eq!(stage.gif_info("film").await, None);
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn every_trace_of_a_script_is_a_frame() {
-    let mut stage = stage(|_| {}).await;
-    let three = format!("{}Sphere 3 6 9 -9 .9 0 0 0 0 0\nTrace\nBackground 0 0 0\nTrace\n", scene(12.0));
-    let files = vec![("a.txt", three), ("b.txt", scene(4.0)), frames(4)];
-    stage.upload("traces", &files).await;
-    let manifest = stage.until_gif_of("traces", &files).await;
-    assert_eq!((manifest.head.scripts, manifest.head.total), (2, 4));
-    let seen = stage.seen();
-    assert_eq!(drawn(&seen), 4);
-    assert_eq!(outcomes(&seen).get("split into 3"), Some(&1));
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let three = format!("{}Sphere 3 6 9 -9 .9 0 0 0 0 0\nTrace\nBackground 0 0 0\nTrace\n", scene(12.0));
+        let files = vec![("a.txt", three), ("b.txt", scene(4.0)), frames(4)];
+        stage.upload("traces", &files).await;
+        let manifest = stage.until_gif_of("traces", &files).await;
+        assert_eq!((manifest.head.scripts, manifest.head.total), (2, 4));
+        let seen = stage.seen();
+        assert_eq!(drawn(&seen), 4);
+        assert_eq!(outcomes(&seen).get("split into 3"), Some(&1));
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_bad_script_is_named_with_its_place_until_it_is_mended() {
-    let mut stage = stage(|_| {}).await;
-    let mut files =
-        vec![("good.txt", scene(8.0)), ("bad.txt", scene(9.0).replace("Sphere 6", "  Spere 6")), frames(2)];
-    stage.upload("film", &files).await;
-    let manifest = stage.until("film", Status::Failed).await;
-    let failures = failures(&manifest);
-    assert_eq!(failures.len(), 1);
-    let (script, reason) = failures[0];
-    assert_eq!(script, "bad");
-    let diagnostic = &reason.diagnostics[0];
-    assert_eq!((diagnostic.line, diagnostic.column), (3, 3), "{diagnostic:?}");
-    assert_eq!(stage.gif_info("film").await, None, "a failed animation is never a shorter GIF");
-    let seen = stage.seen();
-    assert!(seen.iter().all(|o| !matches!(&o.seen, Seen::Finished { outcome, .. } if !outcome.is_success())));
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let mut files = vec![
+            ("good.txt", scene(8.0)),
+            ("bad.txt", scene(9.0).replace("Sphere 6", "  Spere 6")),
+            frames(2),
+        ];
+        stage.upload("film", &files).await;
+        let manifest = stage.until("film", Status::Failed).await;
+        let failures = failures(&manifest);
+        assert_eq!(failures.len(), 1);
+        let (script, reason) = failures[0];
+        assert_eq!(script, "bad");
+        let diagnostic = &reason.diagnostics[0];
+        assert_eq!((diagnostic.line, diagnostic.column), (3, 3), "{diagnostic:?}");
+        assert_eq!(stage.gif_info("film").await, None, "a failed animation is never a shorter GIF");
+        let seen = stage.seen();
+        assert!(
+            seen.iter().all(|o| !matches!(&o.seen, Seen::Finished { outcome, .. } if !outcome.is_success()))
+        );
 
-    files[1].1 = scene(9.0);
-    stage.upload("film", &files[1..2]).await;
-    stage.until_gif_of("film", &files).await;
-    assert_eq!(drawn(&stage.seen()), 1);
+        files[1].1 = scene(9.0);
+        stage.upload("film", &files[1..2]).await;
+        stage.until_gif_of("film", &files).await;
+        assert_eq!(drawn(&stage.seen()), 1);
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn an_invalid_animation_json_fails_the_animation_until_it_is_mended() {
-    let mut stage = stage(|_| {}).await;
-    let mut files = vec![("f.txt", scene(8.0)), ("animation.json", "{ \"frmes\": 1 }".to_owned())];
-    stage.upload("film", &files).await;
-    let manifest = stage.until("film", Status::Failed).await;
-    assert!(manifest.head.settings.fault.is_some());
-    assert_eq!(stage.gif_info("film").await, None);
-    files[1] = frames(1);
-    stage.upload("film", &files[1..]).await;
-    stage.until_gif_of("film", &files).await;
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let mut files = vec![("f.txt", scene(8.0)), ("animation.json", "{ \"frmes\": 1 }".to_owned())];
+        stage.upload("film", &files).await;
+        let manifest = stage.until("film", Status::Failed).await;
+        assert!(manifest.head.settings.fault.is_some());
+        assert_eq!(stage.gif_info("film").await, None);
+        files[1] = frames(1);
+        stage.upload("film", &files[1..]).await;
+        stage.until_gif_of("film", &files).await;
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn fewer_frames_than_expected_wait() {
-    let mut stage = stage(|_| {}).await;
-    let files = vec![("a.txt", scene(8.0)), ("b.txt", scene(9.0)), frames(2)];
-    stage.upload("film", &[files[2].clone(), files[0].clone()]).await;
-    let manifest = stage.until("film", Status::Waiting).await;
-    assert_eq!((manifest.head.done, manifest.head.total), (1, 1));
-    assert_eq!(stage.gif_info("film").await, None);
-    stage.upload("film", &files[1..2]).await;
-    stage.until_gif_of("film", &files).await;
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let files = vec![("a.txt", scene(8.0)), ("b.txt", scene(9.0)), frames(2)];
+        stage.upload("film", &[files[2].clone(), files[0].clone()]).await;
+        let manifest = stage.until("film", Status::Waiting).await;
+        assert_eq!((manifest.head.done, manifest.head.total), (1, 1));
+        assert_eq!(stage.gif_info("film").await, None);
+        stage.upload("film", &files[1..2]).await;
+        stage.until_gif_of("film", &files).await;
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn every_event_twice_and_in_reverse() {
-    let mut stage = stage(|settings| {
-        settings.chaos = Chaos {
-            seed: 1,
-            duplicate: 1.0,
-            reverse_after: Some(Duration::from_millis(200)),
-            ..Chaos::default()
-        };
+    on_every_store(async |store| {
+        let mut stage = stage(store, |settings| {
+            settings.chaos = Chaos {
+                seed: 1,
+                duplicate: 1.0,
+                reverse_after: Some(Duration::from_millis(200)),
+                ..Chaos::default()
+            };
+        })
+        .await;
+        let files: Vec<_> = ["a.txt", "b.txt", "c.txt", "d.txt", "e.txt"]
+            .into_iter()
+            .zip(1..)
+            .map(|(name, x)| (name, scene(f64::from(x) * 4.0)))
+            .chain([frames(5)])
+            .collect();
+        stage.upload("film", &files).await;
+        stage.until_gif_of("film", &files).await;
+        let events = stage
+            .seen()
+            .iter()
+            .filter(|o| matches!(&o.seen, Seen::Started(a) if a.function == Function::Render))
+            .count();
+        assert_eq!(events, 12, "each event twice");
     })
     .await;
-    let files: Vec<_> = ["a.txt", "b.txt", "c.txt", "d.txt", "e.txt"]
-        .into_iter()
-        .zip(1..)
-        .map(|(name, x)| (name, scene(f64::from(x) * 4.0)))
-        .chain([frames(5)])
-        .collect();
-    stage.upload("film", &files).await;
-    stage.until_gif_of("film", &files).await;
-    let events = stage
-        .seen()
-        .iter()
-        .filter(|o| matches!(&o.seen, Seen::Started(a) if a.function == Function::Render))
-        .count();
-    assert_eq!(events, 12, "each event twice");
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn two_animations_at_once_keep_apart() {
-    let mut stage = stage(|_| {}).await;
-    let one = vec![("a.txt", scene(4.0)), ("b.txt", scene(8.0)), frames(2)];
-    let two = vec![("a.txt", scene(12.0)), ("b.txt", scene(16.0)), ("c.txt", scene(20.0)), frames(3)];
-    // One below the other, too: an animation's name may be a folder of another's.
-    let below = vec![("a.txt", scene(2.0)), frames(1)];
-    tokio::join!(stage.upload("one", &one), stage.upload("two", &two), stage.upload("one/deeper", &below));
-    stage.until_gif_of("one", &one).await;
-    stage.until_gif_of("two", &two).await;
-    stage.until_gif_of("one/deeper", &below).await;
-    assert_eq!(drawn(&stage.seen()), 6);
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let one = vec![("a.txt", scene(4.0)), ("b.txt", scene(8.0)), frames(2)];
+        let two = vec![("a.txt", scene(12.0)), ("b.txt", scene(16.0)), ("c.txt", scene(20.0)), frames(3)];
+        // One below the other, too: an animation's name may be a folder of another's.
+        let below = vec![("a.txt", scene(2.0)), frames(1)];
+        tokio::join!(
+            stage.upload("one", &one),
+            stage.upload("two", &two),
+            stage.upload("one/deeper", &below)
+        );
+        stage.until_gif_of("one", &one).await;
+        stage.until_gif_of("two", &two).await;
+        stage.until_gif_of("one/deeper", &below).await;
+        assert_eq!(drawn(&stage.seen()), 6);
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn keys_with_blanks_plus_signs_umlauts_and_slashes() {
-    let mut stage = stage(|_| {}).await;
-    let name = "Über uns/1 + 1 = 2 & 100%/ß";
-    let files = vec![
-        ("a b.txt", scene(4.0)),
-        ("a+b.txt", scene(8.0)),
-        ("ä%20@1.txt", scene(12.0)),
-        ("日本.txt", scene(16.0)),
-        frames(4),
-    ];
-    stage.upload(name, &files).await;
-    stage.until_gif_of(name, &files).await;
-    assert_eq!(drawn(&stage.seen()), 4);
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let name = "Über uns/1 + 1 = 2 & 100%/ß";
+        let files = vec![
+            ("a b.txt", scene(4.0)),
+            ("a+b.txt", scene(8.0)),
+            ("ä%20@1.txt", scene(12.0)),
+            ("日本.txt", scene(16.0)),
+            frames(4),
+        ];
+        stage.upload(name, &files).await;
+        stage.until_gif_of(name, &files).await;
+        assert_eq!(drawn(&stage.seen()), 4);
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn three_hundred_tiny_frames_at_a_concurrency_of_fifty() {
-    let mut stage = stage(|settings| settings.concurrency = 50).await;
-    let names: Vec<String> = (1..=300).map(|number| format!("f{number}.txt")).collect();
-    let mut files: Vec<_> =
-        names.iter().zip(1..).map(|(name, x)| (name.as_str(), scene(f64::from(x) / 12.0))).collect();
-    files.insert(0, frames(300));
-    let uploads = files.chunks(25).map(|chunk| stage.upload("film", chunk));
-    futures_util::future::join_all(uploads).await;
-    stage.until_gif_of("film", &files).await;
-    let seen = stage.seen();
-    assert_eq!(drawn(&seen), 300);
-    let billed: u64 = Function::ALL.iter().flat_map(|f| requests(&seen, *f)).map(|r| r.billed()).sum();
-    // The assembler's own reading of each frame is one; the protocol's share is what the contract bounds.
-    let per_frame = (billed as f64 - 300.0) / 300.0;
-    assert!(per_frame <= 12.0, "{per_frame} requests a frame");
-    assert_eq!(built(&seen), 1, "with `frames` given no GIF is made too early");
+    on_every_store(async |store| {
+        let mut stage = stage(store, |settings| settings.concurrency = 50).await;
+        let names: Vec<String> = (1..=300).map(|number| format!("f{number}.txt")).collect();
+        let mut files: Vec<_> =
+            names.iter().zip(1..).map(|(name, x)| (name.as_str(), scene(f64::from(x) / 12.0))).collect();
+        files.insert(0, frames(300));
+        let uploads = files.chunks(25).map(|chunk| stage.upload("film", chunk));
+        futures_util::future::join_all(uploads).await;
+        stage.until_gif_of("film", &files).await;
+        let seen = stage.seen();
+        assert_eq!(drawn(&seen), 300);
+        let billed: u64 = Function::ALL.iter().flat_map(|f| requests(&seen, *f)).map(|r| r.billed()).sum();
+        // The assembler's own reading of each frame is one; the protocol's share is what the contract bounds.
+        let per_frame = (billed as f64 - 300.0) / 300.0;
+        assert!(per_frame <= 12.0, "{per_frame} requests a frame");
+        assert_eq!(built(&seen), 1, "with `frames` given no GIF is made too early");
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_requests_of_a_lonely_frame_are_these() {
-    let mut stage = stage(|_| {}).await;
-    stage.upload("film", &[frames(2)]).await;
-    stage.settle().await;
-    stage.upload("film", &[("a.txt", scene(4.0))]).await;
-    stage.settle().await;
-    stage.seen();
-    stage.upload("film", &[("b.txt", scene(8.0))]).await;
-    stage.until("film", Status::Done).await;
-    let seen = stage.seen();
-    let render = requests(&seen, Function::Render);
-    assert_eq!(render.len(), 1);
-    assert!(render[0].billed() <= 12, "{render:?}");
-    assert_eq!(render[0].delete, 0);
-    // It writes its frame, the manifest and the claim.
-    assert_eq!(render[0].put, 3, "{render:?}");
-    let kinds = |of: Function| {
-        let keys = seen.iter().filter_map(move |o| match &o.seen {
-            Seen::Requested { attempt, request }
-                if attempt.function == of && request.kind == RequestKind::Put =>
-            {
-                Some(request.key.split('/').next().unwrap().to_owned())
-            }
-            _ => None,
-        });
-        keys.collect::<Vec<_>>()
-    };
-    assert_eq!(kinds(Function::Render), ["frames", "manifests", "assemblies"]);
-    assert_eq!(kinds(Function::Assemble), ["animations"]);
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        stage.upload("film", &[frames(2)]).await;
+        stage.settle().await;
+        stage.upload("film", &[("a.txt", scene(4.0))]).await;
+        stage.settle().await;
+        stage.seen();
+        stage.upload("film", &[("b.txt", scene(8.0))]).await;
+        stage.until("film", Status::Done).await;
+        let seen = stage.seen();
+        let render = requests(&seen, Function::Render);
+        assert_eq!(render.len(), 1);
+        assert!(render[0].billed() <= 12, "{render:?}");
+        assert_eq!(render[0].delete, 0);
+        // It writes its frame, the manifest and the claim.
+        assert_eq!(render[0].put, 3, "{render:?}");
+        let kinds = |of: Function| {
+            let keys = seen.iter().filter_map(move |o| match &o.seen {
+                Seen::Requested { attempt, request }
+                    if attempt.function == of && request.kind == RequestKind::Put =>
+                {
+                    Some(request.key.split('/').next().unwrap().to_owned())
+                }
+                _ => None,
+            });
+            keys.collect::<Vec<_>>()
+        };
+        assert_eq!(kinds(Function::Render), ["frames", "manifests", "assemblies"]);
+        assert_eq!(kinds(Function::Assemble), ["animations"]);
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn logs_hold_no_script_contents() {
-    let mut stage = stage(|_| {}).await;
-    let secret = "# the villain is the gardener\n";
-    let files = vec![
-        ("a.txt", format!("{secret}{}", scene(4.0))),
-        ("b.txt", format!("{secret}Sphere gardener\nTrace\n")),
-        frames(2),
-    ];
-    stage.upload("film", &files).await;
-    stage.until("film", Status::Failed).await;
-    let lines = stage::logged(&stage.seen());
-    assert!(lines.iter().any(|line| line["message"] == "rendered" && line["animation"] == "film"));
-    for line in &lines {
-        assert!(!line.to_string().contains("gardener"), "{line}");
-        if line["message"] == "rendered" && line["frame"].is_string() {
-            for field in ["request_id", "animation", "read_ms", "draw_ms", "put_ms", "fold_ms"] {
-                assert!(!line[field].is_null(), "{field} is missing in {line}");
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let secret = "# the villain is the gardener\n";
+        let files = vec![
+            ("a.txt", format!("{secret}{}", scene(4.0))),
+            ("b.txt", format!("{secret}Sphere gardener\nTrace\n")),
+            frames(2),
+        ];
+        stage.upload("film", &files).await;
+        stage.until("film", Status::Failed).await;
+        let lines = stage::logged(&stage.seen());
+        assert!(lines.iter().any(|line| line["message"] == "rendered" && line["animation"] == "film"));
+        for line in &lines {
+            assert!(!line.to_string().contains("gardener"), "{line}");
+            if line["message"] == "rendered" && line["frame"].is_string() {
+                for field in ["request_id", "animation", "read_ms", "draw_ms", "put_ms", "fold_ms"] {
+                    assert!(!line[field].is_null(), "{field} is missing in {line}");
+                }
             }
         }
-    }
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn nothing_is_written_where_it_does_not_belong() {
-    let mut stage = stage(|_| {}).await;
-    let files = vec![("a.txt", scene(4.0)), ("b.txt", scene(8.0)), frames(2)];
-    stage.upload("film", &files).await;
-    stage.until_gif_of("film", &files).await;
-    let page = stage.store().list(ListRequest::all("")).await.unwrap();
-    let mut prefixes: Vec<&str> =
-        page.objects.iter().map(|object| object.key.split('/').next().unwrap()).collect();
-    prefixes.dedup();
-    assert_eq!(prefixes, ["animations", "assemblies", "frames", "manifests", "scripts"]);
-    for observation in stage.seen() {
-        if let Seen::Requested { attempt, request } = observation.seen
-            && matches!(request.kind, RequestKind::Put | RequestKind::Delete)
-        {
-            assert!(!request.key.starts_with("scripts/"), "{attempt:?} wrote {}", request.key);
-            let is_gif = request.key.starts_with("animations/");
-            assert!(!(is_gif && attempt.function == Function::Render), "render wrote {}", request.key);
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let files = vec![("a.txt", scene(4.0)), ("b.txt", scene(8.0)), frames(2)];
+        stage.upload("film", &files).await;
+        stage.until_gif_of("film", &files).await;
+        let page = stage.store().list(ListRequest::all("")).await.unwrap();
+        let mut prefixes: Vec<&str> =
+            page.objects.iter().map(|object| object.key.split('/').next().unwrap()).collect();
+        prefixes.dedup();
+        assert_eq!(prefixes, ["animations", "assemblies", "frames", "manifests", "scripts"]);
+        for observation in stage.seen() {
+            if let Seen::Requested { attempt, request } = observation.seen
+                && matches!(request.kind, RequestKind::Put | RequestKind::Delete)
+            {
+                assert!(!request.key.starts_with("scripts/"), "{attempt:?} wrote {}", request.key);
+                let is_gif = request.key.starts_with("animations/");
+                assert!(!(is_gif && attempt.function == Function::Render), "render wrote {}", request.key);
+            }
         }
-    }
+    })
+    .await;
 }

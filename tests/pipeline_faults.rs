@@ -1,7 +1,7 @@
 //! The pipeline when things go wrong at a chosen moment: processes killed between two requests, answers lost, the invoker
 //! down, events lost. After each the animation is what the uploaded set says, or says why it is not.
 
-#![allow(clippy::print_stderr, reason = "installing MinIO takes minutes and says so")]
+#![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
 mod stage;
@@ -11,14 +11,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
+use rayfold_local::StoreKind;
 use rayfold_local::invoker::{Chaos, Fate, Fates, Settings};
 use rayfold_local::observation::{Outcome, RequestKind, Seen};
 use rayfold_local::routes::Function;
 use rayfold_pipeline::manifest::{FrameState, Status};
+use stage::stores::on_every_store;
 use stage::{Stage, built, drawn, frames, scene};
 
-async fn stage(change: impl FnOnce(&mut Settings)) -> Stage {
-    stage::stage(Path::new(env!("CARGO_BIN_EXE_rayfold-render")).parent().unwrap(), change).await
+async fn stage(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Stage {
+    stage::stage(store, Path::new(env!("CARGO_BIN_EXE_rayfold-render")).parent().unwrap(), change).await
 }
 
 /// The fate of the first `times` puts below a prefix by a function.
@@ -46,66 +48,76 @@ fn crashes(stage: &mut Stage) -> usize {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_render_process_killed_in_the_middle_is_made_good() {
-    for prefix in ["frames/", "manifests/", "assemblies/"] {
-        for fate in [Fate::KillBefore, Fate::KillAfter, Fate::LoseAnswer] {
-            let (fates, met) = at_put(Function::Render, prefix, 1, fate);
-            let mut stage = stage(|settings| settings.fates = Some(fates)).await;
-            stage.upload("film", &film()).await;
-            stage.until_gif_of("film", &film()).await;
-            // A manifest whose put took effect stands, whether or not anyone heard of it: the next attempt at the event
-            // finds its own commit, lists once more, and puts another only if something has come meanwhile.
-            let again = prefix != "manifests/" || fate == Fate::KillBefore;
-            let met = met.load(Ordering::SeqCst);
-            assert!(met > usize::from(again), "{fate:?} at {prefix}: written {met} times");
-            let expected = usize::from(fate != Fate::LoseAnswer);
-            assert_eq!(crashes(&mut stage), expected, "{fate:?} at {prefix}");
+    on_every_store(async |store| {
+        for prefix in ["frames/", "manifests/", "assemblies/"] {
+            for fate in [Fate::KillBefore, Fate::KillAfter, Fate::LoseAnswer] {
+                let (fates, met) = at_put(Function::Render, prefix, 1, fate);
+                let mut stage = stage(store, |settings| settings.fates = Some(fates)).await;
+                stage.upload("film", &film()).await;
+                stage.until_gif_of("film", &film()).await;
+                // A manifest whose put took effect stands, whether or not anyone heard of it: the next attempt at the event
+                // finds its own commit, lists once more, and puts another only if something has come meanwhile.
+                let again = prefix != "manifests/" || fate == Fate::KillBefore;
+                let met = met.load(Ordering::SeqCst);
+                assert!(met > usize::from(again), "{fate:?} at {prefix}: written {met} times");
+                let expected = usize::from(fate != Fate::LoseAnswer);
+                assert_eq!(crashes(&mut stage), expected, "{fate:?} at {prefix}");
+            }
         }
-    }
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn an_assembler_killed_while_writing_is_made_good() {
-    for fate in [Fate::KillBefore, Fate::KillAfter, Fate::LoseAnswer, Fate::SlowDown] {
-        let (fates, _) = at_put(Function::Assemble, "animations/", 1, fate);
-        let mut stage = stage(|settings| settings.fates = Some(fates)).await;
-        stage.upload("film", &film()).await;
-        stage.until_gif_of("film", &film()).await;
-        let expected = usize::from(matches!(fate, Fate::KillBefore | Fate::KillAfter));
-        assert_eq!(crashes(&mut stage), expected, "{fate:?}");
-    }
+    on_every_store(async |store| {
+        for fate in [Fate::KillBefore, Fate::KillAfter, Fate::LoseAnswer, Fate::SlowDown] {
+            let (fates, _) = at_put(Function::Assemble, "animations/", 1, fate);
+            let mut stage = stage(store, |settings| settings.fates = Some(fates)).await;
+            stage.upload("film", &film()).await;
+            stage.until_gif_of("film", &film()).await;
+            let expected = usize::from(matches!(fate, Fate::KillBefore | Fate::KillAfter));
+            assert_eq!(crashes(&mut stage), expected, "{fate:?}");
+        }
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_frame_whose_function_dies_every_time_is_named() {
-    let fates: Fates = Arc::new(|attempt, request| {
-        let is_it = attempt.function == Function::Render
-            && request.kind == RequestKind::Put
-            && request.key.starts_with("frames/film/b@");
-        if is_it { Fate::KillBefore } else { Fate::Pass }
-    });
-    let mut stage = stage(|settings| settings.fates = Some(fates)).await;
-    stage.upload("film", &film()).await;
-    let manifest = stage.until("film", Status::Failed).await;
-    let failed: Vec<_> = manifest
-        .frames
-        .iter()
-        .filter_map(|frame| match &frame.state {
-            FrameState::Failed(fault) => {
-                Some((frame.script.as_str(), &fault.reason.as_ref().unwrap().message))
-            }
-            _ => None,
-        })
-        .collect();
-    assert_eq!(failed.len(), 1);
-    assert_eq!(failed[0].0, "b");
-    assert!(failed[0].1.contains("died in each of 3 attempts"), "{}", failed[0].1);
-    assert_eq!(crashes(&mut stage), 3);
-    assert_eq!(stage.gif_info("film").await, None);
+    on_every_store(async |store| {
+        let fates: Fates = Arc::new(|attempt, request| {
+            let is_it = attempt.function == Function::Render
+                && request.kind == RequestKind::Put
+                && request.key.starts_with("frames/film/b@");
+            if is_it { Fate::KillBefore } else { Fate::Pass }
+        });
+        let mut stage = stage(store, |settings| settings.fates = Some(fates)).await;
+        stage.upload("film", &film()).await;
+        let manifest = stage.until("film", Status::Failed).await;
+        let failed: Vec<_> = manifest
+            .frames
+            .iter()
+            .filter_map(|frame| match &frame.state {
+                FrameState::Failed(fault) => {
+                    Some((frame.script.as_str(), &fault.reason.as_ref().unwrap().message))
+                }
+                _ => None,
+            })
+            .collect();
+        assert_eq!(failed.len(), 1);
+        assert_eq!(failed[0].0, "b");
+        assert!(failed[0].1.contains("died in each of 3 attempts"), "{}", failed[0].1);
+        assert_eq!(crashes(&mut stage), 3);
+        assert_eq!(stage.gif_info("film").await, None);
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_frame_that_takes_too_long_is_named() {
-    let mut stage = stage(|settings| {
+    on_every_store(async |store| {
+    let mut stage = stage(store, |settings| {
         settings.timeout = Duration::from_secs(3);
         settings.retry_pauses = vec![Duration::from_millis(10), Duration::from_millis(10)];
     })
@@ -123,6 +135,7 @@ async fn a_frame_that_takes_too_long_is_named() {
         .filter(|o| matches!(&o.seen, Seen::Finished { outcome: Outcome::Failed(body), .. } if body.contains("out of time")))
         .count();
     assert_eq!(told, 3, "it stops in time to say so and is not killed");
+    }).await;
 }
 
 /// Enough to trace for a minute.
@@ -137,82 +150,91 @@ fn mirrors() -> String {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn uploads_while_the_invoker_is_down_are_caught_up_with() {
-    let mut stage = stage(|_| {}).await;
-    let mut files = film();
-    stage.upload("film", &files[..2]).await;
-    stage.settle().await;
-    stage.platform.stop_invoker().await;
-    files[1].1 = scene(9.0);
-    stage.upload("film", &files[1..]).await;
-    stage.upload("other", &film()).await;
-    assert_eq!(stage.gif_info("other").await, None);
-    stage.restart_invoker().await;
-    stage.until_gif_of("film", &files).await;
-    stage.until_gif_of("other", &film()).await;
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let mut files = film();
+        stage.upload("film", &files[..2]).await;
+        stage.settle().await;
+        stage.platform.stop_invoker().await;
+        files[1].1 = scene(9.0);
+        stage.upload("film", &files[1..]).await;
+        stage.upload("other", &film()).await;
+        assert_eq!(stage.gif_info("other").await, None);
+        stage.restart_invoker().await;
+        stage.until_gif_of("film", &files).await;
+        stage.until_gif_of("other", &film()).await;
 
-    // And what is done is left alone by the next start.
-    stage.seen();
-    stage.restart_invoker().await;
-    stage.settle().await;
-    let seen = stage.seen();
-    assert_eq!((drawn(&seen), built(&seen)), (0, 0));
+        // And what is done is left alone by the next start.
+        stage.seen();
+        stage.restart_invoker().await;
+        stage.settle().await;
+        let seen = stage.seen();
+        assert_eq!((drawn(&seen), built(&seen)), (0, 0));
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn lost_events_are_found_by_the_sweep() {
-    let mut stage = stage(|settings| {
-        settings.chaos = Chaos { seed: 3, drop: 0.4, ..Chaos::default() };
-        settings.sweep_every = Some(Duration::from_millis(500));
-        settings.environment.push(("RAYFOLD_STUCK_AFTER_MS".into(), "1000".into()));
-        // Wakings are events too, and lost as often: with three attempts some frames would be given up.
-        settings.environment.push(("RAYFOLD_ATTEMPTS".into(), "20".into()));
+    on_every_store(async |store| {
+        let mut stage = stage(store, |settings| {
+            settings.chaos = Chaos { seed: 3, drop: 0.4, ..Chaos::default() };
+            settings.sweep_every = Some(Duration::from_millis(500));
+            settings.environment.push(("RAYFOLD_STUCK_AFTER_MS".into(), "1000".into()));
+            // Wakings are events too, and lost as often: with three attempts some frames would be given up.
+            settings.environment.push(("RAYFOLD_ATTEMPTS".into(), "20".into()));
+        })
+        .await;
+        let names: Vec<String> = (1..=12).map(|number| format!("f{number}.txt")).collect();
+        let mut files: Vec<_> =
+            names.iter().zip(1..).map(|(name, x)| (name.as_str(), scene(f64::from(x)))).collect();
+        files.push(frames(12));
+        stage.upload("film", &files).await;
+        stage.until_gif_of("film", &files).await;
+        let woken: u64 = stage::logged(&stage.seen()).iter().filter_map(|line| line["woken"].as_u64()).sum();
+        assert!(woken > 0, "with two fifths of the events lost something had to be woken");
     })
     .await;
-    let names: Vec<String> = (1..=12).map(|number| format!("f{number}.txt")).collect();
-    let mut files: Vec<_> =
-        names.iter().zip(1..).map(|(name, x)| (name.as_str(), scene(f64::from(x)))).collect();
-    files.push(frames(12));
-    stage.upload("film", &files).await;
-    stage.until_gif_of("film", &files).await;
-    let woken: u64 = stage::logged(&stage.seen()).iter().filter_map(|line| line["woken"].as_u64()).sum();
-    assert!(woken > 0, "with two fifths of the events lost something had to be woken");
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_storm_of_everything_ends_in_the_right_gif() {
-    let seed = std::env::var("RAYFOLD_TEST_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(11);
-    eprintln!("RAYFOLD_TEST_SEED={seed}");
-    let random = std::sync::Mutex::new(fastrand::Rng::with_seed(seed));
-    let fates: Fates = Arc::new(move |_, _| match random.lock().unwrap().u32(0..200) {
-        0 => Fate::KillBefore,
-        1 => Fate::KillAfter,
-        2 | 3 => Fate::LoseAnswer,
-        4..=7 => Fate::SlowDown,
-        _ => Fate::Pass,
-    });
-    let mut stage = stage(|settings| {
-        settings.concurrency = 8;
-        settings.fates = Some(fates);
-        settings.sweep_every = Some(Duration::from_secs(1));
-        settings.environment.push(("RAYFOLD_STUCK_AFTER_MS".into(), "3000".into()));
-        settings.chaos = Chaos {
-            seed,
-            duplicate: 0.2,
-            delay: 0.3,
-            delay_up_to: Duration::from_millis(500),
-            drop: 0.05,
-            ..Chaos::default()
-        };
+    on_every_store(async |store| {
+        let seed = std::env::var("RAYFOLD_TEST_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(11);
+        eprintln!("RAYFOLD_TEST_SEED={seed}");
+        let random = std::sync::Mutex::new(fastrand::Rng::with_seed(seed));
+        let fates: Fates = Arc::new(move |_, _| match random.lock().unwrap().u32(0..200) {
+            0 => Fate::KillBefore,
+            1 => Fate::KillAfter,
+            2 | 3 => Fate::LoseAnswer,
+            4..=7 => Fate::SlowDown,
+            _ => Fate::Pass,
+        });
+        let mut stage = stage(store, |settings| {
+            settings.concurrency = 8;
+            settings.fates = Some(fates);
+            settings.sweep_every = Some(Duration::from_secs(1));
+            settings.environment.push(("RAYFOLD_STUCK_AFTER_MS".into(), "3000".into()));
+            settings.chaos = Chaos {
+                seed,
+                duplicate: 0.2,
+                delay: 0.3,
+                delay_up_to: Duration::from_millis(500),
+                drop: 0.05,
+                ..Chaos::default()
+            };
+        })
+        .await;
+        let names: Vec<String> = (1..=30).map(|number| format!("f{number}.txt")).collect();
+        let mut files: Vec<_> =
+            names.iter().zip(1..).map(|(name, x)| (name.as_str(), scene(f64::from(x)))).collect();
+        files.push(frames(30));
+        stage.upload("film", &files).await;
+        for place in [3, 17, 29] {
+            files[place].1 = scene(place as f64 / 2.0);
+            stage.upload("film", &files[place..=place]).await;
+        }
+        stage.until_gif_of("film", &files).await;
     })
     .await;
-    let names: Vec<String> = (1..=30).map(|number| format!("f{number}.txt")).collect();
-    let mut files: Vec<_> =
-        names.iter().zip(1..).map(|(name, x)| (name.as_str(), scene(f64::from(x)))).collect();
-    files.push(frames(30));
-    stage.upload("film", &files).await;
-    for place in [3, 17, 29] {
-        files[place].1 = scene(place as f64 / 2.0);
-        stage.upload("film", &files[place..=place]).await;
-    }
-    stage.until_gif_of("film", &files).await;
 }

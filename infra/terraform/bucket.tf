@@ -2,7 +2,7 @@
 
 resource "aws_s3_bucket" "this" {
   #checkov:skip=CKV_AWS_144:Frames and GIFs can be made again from the scripts, and their owner has those
-  #checkov:skip=CKV_AWS_145:The key is optional (customer_managed_key): with it the same bytes render again
+  #checkov:skip=CKV_AWS_145:The key is optional (kms_key_arn): with it the same bytes render again
   bucket        = local.bucket_name
   force_destroy = var.force_destroy
   tags          = local.tags
@@ -29,7 +29,7 @@ resource "aws_s3_bucket_policy" "this" {
 
   policy = jsonencode({
     Version = "2012-10-17"
-    Statement = [
+    Statement = concat([
       {
         Sid       = "TlsOnly"
         Effect    = "Deny"
@@ -46,7 +46,7 @@ resource "aws_s3_bucket_policy" "this" {
         Resource  = [aws_s3_bucket.this.arn, "${aws_s3_bucket.this.arn}/*"]
         Condition = { NumericLessThan = { "s3:TlsVersion" = "1.2" } }
       },
-    ]
+    ], var.bucket_policy_statements)
   })
 
   # Both write the bucket's policy state; at the same time S3 answers with a conflict.
@@ -57,11 +57,11 @@ resource "aws_s3_bucket_server_side_encryption_configuration" "this" {
   bucket = aws_s3_bucket.this.bucket
 
   rule {
-    bucket_key_enabled = var.customer_managed_key
+    bucket_key_enabled = var.kms_key_arn != null
 
     apply_server_side_encryption_by_default {
-      sse_algorithm     = var.customer_managed_key ? "aws:kms" : "AES256"
-      kms_master_key_id = local.kms_key_arn
+      sse_algorithm     = var.kms_key_arn == null ? "AES256" : "aws:kms"
+      kms_master_key_id = var.kms_key_arn
     }
   }
 }

@@ -1,7 +1,13 @@
 # One page that answers: is it working, is it slow, is something stuck?
 
 locals {
-  # What each graph shows of both functions, in reading order.
+  # Partitions have consoles of their own.
+  console = lookup({
+    aws-cn     = "console.amazonaws.cn"
+    aws-us-gov = "console.amazonaws-us-gov.com"
+  }, local.partition, "console.aws.amazon.com")
+
+  # What each graph shows of the functions, in reading order.
   graphs = [
     { title = "Invocations", metric = "Invocations", stat = "Sum" },
     { title = "Errors and throttles", metric = "Errors", stat = "Sum", also = "Throttles" },
@@ -63,7 +69,8 @@ locals {
       region = local.region
       query = join(" | ", concat(
         [for name in values(local.log_group_names) : "SOURCE '${name}'"],
-        ["filter level in ['WARN', 'ERROR']", "sort @timestamp desc", "limit 50"],
+        # Of a timeout or a lack of memory only the platform tells.
+        ["filter level in ['WARN', 'ERROR'] or record.status in ['error', 'failure', 'timeout']", "sort @timestamp desc", "limit 50"],
       ))
     }
   }
@@ -72,6 +79,6 @@ locals {
 resource "aws_cloudwatch_dashboard" "this" {
   count = var.dashboard_enabled ? 1 : 0
 
-  dashboard_name = var.name
+  dashboard_name = local.global_name
   dashboard_body = jsonencode({ widgets = concat(local.graph_widgets, [local.queue_widget, local.log_widget]) })
 }

@@ -1,31 +1,51 @@
-# The two functions, their logs, and the events of the bucket that wake them.
+# The functions, their logs, and the events of the bucket that wake them.
 
 locals {
   function_names  = { for function in keys(local.functions) : function => "${var.name}-${function}" }
   log_group_names = { for function, name in local.function_names : function => "/aws/lambda/${name}" }
 
-  # Spelled out, as the key's policy names them and the groups name the key.
+  # Spelled out, as the roles name them and the functions, which need the roles, name the groups.
   log_group_arns = {
     for function, name in local.log_group_names :
     function => "arn:${local.partition}:logs:${local.region}:${local.account_id}:log-group:${name}"
   }
 }
 
+locals {
+  # What a script may ask for. The defaults fit the render function's memory, as measured with spheres, boxes and
+  # triangles: a megabyte holds 1,700 objects with their part of the script and of the search tree, and an image takes six
+  # bytes a pixel with its PNG.
+  limits = {
+    RAYFOLD_MAX_FRAMES       = tostring(var.limits.max_frames)
+    RAYFOLD_MAX_LIGHTS       = tostring(var.limits.max_lights)
+    RAYFOLD_MAX_SCRIPT_BYTES = tostring(var.limits.max_script_bytes)
+    RAYFOLD_MAX_OBJECTS = tostring(coalesce(
+      var.limits.max_objects,
+      max(10000, min(4000000, (var.render.memory_mb - 700) * 1700)),
+    ))
+    RAYFOLD_MAX_PIXELS = tostring(coalesce(
+      var.limits.max_pixels,
+      min(64000000, var.render.memory_mb * 50000),
+    ))
+  }
+}
+
 resource "aws_cloudwatch_log_group" "this" {
-  #checkov:skip=CKV_AWS_158:The key is optional (customer_managed_key); the logs hold no script contents
+  #checkov:skip=CKV_AWS_158:The key is optional (kms_key_arn); the logs hold no script contents
   #checkov:skip=CKV_AWS_338:log_retention_days decides; what failed is written into the bucket, which does not expire
   for_each = local.log_group_names
 
   name              = each.value
   retention_in_days = var.log_retention_days
-  kms_key_id        = local.kms_key_arn
+  kms_key_id        = var.kms_key_arn
   tags              = local.tags
 }
 
 resource "aws_lambda_function" "this" {
+  #checkov:skip=CKV_AWS_115:Optional (reserved_concurrency): a new account can set none aside
   #checkov:skip=CKV_AWS_116:The on-failure destination takes the place of a dead-letter queue and says more: the error too
-  #checkov:skip=CKV_AWS_117:The functions speak with AWS services only; in a VPC they would need endpoints for nothing
-  #checkov:skip=CKV_AWS_272:The packages are built from this source by whoever applies it; there is no third party to sign
+  #checkov:skip=CKV_AWS_117:Optional (vpc): the functions speak with AWS services only, and in a VPC need an endpoint for that
+  #checkov:skip=CKV_AWS_272:Optional (code_signing_config_arn): the packages are built from this source by whoever applies it
   for_each = local.functions
 
   function_name = local.function_names[each.key]
@@ -36,13 +56,15 @@ resource "aws_lambda_function" "this" {
   runtime          = "provided.al2023"
   architectures    = [var.architecture]
   handler          = "bootstrap"
-  filename         = local.packages[each.key]
-  source_code_hash = try(filebase64sha256(local.packages[each.key]), null)
+  filename         = local.packages[each.value.program]
+  source_code_hash = try(filebase64sha256(local.packages[each.value.program]), null)
+
+  code_signing_config_arn = var.code_signing_config_arn
 
   memory_size                    = each.value.memory_mb
   timeout                        = each.value.timeout_s
   reserved_concurrent_executions = each.value.reserved_concurrency
-  kms_key_arn                    = local.kms_key_arn
+  kms_key_arn                    = var.kms_key_arn
   tags                           = local.tags
 
   ephemeral_storage {
@@ -50,9 +72,19 @@ resource "aws_lambda_function" "this" {
   }
 
   environment {
-    variables = {
+    variables = merge(
       # Events name their bucket; the sweep and the failure queue's records are told which one to look at.
-      RAYFOLD_BUCKET = aws_s3_bucket.this.bucket
+      { RAYFOLD_BUCKET = aws_s3_bucket.this.bucket },
+      each.value.program == "render" ? local.limits : {},
+    )
+  }
+
+  dynamic "vpc_config" {
+    for_each = var.vpc == null ? [] : [var.vpc]
+
+    content {
+      subnet_ids         = vpc_config.value.subnet_ids
+      security_group_ids = vpc_config.value.security_group_ids
     }
   }
 
@@ -69,8 +101,8 @@ resource "aws_lambda_function" "this" {
 
   lifecycle {
     precondition {
-      condition     = fileexists(local.packages[each.key])
-      error_message = "There is no ${local.packages[each.key]}: build it with `cargo xtask package`, or name yours in `packages`."
+      condition     = fileexists(local.packages[each.value.program])
+      error_message = "There is no ${local.packages[each.value.program]}: build it with `cargo xtask package`, or name yours in `packages`."
     }
   }
 
@@ -88,9 +120,9 @@ resource "aws_lambda_function_recursion_config" "this" {
 }
 
 resource "aws_lambda_function_event_invoke_config" "this" {
-  for_each = aws_lambda_function.this
+  for_each = local.event_functions
 
-  function_name                = each.value.function_name
+  function_name                = aws_lambda_function.this[each.key].function_name
   maximum_retry_attempts       = var.event_retries
   maximum_event_age_in_seconds = var.event_max_age_s
 
@@ -102,18 +134,19 @@ resource "aws_lambda_function_event_invoke_config" "this" {
 }
 
 resource "aws_lambda_permission" "bucket" {
-  for_each = aws_lambda_function.this
+  for_each = local.event_functions
 
   statement_id   = "EventsOfTheBucket"
   action         = "lambda:InvokeFunction"
-  function_name  = each.value.function_name
+  function_name  = aws_lambda_function.this[each.key].function_name
   principal      = "s3.amazonaws.com"
   source_arn     = aws_s3_bucket.this.arn
   source_account = local.account_id
 }
 
 resource "aws_s3_bucket_notification" "this" {
-  bucket = aws_s3_bucket.this.bucket
+  bucket      = aws_s3_bucket.this.bucket
+  eventbridge = var.eventbridge_enabled
 
   dynamic "lambda_function" {
     for_each = local.routes
@@ -123,6 +156,17 @@ resource "aws_s3_bucket_notification" "this" {
       lambda_function_arn = aws_lambda_function.this[lambda_function.value.function].arn
       events              = lambda_function.value.events
       filter_prefix       = lambda_function.value.prefix
+    }
+  }
+
+  dynamic "topic" {
+    for_each = var.finished_topic_arn == null ? [] : [var.finished_topic_arn]
+
+    content {
+      id            = "finished"
+      topic_arn     = topic.value
+      events        = ["s3:ObjectCreated:*"]
+      filter_prefix = "animations/"
     }
   }
 

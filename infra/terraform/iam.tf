@@ -1,10 +1,12 @@
 # Who may do what. Each function has a role of its own with two policies: `objects`, the document in policies/ that the
-# end-to-end tests enforce on the same binaries, and `platform`, for what surrounds them in AWS.
+# end-to-end tests enforce on the same binaries, and `platform`, for what surrounds them in AWS. What people need is an
+# output, for the stack knows none of them.
 
 resource "aws_iam_role" "function" {
   for_each = local.functions
 
-  name                 = local.function_names[each.key]
+  name                 = "${local.global_name}-${each.key}"
+  path                 = var.role_path
   description          = "What the ${each.key} function of ${var.name} may do"
   permissions_boundary = var.permissions_boundary_arn
   tags                 = local.tags
@@ -26,7 +28,7 @@ resource "aws_iam_role_policy" "objects" {
   role = aws_iam_role.function[each.key].id
 
   # Through jsondecode, so that a template that is no JSON fails the plan.
-  policy = jsonencode(jsondecode(templatefile("${path.module}/policies/${each.key}.json.tftpl", {
+  policy = jsonencode(jsondecode(templatefile("${path.module}/policies/${each.value.program}.json.tftpl", {
     bucket_arn = aws_s3_bucket.this.arn
   })))
 }
@@ -58,24 +60,53 @@ locals {
       Resource = aws_sqs_queue.failures.arn
     }]
     assemble = [{
-      Sid      = "HandOverAndReadFailedEvents"
+      Sid      = "HandOverFailedEvents"
       Effect   = "Allow"
-      Action   = ["sqs:DeleteMessage", "sqs:GetQueueAttributes", "sqs:ReceiveMessage", "sqs:SendMessage"]
+      Action   = ["sqs:SendMessage"]
+      Resource = aws_sqs_queue.failures.arn
+    }]
+    record = [{
+      Sid      = "ReadFailedEvents"
+      Effect   = "Allow"
+      Action   = ["sqs:DeleteMessage", "sqs:GetQueueAttributes", "sqs:ReceiveMessage"]
       Resource = aws_sqs_queue.failures.arn
     }]
   }
 
-  key_statements = [for arn in aws_kms_key.this[*].arn : {
-    Sid      = "UseTheKeyThroughBucketAndQueue"
-    Effect   = "Allow"
-    Action   = ["kms:Decrypt", "kms:GenerateDataKey"]
-    Resource = arn
-    Condition = {
-      StringEquals = {
-        "kms:ViaService" = ["s3.${local.region}.amazonaws.com", "sqs.${local.region}.amazonaws.com"]
-      }
-    }
-  }]
+  key_statements = concat([for arn in var.kms_key_arn[*] : {
+    Sid       = "UseTheKeyThroughBucketAndQueue"
+    Effect    = "Allow"
+    Action    = ["kms:Decrypt", "kms:GenerateDataKey"]
+    Resource  = arn
+    Condition = { StringEquals = { "kms:ViaService" = [local.kms_s3, local.kms_sqs] } }
+  }], local.former_key_statements)
+
+  # What Lambda needs to put a function into a VPC, which knows no resources; the function's own code may not use it.
+  vpc_actions = [
+    "ec2:AssignPrivateIpAddresses", "ec2:CreateNetworkInterface", "ec2:DeleteNetworkInterface",
+    "ec2:DescribeNetworkInterfaces", "ec2:DescribeSubnets", "ec2:UnassignPrivateIpAddresses",
+  ]
+  vpc_statements = {
+    for function, name in local.function_names : function => concat(
+      [for vpc in var.vpc[*] : {
+        Sid      = "BeInTheVpc"
+        Effect   = "Allow"
+        Action   = local.vpc_actions
+        Resource = "*"
+      }],
+      [for vpc in var.vpc[*] : {
+        Sid      = "OnlyLambdaItself"
+        Effect   = "Deny"
+        Action   = local.vpc_actions
+        Resource = "*"
+        Condition = {
+          ArnEquals = {
+            "lambda:SourceFunctionArn" = "arn:${local.partition}:lambda:${local.region}:${local.account_id}:function:${name}"
+          }
+        }
+      }],
+    )
+  }
 }
 
 resource "aws_iam_role_policy" "platform" {
@@ -91,12 +122,14 @@ resource "aws_iam_role_policy" "platform" {
       local.trace_statements,
       local.failure_statements[each.key],
       local.key_statements,
+      local.vpc_statements[each.key],
     )
   })
 }
 
 resource "aws_iam_role" "scheduler" {
-  name                 = "${var.name}-sweep-schedule"
+  name                 = "${local.global_name}-sweep-schedule"
+  path                 = var.role_path
   description          = "Lets the schedule of ${var.name} wake the assemble function"
   permissions_boundary = var.permissions_boundary_arn
   tags                 = local.tags
@@ -138,13 +171,41 @@ resource "aws_iam_role_policy" "scheduler" {
           Resource = aws_sqs_queue.dead_letters.arn
         },
       ],
-      [for arn in aws_kms_key.this[*].arn : {
+      [for arn in var.kms_key_arn[*] : {
         Sid       = "UseTheKeyThroughTheQueue"
         Effect    = "Allow"
         Action    = ["kms:Decrypt", "kms:GenerateDataKey"]
         Resource  = arn
-        Condition = { StringEquals = { "kms:ViaService" = ["sqs.${local.region}.amazonaws.com"] } }
+        Condition = { StringEquals = { "kms:ViaService" = [local.kms_sqs] } }
       }],
     )
   })
+}
+
+locals {
+  # What each kind of user may do with objects: policies/KIND.json.tftpl, which the tests of the commands enforce.
+  users = {
+    viewer   = ["kms:Decrypt"]
+    uploader = ["kms:Decrypt", "kms:GenerateDataKey"]
+    operator = ["kms:Decrypt", "kms:GenerateDataKey"]
+  }
+
+  user_policies = {
+    for user, key_actions in local.users : user => jsonencode({
+      Version = "2012-10-17"
+      Statement = concat(
+        jsondecode(templatefile("${path.module}/policies/${user}.json.tftpl", {
+          bucket_arn = aws_s3_bucket.this.arn
+        })).Statement,
+        [for arn in var.kms_key_arn[*] : {
+          Sid       = "UseTheKeyThroughTheBucket"
+          Effect    = "Allow"
+          Action    = key_actions
+          Resource  = arn
+          Condition = { StringEquals = { "kms:ViaService" = [local.kms_s3] } }
+        }],
+        local.former_key_statements,
+      )
+    })
+  }
 }

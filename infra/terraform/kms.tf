@@ -1,43 +1,36 @@
-# The one key, on demand, for everything that is stored.
+# The caller's key, if there is one. The stack makes none, so that nothing done to the stack can destroy the key that its
+# objects are encrypted with.
 
-resource "aws_kms_key" "this" {
-  count = var.customer_managed_key ? 1 : 0
+locals {
+  # By way of which services the stack and its users may use the key.
+  kms_s3  = "s3.${local.region}.${local.dns_suffix}"
+  kms_sqs = "sqs.${local.region}.${local.dns_suffix}"
 
-  description             = "${var.name}: bucket, queues, logs and function settings"
-  enable_key_rotation     = true
-  deletion_window_in_days = 30
-  tags                    = local.tags
-
-  policy = jsonencode({
-    Version = "2012-10-17"
-    Statement = [
-      {
-        # Leaves the decision to the IAM policies of the account; without it nobody could manage the key.
-        Sid       = "AccountAdministersByIam"
-        Effect    = "Allow"
-        Principal = { AWS = "arn:${local.partition}:iam::${local.account_id}:root" }
-        Action    = "kms:*"
-        Resource  = "*"
-      },
-      {
-        Sid       = "LogGroupsOfTheFunctions"
-        Effect    = "Allow"
-        Principal = { Service = "logs.${local.region}.amazonaws.com" }
-        Action    = ["kms:Decrypt", "kms:DescribeKey", "kms:Encrypt", "kms:GenerateDataKey*", "kms:ReEncrypt*"]
-        Resource  = "*"
-        Condition = {
-          ArnEquals = {
-            "kms:EncryptionContext:aws:logs:arn" = [for group in values(local.log_group_arns) : group]
-          }
-        }
-      },
-    ]
-  })
+  # Objects that were encrypted with a key that the bucket no longer uses can still be read.
+  former_key_statements = [for arn in var.former_kms_key_arns : {
+    Sid       = "ReadWhatItEncrypted${index(var.former_kms_key_arns, arn)}"
+    Effect    = "Allow"
+    Action    = ["kms:Decrypt"]
+    Resource  = arn
+    Condition = { StringEquals = { "kms:ViaService" = [local.kms_s3] } }
+  }]
 }
 
-resource "aws_kms_alias" "this" {
-  count = var.customer_managed_key ? 1 : 0
+# Up to version 0.1.0 the stack made the key itself. An upgrade forgets that key instead of destroying it: hand it back as
+# kms_key_arn.
 
-  name          = "alias/${var.name}"
-  target_key_id = aws_kms_key.this[0].key_id
+removed {
+  from = aws_kms_key.this
+
+  lifecycle {
+    destroy = false
+  }
+}
+
+removed {
+  from = aws_kms_alias.this
+
+  lifecycle {
+    destroy = false
+  }
 }

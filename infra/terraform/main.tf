@@ -1,6 +1,6 @@
 # What the other files share. The stack: bucket.tf (objects and their lifecycle), functions.tf (the two functions and
 # what wakes them), failures.tf (where failed events go), sweep.tf (the schedule), iam.tf (who may do what), kms.tf,
-# alarms.tf, dashboard.tf.
+# alarms.tf, budget.tf, dashboard.tf.
 
 data "aws_caller_identity" "current" {}
 
@@ -12,6 +12,7 @@ locals {
   account_id = data.aws_caller_identity.current.account_id
   partition  = data.aws_partition.current.partition
   region     = data.aws_region.current.region
+  dns_suffix = data.aws_partition.current.dns_suffix
 
   bucket_name = coalesce(var.bucket_name, "${var.name}-${local.account_id}-${local.region}")
 
@@ -23,12 +24,31 @@ locals {
     function => "${path.module}/../../target/packages/${var.architecture}/rayfold-${function}.zip"
   })
 
+  # `program`: which of the two packages it runs, and so which document of policies/ says what it may do with objects.
   functions = {
-    render   = merge(var.render, { description = "Renders one frame a script and keeps the manifest" })
-    assemble = merge(var.assemble, { description = "Writes the GIF, sweeps, and records failed events" })
+    render = merge(var.render, {
+      program     = "render"
+      description = "Renders one frame a script and keeps the manifest"
+    })
+    assemble = merge(var.assemble, {
+      program     = "assemble"
+      description = "Writes the GIF, and sweeps"
+    })
+    # The assemble program once more, with a short timeout: a queue must hide a batch for longer than its reader may
+    # take, and a record that fails once would wait for that long.
+    record = merge(var.record, {
+      program              = "assemble"
+      tmp_mb               = 512
+      reserved_concurrency = null
+      description          = "Writes failed events into the manifests"
+    })
   }
 
-  kms_key_arn = one(aws_kms_key.this[*].arn)
+  # Those that events of the bucket wake.
+  event_functions = toset([for route in local.routes : route.function])
+
+  # Names of roles and dashboards are the account's, not the region's.
+  global_name = "${var.name}-${local.region}"
 
   tags = merge({ Application = var.name }, var.tags)
 }

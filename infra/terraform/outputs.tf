@@ -19,27 +19,27 @@ output "submit_command" {
 }
 
 output "function_names" {
-  description = "Names of the functions, by `render` and `assemble`"
+  description = "Names of the functions, by `render`, `assemble` and `record`"
   value       = { for function, resource in aws_lambda_function.this : function => resource.function_name }
 }
 
 output "function_arns" {
-  description = "ARNs of the functions, by `render` and `assemble`"
+  description = "ARNs of the functions, by `render`, `assemble` and `record`"
   value       = { for function, resource in aws_lambda_function.this : function => resource.arn }
 }
 
 output "role_arns" {
-  description = "ARNs of the functions' roles, by `render` and `assemble`"
+  description = "ARNs of the functions' roles, by `render`, `assemble` and `record`"
   value       = { for function, resource in aws_iam_role.function : function => resource.arn }
 }
 
 output "log_group_names" {
-  description = "Names of the functions' log groups, by `render` and `assemble`"
+  description = "Names of the functions' log groups, by `render`, `assemble` and `record`"
   value       = { for function, resource in aws_cloudwatch_log_group.this : function => resource.name }
 }
 
 output "failure_queue_url" {
-  description = "URL of the queue of events that a function could not handle, which the assemble function reads"
+  description = "URL of the queue of events that a function could not handle, which the record function reads"
   value       = aws_sqs_queue.failures.url
 }
 
@@ -48,12 +48,12 @@ output "dead_letter_queue_url" {
   value       = aws_sqs_queue.dead_letters.url
 }
 
-output "kms_key_arn" {
-  description = "ARN of the stack's own key, null without one"
-  value       = local.kms_key_arn
+output "user_policies" {
+  description = "IAM policies for people, as JSON, by `viewer` (status, fetch), `uploader` (submit too) and `operator` (retry and remove too)"
+  value       = local.user_policies
 }
 
 output "dashboard_url" {
   description = "Address of the dashboard, null without one"
-  value       = one([for name in aws_cloudwatch_dashboard.this[*].dashboard_name : "https://${local.region}.console.aws.amazon.com/cloudwatch/home?region=${local.region}#dashboards/dashboard/${name}"])
+  value       = one([for name in aws_cloudwatch_dashboard.this[*].dashboard_name : "https://${local.region}.${local.console}/cloudwatch/home?region=${local.region}#dashboards/dashboard/${name}"])
 }

@@ -73,17 +73,63 @@ variable "access_log_prefix" {
   nullable    = false
 }
 
-variable "customer_managed_key" {
-  description = "Encrypt bucket, queues, logs and function settings with a key of the stack's own instead of keys that AWS manages. It costs a monthly fee and requests, and ETags then change at each upload, so that uploading the same bytes again renders them again"
+variable "kms_key_arn" {
+  description = "ARN of a KMS key of yours that encrypts bucket, queues, logs and function settings; null takes the keys that AWS manages. It must outlive the bucket. ETags then change at each upload, so that uploading the same bytes again renders them again"
+  type        = string
+  default     = null
+
+  validation {
+    condition     = var.kms_key_arn == null ? true : can(regex("^arn:[a-z-]+:kms:[a-z0-9-]+:[0-9]{12}:key/", var.kms_key_arn))
+    error_message = "kms_key_arn must be the ARN of a KMS key, not of an alias."
+  }
+}
+
+variable "former_kms_key_arns" {
+  description = "ARNs of the keys that objects of the bucket may still be encrypted with, so that they can be read after kms_key_arn has changed"
+  type        = list(string)
+  default     = []
+  nullable    = false
+
+  validation {
+    condition     = alltrue([for arn in var.former_kms_key_arns : can(regex("^arn:[a-z-]+:kms:[a-z0-9-]+:[0-9]{12}:key/", arn))])
+    error_message = "former_kms_key_arns must be ARNs of KMS keys."
+  }
+}
+
+variable "bucket_policy_statements" {
+  description = "Further statements for the bucket's policy, as objects with the keys of IAM's JSON"
+  type        = any
+  default     = []
+  nullable    = false
+
+  validation {
+    condition     = can([for statement in var.bucket_policy_statements : statement.Effect])
+    error_message = "bucket_policy_statements must be a list of statements, each with an Effect."
+  }
+}
+
+variable "eventbridge_enabled" {
+  description = "Whether the bucket tells EventBridge of its objects, so that rules there can act on a finished GIF (`animations/`)"
   type        = bool
   default     = false
   nullable    = false
 }
 
+variable "finished_topic_arn" {
+  description = "ARN of an SNS topic that is told of each finished GIF; its policy must let s3.amazonaws.com publish. Null tells none"
+  type        = string
+  default     = null
+
+  validation {
+    condition     = var.finished_topic_arn == null ? true : can(regex("^arn:[a-z-]+:sns:[a-z0-9-]+:[0-9]{12}:", var.finished_topic_arn))
+    error_message = "finished_topic_arn must be the ARN of an SNS topic."
+  }
+}
+
 # Functions
 
 variable "architecture" {
-  description = "Instruction set of both functions, `x86_64` or `arm64`; the packages must be built for it"
+  description = "Instruction set of the functions, `x86_64` or `arm64`; the packages must be built for it"
   type        = string
   default     = "x86_64"
   nullable    = false
@@ -95,7 +141,7 @@ variable "architecture" {
 }
 
 variable "packages" {
-  description = "Paths of the functions' zip files; null takes what `cargo xtask package` wrote for the architecture"
+  description = "Paths of the programs' zip files; null takes what `cargo xtask package` wrote for the architecture"
   type = object({
     render   = string
     assemble = string
@@ -133,7 +179,7 @@ variable "render" {
 }
 
 variable "assemble" {
-  description = "Size of the assemble function, which writes GIFs, sweeps and records failures"
+  description = "Size of the assemble function, which writes GIFs and sweeps"
   type = object({
     memory_mb            = optional(number, 3008)
     timeout_s            = optional(number, 900)
@@ -156,8 +202,82 @@ variable "assemble" {
     error_message = "assemble.tmp_mb must be a whole number from 512 to 10240."
   }
   validation {
-    condition     = var.assemble.reserved_concurrency == null ? true : var.assemble.reserved_concurrency >= 3
-    error_message = "assemble.reserved_concurrency must be at least 3: two for the failure queue's readers and one for claims and the sweep."
+    condition     = var.assemble.reserved_concurrency == null ? true : var.assemble.reserved_concurrency >= 2
+    error_message = "assemble.reserved_concurrency must be at least 2: one for claims and one for the sweep."
+  }
+}
+
+variable "record" {
+  description = "Size of the record function, which writes failed events into the manifests. A record that fails once is tried again after six times the timeout"
+  type = object({
+    memory_mb = optional(number, 512)
+    timeout_s = optional(number, 60)
+  })
+  default  = {}
+  nullable = false
+
+  validation {
+    condition     = var.record.memory_mb >= 128 && var.record.memory_mb <= 10240 && floor(var.record.memory_mb) == var.record.memory_mb
+    error_message = "record.memory_mb must be a whole number from 128 to 10240."
+  }
+  validation {
+    condition     = var.record.timeout_s >= 10 && var.record.timeout_s <= 900 && floor(var.record.timeout_s) == var.record.timeout_s
+    error_message = "record.timeout_s must be a whole number from 10 to 900."
+  }
+}
+
+variable "limits" {
+  description = "What a script may ask for: Traces (each is an invocation), pixels of an image, objects, lights, bytes. Null pixels and objects are as many as fit render.memory_mb: 64,000,000 and 1,817,300 with its default"
+  type = object({
+    max_frames       = optional(number, 10000)
+    max_pixels       = optional(number)
+    max_objects      = optional(number)
+    max_lights       = optional(number, 1024)
+    max_script_bytes = optional(number, 268435456)
+  })
+  default  = {}
+  nullable = false
+
+  validation {
+    condition     = alltrue([for limit in values(var.limits) : limit == null ? true : limit >= 1 && floor(limit) == limit])
+    error_message = "Each of limits must be a whole number of at least 1."
+  }
+}
+
+variable "vpc" {
+  description = "Subnets and security groups of a VPC for the functions, which there need an endpoint for S3; null puts them into none"
+  type = object({
+    subnet_ids         = list(string)
+    security_group_ids = list(string)
+  })
+  default = null
+
+  validation {
+    condition     = var.vpc == null ? true : length(var.vpc.subnet_ids) > 0 && length(var.vpc.security_group_ids) > 0
+    error_message = "vpc must name at least one subnet and one security group."
+  }
+}
+
+variable "code_signing_config_arn" {
+  description = "ARN of a code signing configuration that the packages must satisfy; null asks for no signature"
+  type        = string
+  default     = null
+
+  validation {
+    condition     = var.code_signing_config_arn == null ? true : can(regex("^arn:[a-z-]+:lambda:[a-z0-9-]+:[0-9]{12}:code-signing-config:", var.code_signing_config_arn))
+    error_message = "code_signing_config_arn must be the ARN of a code signing configuration."
+  }
+}
+
+variable "role_path" {
+  description = "Path of every role of the stack"
+  type        = string
+  default     = "/"
+  nullable    = false
+
+  validation {
+    condition     = can(regex("^/([!-~]+/)?$", var.role_path)) && length(var.role_path) <= 512
+    error_message = "role_path must begin and end with a slash."
   }
 }
 
@@ -259,6 +379,57 @@ variable "alarm_actions" {
   validation {
     condition     = alltrue([for arn in var.alarm_actions : startswith(arn, "arn:")])
     error_message = "alarm_actions must be ARNs."
+  }
+}
+
+variable "alarm_thresholds" {
+  description = "From where on the alarms go off: percent of invocations that fail, throttled invocations, percent of the timeout, age of waiting events and of failed ones, dropped events, unhandled ones, dead letters"
+  type = object({
+    error_percent    = optional(number, 10)
+    throttles        = optional(number, 1)
+    duration_percent = optional(number, 90)
+    event_age_s      = optional(number, 3600)
+    failure_age_s    = optional(number, 1800)
+    dropped_events   = optional(number, 1)
+    unhandled        = optional(number, 1)
+    dead_letters     = optional(number, 1)
+  })
+  default  = {}
+  nullable = false
+
+  validation {
+    condition     = alltrue([for threshold in values(var.alarm_thresholds) : threshold > 0])
+    error_message = "Each of alarm_thresholds must be above 0."
+  }
+  validation {
+    condition     = var.alarm_thresholds.error_percent <= 100 && var.alarm_thresholds.duration_percent <= 100
+    error_message = "alarm_thresholds.error_percent and duration_percent must be at most 100."
+  }
+}
+
+variable "runbook_url" {
+  description = "Address of RUNBOOK.md, or of your own page with the same headings, for the texts of the alarms"
+  type        = string
+  default     = "infra/terraform/RUNBOOK.md"
+  nullable    = false
+}
+
+variable "budget" {
+  description = "Dollars a month from which somebody is told what the stack costs: at 80 % spent, and at 100 % forecast. It needs the tag Application to be activated for cost allocation; null sets none"
+  type = object({
+    monthly_usd = number
+    emails      = optional(list(string), [])
+    topic_arns  = optional(list(string), [])
+  })
+  default = null
+
+  validation {
+    condition     = var.budget == null ? true : var.budget.monthly_usd > 0
+    error_message = "budget.monthly_usd must be above 0."
+  }
+  validation {
+    condition     = var.budget == null ? true : length(var.budget.emails) + length(var.budget.topic_arns) > 0
+    error_message = "budget must name somebody to tell, in emails or topic_arns."
   }
 }
 

@@ -29,14 +29,14 @@ Keeping it, each month
   Together                                            0.0319
 
 The stack, each month, however many animations
-  Alarms                                     11       1.1000
+  Alarms                                     24       2.4000
   Dashboard                                   1       3.0000
   Schedule of the sweep                   2,880       0.0029
   Lambda: sweep invocations               2,880       0.0006
   Lambda: sweeping                   4,230 GB-s       0.0705
   S3: lists of the sweep                  5,760       0.0288
   Reading the failure queue             648,000       0.2592
-  Together                                            4.4620
+  Together                                            5.7620
 
 "#]]);
 }

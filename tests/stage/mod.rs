@@ -1,20 +1,22 @@
-//! A stage for end-to-end tests: MinIO, the invoker and the unmodified function binaries, with scripts going in and GIFs
-//! coming out. Everything is started fresh for each test, on free loopback ports, and ends with it. Each function runs
+//! A stage for end-to-end tests: an S3 server, the invoker and the unmodified function binaries, with scripts going in and
+//! GIFs coming out. Everything is started fresh for each test, on free loopback ports, and ends with it. Each function runs
 //! under the policy of its own role, the document that Terraform gives it on AWS: what that lacks fails a test.
 
 #![allow(dead_code, unreachable_pub, reason = "a module of several test files, which use each a part of it")]
 
 pub mod role;
+pub mod stores;
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use rayfold_local::invoker::{Invoker, Settings};
 use rayfold_local::observation::{Observation, Requests, Seen};
 use rayfold_local::routes::Function;
-use rayfold_local::{Functions, Plan, Platform};
+use rayfold_local::{Functions, Plan, Platform, StoreKind};
 use rayfold_pipeline::assemble::generation_of;
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Manifest, Status};
@@ -32,10 +34,29 @@ pub struct Stage {
     data: tempfile::TempDir,
 }
 
+/// The folder of the function binaries, where the program is. `cargo test` for one package alone does not build what belongs
+/// to another: then they are built here.
+pub fn functions_beside(program: &Path) -> &Path {
+    let folder = program.parent().unwrap();
+    if folder.join("rayfold-render").exists() && folder.join("rayfold-assemble").exists() {
+        return folder;
+    }
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo
+        .args(["build", "--locked", "-p", "rayfold-lambda", "--bins", "--target-dir"])
+        .arg(folder.parent().unwrap());
+    cargo.current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."));
+    if folder.ends_with("release") {
+        cargo.arg("--release");
+    }
+    assert!(cargo.status().unwrap().success(), "the function binaries do not build");
+    folder
+}
+
 /// Starts everything; `change` alters the invoker's settings.
-pub async fn stage(functions: &Path, change: impl FnOnce(&mut Settings)) -> Stage {
+pub async fn stage(store: StoreKind, functions: &Path, change: impl FnOnce(&mut Settings)) -> Stage {
     let data = tempfile::tempdir().unwrap();
-    let plan = Plan::new(data.path(), Functions::in_folder(functions));
+    let plan = Plan::new(store, data.path(), Functions::in_folder(functions));
     let settings = |settings: &mut Settings| {
         settings.concurrency = 4;
         settings.retry_pauses = vec![Duration::from_millis(50), Duration::from_millis(100)];
@@ -46,7 +67,7 @@ pub async fn stage(functions: &Path, change: impl FnOnce(&mut Settings)) -> Stag
     };
     let mut platform = Platform::start(&plan, settings, &mut |line| eprintln!("{line}")).await.unwrap();
     for function in Function::ALL {
-        let own = role::environment(platform.minio(), function, &plan.bucket).await;
+        let own = role::environment(platform.server(), function, &plan.bucket).await;
         platform.settings_mut().environment_of.insert(function, own);
     }
     let (sender, seen) = unbounded_channel();
@@ -109,7 +130,7 @@ impl Stage {
         self.store().get(&Animation::new(animation).unwrap().gif()).await.unwrap().body
     }
 
-    /// Waits until nothing is on its way any more: all invocations have ended, and MinIO has no event left to tell.
+    /// Waits until nothing is on its way any more: all invocations have ended, and the store has no event left to tell.
     pub async fn settle(&mut self) {
         let start = Instant::now();
         let mut quiet = 0;

@@ -1,16 +1,16 @@
-//! Taking a function's role, as Lambda does, by STS: MinIO then allows what the document says and no more.
+//! Taking a role by STS, a function's as Lambda does or that of a kind of user: the store then allows what the document says
+//! and no more.
 
+use std::fmt::Display;
 use std::path::Path;
 
 use aws_sdk_sts::config::{BehaviorVersion, Credentials, Region};
 use aws_smithy_http_client::Builder as HttpBuilder;
-use rayfold_local::connection;
-use rayfold_local::minio::Minio;
-use rayfold_local::routes::Function;
+use rayfold_local::S3Server;
 use rayfold_pipeline::store::Connection;
 
-/// The document of a function's role for a bucket, as Terraform renders it.
-pub fn policy(role: Function, bucket: &str) -> String {
+/// The document of a role for a bucket, as Terraform renders it: of a function, or of `viewer`, `uploader` or `operator`.
+pub fn policy(role: impl Display, bucket: &str) -> String {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../infra/terraform/policies");
     let template = std::fs::read_to_string(folder.join(format!("{role}.json.tftpl"))).unwrap();
     let document = template.replace("${bucket_arn}", &format!("arn:aws:s3:::{bucket}"));
@@ -19,9 +19,9 @@ pub fn policy(role: Function, bucket: &str) -> String {
 }
 
 /// Temporary credentials with the role's policy.
-pub async fn assume(minio: &Minio, role: Function, bucket: &str) -> Connection {
-    let owner = connection(minio);
-    let document: serde_json::Value = serde_json::from_str(&policy(role, bucket)).unwrap();
+pub async fn assume(server: &S3Server, role: impl Display, bucket: &str) -> Connection {
+    let owner = server.connection();
+    let document: serde_json::Value = serde_json::from_str(&policy(&role, bucket)).unwrap();
     let config = aws_sdk_sts::Config::builder()
         .behavior_version(BehaviorVersion::latest())
         .region(Region::new(owner.region.clone()))
@@ -47,9 +47,9 @@ pub async fn assume(minio: &Minio, role: Function, bucket: &str) -> Connection {
     }
 }
 
-/// The same for a function's process, in the variables that Lambda sets.
-pub async fn environment(minio: &Minio, role: Function, bucket: &str) -> Vec<(String, String)> {
-    let Connection { access_key, secret_key, session_token, .. } = assume(minio, role, bucket).await;
+/// The same for a process, in the variables that Lambda sets.
+pub async fn environment(server: &S3Server, role: impl Display, bucket: &str) -> Vec<(String, String)> {
+    let Connection { access_key, secret_key, session_token, .. } = assume(server, role, bucket).await;
     [
         ("AWS_ACCESS_KEY_ID", access_key),
         ("AWS_SECRET_ACCESS_KEY", secret_key),

@@ -1,12 +1,13 @@
 //! Measurements of rayfold, and the reports that they write.
 //!
 //! Each subcommand of the program is a module here and writes one report; what two of them need (the oracle, the hard
-//! cases, the ways to trace, the scenes) is a module beside them. Nothing that ships depends on this crate. A number in
+//! cases, the backends, the scenes) is a module beside them. Nothing that ships depends on this crate. A number in
 //! a report was measured by the run that wrote the report.
 
 #![allow(clippy::print_stderr, reason = "a measurement says what it is at")]
 
 pub mod accuracy;
+pub mod backends;
 #[cfg(feature = "bucket")]
 pub mod cold_start;
 pub mod cpu_time;
@@ -24,4 +25,3 @@ pub mod scenes;
 #[cfg(feature = "bucket")]
 pub mod simulate;
 pub mod speed;
-pub mod tracers;

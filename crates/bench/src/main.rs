@@ -14,7 +14,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Measurement {
-    /// Error and speed of every way to trace, and the hard cases at full size
+    /// Error and speed of every backend, and the hard cases at full size
     Accuracy(accuracy::Args),
     /// The paper's table: scenes from upload to GIF on MinIO and the local invoker
     #[cfg(feature = "bucket")]

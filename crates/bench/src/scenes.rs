@@ -9,7 +9,7 @@ use rayfold_scene::{
     Sphere, Triangle, natural_cmp, parse,
 };
 
-use crate::tracers::Ray;
+use crate::backends::Ray;
 
 /// A camera at `eye` that looks at `target` and sees `width` world units a unit of distance from side to side.
 ///
@@ -228,21 +228,7 @@ pub fn moved(scene: &Scene, scale: f64, offset: DVec3) -> Result<Scene> {
         pinhole.lower_left(),
         pinhole.upper_right(),
     )?);
-    let objects: Result<Vec<_>, InvalidValue> = scene
-        .objects
-        .iter()
-        .map(|object| {
-            Ok(match object {
-                Object::Sphere(s) => {
-                    Object::Sphere(Sphere::new(scale * s.radius(), place(s.center()), *s.material())?)
-                }
-                Object::Triangle(t) => {
-                    Object::Triangle(Triangle::new(t.vertices().map(place), *t.material())?)
-                }
-                Object::Cuboid(c) => Object::Cuboid(Cuboid::new(c.corners().map(place), *c.material())?),
-            })
-        })
-        .collect();
+    let objects: Result<Vec<_>, _> = scene.objects.iter().map(|object| object.placed(scale, place)).collect();
     moved.objects = objects.context("the moved scene")?.into();
     Ok(moved)
 }

@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::cloud::{fetch, remove, retry, status, submit};
 use crate::console::{Color, Console};
@@ -77,7 +77,7 @@ impl Command {
             Self::Remove(args) => remove::run(&args, console),
             #[cfg(unix)]
             Self::Dev(args) => dev::run(&args, console),
-            Self::Completions(args) => completions::run(&args, console),
+            Self::Completions(args) => completions::run(&args, App::command(), console),
         }
     }
 }

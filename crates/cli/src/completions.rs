@@ -1,9 +1,7 @@
 //! `rayfold completions`: scripts that make a shell complete rayfold's command line.
 
-use clap::CommandFactory;
 use clap_complete::Shell;
 
-use crate::app::App;
 use crate::console::Console;
 use crate::outcome::Outcome;
 
@@ -19,9 +17,10 @@ pub(crate) struct Args {
     shell: Shell,
 }
 
-pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
+/// Prints the script for `command`, which is the whole command line.
+pub(crate) fn run(args: &Args, mut command: clap::Command, console: &Console) -> anyhow::Result<Outcome> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut App::command(), "rayfold", &mut script);
+    clap_complete::generate(args.shell, &mut command, "rayfold", &mut script);
     console.print(&script)?;
     Ok(Outcome::Done)
 }

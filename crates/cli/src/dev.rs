@@ -1,17 +1,17 @@
 //! `rayfold dev`: the whole pipeline on this machine, until told to stop.
 //!
-//! MinIO, the bucket, its notifications and the local invoker with the function binaries. Everything it started ends with
-//! it; the data stays, and the next start goes on from there.
+//! An S3 server (the store built in, or MinIO), the bucket, its notifications and the local invoker with the function
+//! binaries. Everything it started ends with it; the data stays, and the next start goes on from there.
 
 mod news;
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
 use rayfold_local::invoker::Settings;
-use rayfold_local::{Error, Functions, Plan, Platform};
+use rayfold_local::{Error, Functions, Plan, Platform, StoreKind};
 use tokio::sync::mpsc::unbounded_channel;
 
 use crate::console::Console;
@@ -25,17 +25,25 @@ const LOOK: Duration = Duration::from_millis(50);
 /// How long the first lines wait for what was missed since the last run.
 const CATCH_UP: Duration = Duration::from_secs(3);
 
-/// Run the whole pipeline on this machine: MinIO, the bucket and the functions
+/// Run the whole pipeline on this machine: an S3 server, the bucket and the functions
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-MinIO is taken from RAYFOLD_MINIO or the PATH; without one it is installed from source, once,
-which needs Go 1.25 or later. Stop with Ctrl-C; the data is kept, and the next start goes on where
-this one was.
+Nothing has to be installed: the S3 server is part of rayfold. `--store minio` takes MinIO instead,
+from RAYFOLD_MINIO or the PATH; without one it is installed from source, once, which needs Go 1.25 or
+later. Each keeps objects of its own, `bucket/` and `objects/` in the data folder.
+
+The functions, rayfold-render and rayfold-assemble, are those in the folder that RAYFOLD_FUNCTIONS
+names; without it those beside rayfold, or on the PATH, or they are built where rayfold was built.
+
+Stop with Ctrl-C; the data is kept, and the next start goes on where this one was.
 
 Examples:
   rayfold dev                                            prints what to set in another terminal
   aws s3 sync scenes/hello s3://rayfold/scripts/hello/   there; the GIF appears below animations/")]
 pub(crate) struct Args {
+    /// What keeps the bucket
+    #[arg(long, value_name = "STORE", value_enum, default_value_t = StoreName::BuiltIn)]
+    store: StoreName,
     /// Where objects and credentials are kept [default: rayfold/dev in the user's data folder]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -48,6 +56,24 @@ pub(crate) struct Args {
     /// The bucket's name
     #[arg(long, value_name = "NAME", default_value = "rayfold")]
     bucket: String,
+}
+
+/// As the flag has it.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum StoreName {
+    /// The store in rayfold itself
+    BuiltIn,
+    /// MinIO, a program of its own
+    Minio,
+}
+
+impl From<StoreName> for StoreKind {
+    fn from(name: StoreName) -> Self {
+        match name {
+            StoreName::BuiltIn => Self::BuiltIn,
+            StoreName::Minio => Self::Minio,
+        }
+    }
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
@@ -70,7 +96,8 @@ async fn serve(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         Some(address) => address,
         None => usual_address(),
     };
-    let plan = Plan { data: data.clone(), address, bucket: args.bucket.clone(), functions };
+    let store = args.store.into();
+    let plan = Plan { store, data: data.clone(), address, bucket: args.bucket.clone(), functions };
     let settings = |settings: &mut Settings| {
         settings.concurrency = usize::from(args.concurrency);
         // An animation in which nothing has happened for so long has lost an event.
@@ -80,6 +107,10 @@ async fn serve(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let mut platform = tokio::select! {
         platform = start => match platform {
             Err(error @ Error::DataInUse(_)) => bail!("{error}: stop that one, or choose another folder by --data"),
+            Err(error @ Error::MinioFolder(_)) => bail!("{error} by --data"),
+            Err(error @ (Error::NoMinio(_) | Error::Install(_))) => {
+                bail!("{error}. Without `--store minio` nothing has to be installed")
+            }
             platform => platform?,
         },
         () = told_to_stop() => return Ok(Outcome::Interrupted),
@@ -90,6 +121,9 @@ async fn serve(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let _ = tokio::time::timeout(CATCH_UP, invoker.idle()).await;
     console.print(exports(&platform))?;
     console.note(format_args!("data in {}; Ctrl-C stops everything", data.display()));
+    for other in StoreKind::ALL.into_iter().filter(|kind| *kind != store && kind.objects(&data).exists()) {
+        console.note(format_args!("{}", left_alone(other, &data)));
+    }
     console.print(format!("aws s3 sync scenes/hello s3://{0}/scripts/hello/\n", args.bucket))?;
     let mut news = News::new(console, platform.store());
     loop {
@@ -99,15 +133,14 @@ async fn serve(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
                 None => bail!("the invoker has ended"),
             },
             () = news.tick() => news.look().await,
-            status = platform.minio().ended() => {
+            status = platform.server().ended() => {
                 bail!("MinIO has ended ({status}); its log is in {}", data.display());
             }
             () = told_to_stop() => break,
         }
     }
     console.note("stopping");
-    platform.stop_invoker().await;
-    drop(platform);
+    platform.stop().await;
     Ok(Outcome::Done)
 }
 
@@ -117,10 +150,20 @@ async fn told_to_stop() {
     }
 }
 
+/// What the other store keeps in the same data folder is not what is shown now.
+fn left_alone(other: StoreKind, data: &Path) -> String {
+    let flag = match other {
+        StoreKind::BuiltIn => "without --store",
+        StoreKind::Minio => "by --store minio",
+    };
+    let objects = other.objects(data);
+    format!("{} has objects of {other}, which stay there; they are shown {flag}", objects.display())
+}
+
 /// What makes every AWS tool speak with this S3; `eval`-able.
 fn exports(platform: &Platform) -> String {
     let mut text = String::new();
-    for (name, value) in platform.minio().environment() {
+    for (name, value) in platform.server().environment() {
         text.push_str(&format!("export {name}={value}\n"));
         if name == "AWS_REGION" {
             // Older versions of the AWS command line know this name alone.
@@ -136,8 +179,8 @@ fn default_data() -> anyhow::Result<PathBuf> {
     Ok(base.context("no home folder: say where the data goes by --data")?.join("rayfold/dev"))
 }
 
-/// MinIO's usual port, so that what another terminal has exported stays right from run to run.
+/// MinIO's usual port, for either store, so that what another terminal has exported stays right from run to run.
 fn usual_address() -> SocketAddr {
     let usual = SocketAddr::from(([127, 0, 0, 1], 9000));
-    if std::net::TcpListener::bind(usual).is_ok() { usual } else { rayfold_local::minio::any_port() }
+    if std::net::TcpListener::bind(usual).is_ok() { usual } else { rayfold_local::any_port() }
 }

@@ -1,54 +1,57 @@
-//! How much of what stays may be drawn anew.
+//! How many of the pixels that stay may be drawn anew.
 //!
 //! A pixel that keeps its colour from frame to frame may be seen a little wrong, and a later palette may have a better
-//! colour for it. To draw it then makes the animation better, and flicker. So there is an allowance, of pixels and of
-//! visible difference, that grows with each frame, the more of it changes the more; the tiles with the largest error
-//! are drawn first. What only a few tiles ask for costs more bytes than it is worth: single pixels drawn among others
-//! that are left cost as much as if all were drawn.
+//! colour for it. To draw it again makes the picture better, but also makes it flicker. So there is an allowance, of pixels
+//! and of visible difference. It grows with each frame, by more if more of the frame changes. The tiles with the largest
+//! error are drawn first.
+//!
+//! A frame is prepared before the previous one has been drawn, that is, before it is known how much that one used. So a
+//! frame gets a [`Loan`], and pays back what it did not use.
 
 use crate::colour;
 
-/// Of the pixels that stay: how many, as a part of them, and how much CIE 1976 difference in their mean.
+/// An amount of allowance, relative to the pixels that stay: what part of them, and what CIE 1976 difference in the mean of
+/// all of them.
 struct Grant {
     pixels: f64,
     difference: f64,
 }
-/// At the start. Over 10 frames and the first, the mean difference stays below 0.05 with what comes later.
+/// At the start. With what comes later, the mean difference stays below 0.05 over the first 11 frames.
 const AT_FIRST: Grant = Grant { pixels: 0.1, difference: 0.13 };
-/// More with each frame of which a fair part changes.
+/// Added with each frame of which a fair part changes.
 const EACH_FRAME: Grant = Grant { pixels: 0.2, difference: 0.03 };
-/// A frame gives that grant in full when one pixel in so many of them changes.
+/// A frame adds that in full if one of its pixels in so many changes, else proportionally less.
 const FOR_CHANGES: f64 = 8.0;
-/// How much more may be asked for than is left: of what is asked for a part is drawn, and only that is taken off. One
-/// large improvement costs fewer bytes than many small ones.
+/// A loan may be so many times what is left: only a part of the pixels it allows is drawn, and only that is paid. One large
+/// improvement costs fewer bytes than many small ones.
 const AHEAD: f64 = 4.0;
-/// Where fewer than one pixel in so many stay, none is drawn anew: they stay by chance, as in noise, or not for long.
+/// If fewer than one pixel in so many stay, none is drawn anew: they stay by chance, as in noise, or not for long.
 const FEW_STAY: f64 = 16.0;
-/// The part of what is asked for that is set aside until it is known what was drawn.
+/// The part of a loan that is taken off until it is known what was drawn.
 const LENT: f64 = 0.5;
-/// Steps of error in an octave, as a power of two.
+/// Errors are counted in steps, 2 to this power for each doubling.
 const FINENESS: u32 = 3;
 const STEPS: usize = 128;
 
 /// Pixels that stay as they were in the frame before.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Still {
+pub(crate) struct StaticPixels {
     pixels: u64,
-    /// How many are seen with which error.
+    /// How many are seen with an error of each step.
     errors: [u64; STEPS],
 }
 
-impl Still {
+impl StaticPixels {
     pub(crate) fn none() -> Self {
         Self { pixels: 0, errors: [0; STEPS] }
     }
 
-    /// Counts some that are seen right enough.
+    /// Counts pixels that are seen right.
     pub(crate) fn count(&mut self, pixels: usize) {
         self.pixels += pixels as u64;
     }
 
-    /// Counts some that are seen with a mean error that calls for better colours.
+    /// Counts pixels to be refined, given their mean error.
     pub(crate) fn count_wrong(&mut self, pixels: u64, error: f32) {
         self.pixels += pixels;
         self.errors[step(error)] += pixels;
@@ -63,7 +66,7 @@ impl Still {
     }
 }
 
-/// Still pixels that were drawn anew.
+/// Pixels that stay and were drawn anew.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Redrawn {
     pixels: u64,
@@ -71,19 +74,19 @@ pub(crate) struct Redrawn {
 }
 
 impl Redrawn {
-    /// Counts one, whose look changed by a squared error of which the levels' part is known.
+    /// Counts one whose colour changed by a squared error, of which `levels` is the part of the sRGB levels.
     pub(crate) fn count(&mut self, error: f32, levels: u32) {
         self.pixels += 1;
         self.difference += difference(error - levels as f32);
     }
 }
 
-/// What is left.
+/// What is left of it.
 #[derive(Debug)]
 pub(crate) struct Allowance {
     share: f64,
     difference: f64,
-    /// How many frames in a row have left alone what lies apart from their changes, and one.
+    /// How many frames in a row refined nothing outside of what changed, plus one.
     pub(crate) waited: usize,
 }
 
@@ -96,8 +99,8 @@ impl Allowance {
         self.share > 0.01 && self.difference > 0.01
     }
 
-    /// Sets aside what the next frame may use, before the frame before it has paid. `of`: pixels of the whole frame.
-    pub(crate) fn lend(&mut self, still: &Still, of: usize) -> Loan {
+    /// Lends what the next frame may use, before the previous one has paid. `of`: pixels of the whole frame.
+    pub(crate) fn lend(&mut self, still: &StaticPixels, of: usize) -> Loan {
         let pixels = still.pixels as f64;
         if pixels * FEW_STAY < of as f64 {
             return Loan { pixels, share: 0.0, difference: 0.0, least_error: f32::INFINITY };
@@ -119,7 +122,7 @@ impl Allowance {
         Loan { pixels, share, difference, least_error }
     }
 
-    /// Gives back what was not used, and adds what a frame of which a part `changed` gives.
+    /// Takes back what was not used of a loan, and adds what a frame of which a part `changed` adds.
     pub(crate) fn pay(&mut self, loan: &Loan, redrawn: &[Redrawn], changed: f64) {
         if loan.least_error == f32::INFINITY {
             return;
@@ -133,14 +136,14 @@ impl Allowance {
     }
 }
 
-/// What a frame may use.
+/// What a frame may use of the allowance.
 #[derive(Debug)]
 pub(crate) struct Loan {
-    /// That stay.
+    /// How many stay.
     pixels: f64,
     share: f64,
     difference: f64,
-    /// The error from which pixels that stay may be drawn anew.
+    /// The error from which a tile's pixels that stay may be drawn anew.
     pub(crate) least_error: f32,
 }
 
@@ -179,7 +182,7 @@ mod tests {
 
     #[test]
     fn the_largest_errors_come_first_and_no_more_than_allowed() {
-        let mut still = Still::none();
+        let mut still = StaticPixels::none();
         (0..1_000).for_each(|k| still.count_wrong(1, 2.0 + k as f32 * 0.01));
         let least = Allowance::new().lend(&still, still.pixels as usize).least_error;
         let drawn = (0..1_000).filter(|&k| 2.0 + k as f32 * 0.01 >= least).count();
@@ -194,7 +197,7 @@ mod tests {
         let mut unpaid: Option<(Loan, Redrawn)> = None;
         for frame in 0..frames {
             let errors = (0..1_000_u32).map(|k| 2.0 + (k * 37 + frame * 101) as f32 % 97.0);
-            let mut still = Still::none();
+            let mut still = StaticPixels::none();
             if allowance.is_left() {
                 errors.clone().for_each(|error| still.count_wrong(1, error));
             } else {
@@ -219,7 +222,7 @@ mod tests {
 
     #[test]
     fn what_is_used_up_comes_back_slowly() {
-        let mut still = Still::none();
+        let mut still = StaticPixels::none();
         (0..100).for_each(|_| still.count_wrong(1, 50.0));
         let mut allowance = Allowance::new();
         let mut all = Redrawn::default();
@@ -231,7 +234,7 @@ mod tests {
 
     #[test]
     fn where_few_stay_nothing_is_drawn_anew() {
-        let mut still = Still::none();
+        let mut still = StaticPixels::none();
         (0..100).for_each(|k| still.count_wrong(1, if k < 20 { 50.0 } else { 3.0 }));
         let mut allowance = Allowance::new();
         let loan = allowance.lend(&still, 10_000);
@@ -243,7 +246,7 @@ mod tests {
 
     #[test]
     fn what_was_not_used_comes_back_at_once() {
-        let mut still = Still::none();
+        let mut still = StaticPixels::none();
         (0..100).for_each(|k| still.count_wrong(1, if k < 20 { 50.0 } else { 3.0 }));
         let mut allowance = Allowance::new();
         let first = allowance.lend(&still, still.pixels as usize);

@@ -25,7 +25,7 @@ impl Area {
         (self.left..self.right).contains(&x) && (self.top..self.bottom).contains(&y)
     }
 
-    /// The smallest that holds it and a pixel.
+    /// The smallest area that holds it and a pixel.
     pub(crate) fn with(&self, x: usize, y: usize) -> Self {
         Self {
             left: self.left.min(x),
@@ -35,7 +35,7 @@ impl Area {
         }
     }
 
-    /// The smallest that holds all pixels wanted, row by row; `None` if there are none.
+    /// The smallest area that holds all wanted items, which are given row by row; `None` if there are none.
     pub(crate) fn around<T>(items: &[T], width: usize, wanted: impl Fn(&T) -> bool) -> Option<Self> {
         let mut around: Option<Self> = None;
         for (y, row) in items.chunks_exact(width).enumerate() {
@@ -64,7 +64,7 @@ pub(crate) struct Block {
 }
 
 impl Block {
-    /// Draws nothing, for the time given. The format has no empty block, so this is one pixel of nothing.
+    /// Draws nothing, for the time given. The format has no empty block, so this is one transparent pixel.
     pub(crate) fn nothing(delay_cs: u16) -> Self {
         let mut writer = lzw::Writer::new(bits(1));
         writer.put(0);
@@ -72,7 +72,7 @@ impl Block {
         Self::new(area, &[], Some(0), delay_cs, &[writer.finish(true)])
     }
 
-    /// With the indices in parts.
+    /// From image data in parts.
     pub(crate) fn new(
         area: Area,
         colours: &[[u8; 3]],
@@ -80,6 +80,7 @@ impl Block {
         delay_cs: u16,
         parts: &[Part],
     ) -> Self {
+        // The transparent index has an entry, too, which is never shown.
         let filler = transparent.map(|_| [0; 3]);
         let palette = colours.iter().chain(&filler).flatten().copied().collect::<Vec<_>>();
         let data = lzw::join(bits(palette.len() / 3), parts);
@@ -87,7 +88,7 @@ impl Block {
     }
 }
 
-/// Bits of an index into so many colours, as LZW has it.
+/// Bits of an index into so many colours. LZW wants at least 2.
 pub(crate) fn bits(colours: usize) -> u8 {
     (2..8).find(|&bits| colours <= 1 << bits).unwrap_or(8)
 }
@@ -108,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_one_clear_pixel() {
+    fn nothing_is_one_transparent_pixel() {
         let block = Block::nothing(9);
         let mut decoder = weezl::decode::Decoder::new(weezl::BitOrder::Lsb, block.data[0]);
         assert_eq!(decoder.decode(&block.data[1..]).unwrap(), [0]);

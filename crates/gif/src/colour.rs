@@ -1,7 +1,7 @@
 //! The space in which errors are measured.
 //!
-//! A picture is judged by its levels (PSNR) and by the eye (CIE Lab). Neither alone will do: a palette that is best in
-//! one loses in the other. So a colour is a point with six coordinates, the sRGB levels and `LAB_WEIGHT` times CIE
+//! A picture is judged by its levels (PSNR) and by the eye (CIE Lab). A palette that is best in one of them loses in the
+//! other. So a colour is a point with six coordinates, the sRGB levels and `LAB_WEIGHT` times CIE
 //! L\*a\*b\* (D65, CIE 15:2004), and the squared distance is the sum of both errors. The chroma is compressed half way
 //! from the CIE 1976 difference to that of CIE 2000, in which saturated colours differ less.
 //!
@@ -15,7 +15,7 @@ pub(crate) const DIMENSIONS: usize = 6;
 /// How much a unit of L\*a\*b\* counts against a level of sRGB.
 pub(crate) const LAB_WEIGHT: f32 = 3.0;
 
-/// By which part of itself a unit of chroma makes differences of chroma count less (CIE 142-2001, `S_C`).
+/// How much less differences of chroma count for each unit of chroma (CIE 142-2001, `S_C`).
 const CHROMA_FALLOFF: f32 = 0.045;
 
 /// A colour where distance is error.
@@ -59,16 +59,16 @@ pub(crate) fn point_of(rgb: [u8; 3]) -> Point {
     point([f32::from(rgb[0]), f32::from(rgb[1]), f32::from(rgb[2])])
 }
 
-/// Squared distances of colours of whole levels that are near to each other, in a fraction of the time.
+/// Approximates [`error`] for colours of whole levels that are near each other, in a fraction of the time.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Near(&'static [[f32; 6]; 4096]);
+pub(crate) struct LocalMetric(&'static [[f32; 6]; 4096]);
 
-impl Near {
+impl LocalMetric {
     pub(crate) fn new() -> Self {
         Self(&METRIC)
     }
 
-    /// Works out beforehand what the first one needs.
+    /// Works out the tables now, and not when the first one is made.
     pub(crate) fn prepare() {
         LazyLock::force(&METRIC);
     }
@@ -77,18 +77,18 @@ impl Near {
         self.around(a).error(levels(a), levels(b))
     }
 
-    /// What holds near one colour.
-    pub(crate) fn around(self, [r, g, b]: [u8; 3]) -> Form {
-        Form(&self.0[usize::from(r >> 4) << 8 | usize::from(g >> 4) << 4 | usize::from(b >> 4)])
+    /// The metric near one colour.
+    pub(crate) fn around(self, [r, g, b]: [u8; 3]) -> QuadraticForm {
+        QuadraticForm(&self.0[usize::from(r >> 4) << 8 | usize::from(g >> 4) << 4 | usize::from(b >> 4)])
     }
 }
 
 /// A quadratic form of differences of levels.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Form(&'static [f32; 6]);
+pub(crate) struct QuadraticForm(&'static [f32; 6]);
 
-// By hand throughout: mapped arrays are several times slower here.
-impl Form {
+// Written out: mapped arrays are several times slower here.
+impl QuadraticForm {
     pub(crate) fn error(self, a: [f32; 3], b: [f32; 3]) -> f32 {
         let (r, g, b) = (a[0] - b[0], a[1] - b[1], a[2] - b[2]);
         let form = self.0;
@@ -96,7 +96,7 @@ impl Form {
     }
 }
 
-/// The levels of a colour as numbers to reckon with.
+/// The levels of a colour as numbers.
 pub(crate) fn levels(rgb: [u8; 3]) -> [f32; 3] {
     [f32::from(rgb[0]), f32::from(rgb[1]), f32::from(rgb[2])]
 }
@@ -179,7 +179,7 @@ fn root(x: f64, n: i32) -> f64 {
     let mut y = 1.0;
     loop {
         let power = (1..n).fold(1.0, |product, _| product * y);
-        // From above it comes nearer with each step, until it cannot.
+        // Each step comes nearer from above, until the rounding stops it.
         let next = y - (y - x / power) / f64::from(n);
         if next >= y {
             return y;
@@ -215,7 +215,7 @@ mod tests {
             let [r, g, b, d] = k.wrapping_mul(2_654_435_761).to_le_bytes().map(|v| v.clamp(8, 247));
             let near = [r + d % 5, g + 4 - d % 3, b - d % 7];
             let (quick, exact) =
-                (Near::new().error([r, g, b], near), error(&point_of([r, g, b]), &point_of(near)));
+                (LocalMetric::new().error([r, g, b], near), error(&point_of([r, g, b]), &point_of(near)));
             assert!((quick - exact).abs() <= 0.6 * exact + 0.1, "{r} {g} {b} {near:?}: {quick} for {exact}");
         }
     }

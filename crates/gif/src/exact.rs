@@ -1,29 +1,31 @@
-//! Frames of at most 256 colours, which lose nothing unless the picture drifts: where much of it [changes](change)
-//! slightly from frame to frame, to draw all that would cost several times the bytes.
+//! Frames of at most 256 colours, which are drawn without loss.
+//!
+//! An exception are frames that drift: much of the picture [changes](change) slightly from frame to frame. To draw all of
+//! that would cost several times the bytes, so these are drawn like frames of more colours.
 
 use rayon::prelude::*;
 
 use crate::block::{Area, Block};
 use crate::colour;
-use crate::look::GLARING;
-use crate::stripe::{self, Sheet};
+use crate::needs::GLARING;
+use crate::stripe::{self, Layout};
 
-/// Colours, at most 256, and their numbers in order of appearance.
+/// At most 256 colours, numbered in order of appearance.
 #[derive(Debug)]
 pub(crate) struct FewColours {
     pub(crate) colours: Vec<[u8; 3]>,
-    /// Number + 1 of a colour where its hash puts it, 0 where there is none.
+    /// A hash table: the number of a colour plus 1, or 0 in an empty slot.
     slots: Box<[u16; SLOTS]>,
 }
 
 const SLOTS: usize = 1024;
-/// How many pixels in a row are looked at, and of how many such rows one is, to see how a frame changes: a prime,
-/// so that they are not below each other.
+/// To see how a frame changes, its pixels are divided into runs of so many, of which one in `ONE_IN` is looked at. A
+/// prime, so that the runs do not lie below each other.
 const PROBE: usize = 61;
 const ONE_IN: usize = 4;
-/// Much changes where one pixel in so many does.
+/// Much of a frame changes if one pixel in so many does.
 const MUCH: usize = 8;
-/// Parts of a frame that are looked at side by side.
+/// Parts of a frame that are compared in parallel.
 const PARTS: usize = 2;
 
 impl FewColours {
@@ -44,7 +46,7 @@ impl FewColours {
         }
     }
 
-    /// Says whether there was room.
+    /// Adds a colour that is not yet there, and says whether there was room for it.
     fn add(&mut self, rgb: [u8; 3]) -> bool {
         let Err(at) = self.find(rgb) else { return true };
         if self.colours.len() == 256 {
@@ -57,7 +59,7 @@ impl FewColours {
 }
 
 /// The colours of a frame, if there are at most 256.
-pub(crate) fn few_colours(pixels: &[[u8; 3]]) -> Option<FewColours> {
+fn few_colours(pixels: &[[u8; 3]]) -> Option<FewColours> {
     let mut colours = FewColours::new();
     let mut last = None;
     for now in pixels {
@@ -71,19 +73,19 @@ pub(crate) fn few_colours(pixels: &[[u8; 3]]) -> Option<FewColours> {
     Some(colours)
 }
 
-/// What becomes of a frame in the next one.
+/// How much a frame changes from the one before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Change {
     /// Most of it stays.
     Little,
-    /// Much changes, most of that by no more than a viewer may miss, as in a slow fade of a gradient.
+    /// Much changes, but most of that by so little that a viewer may miss it, as in a slow fade of a gradient.
     Slight,
-    /// Much changes, and clearly.
+    /// Much changes by more than that.
     Large,
 }
 
-/// How a frame differs from the one before it.
-pub(crate) fn change(pixels: &[[u8; 3]], before: &[[u8; 3]]) -> Change {
+/// Compares a frame with the one before it.
+fn change(pixels: &[[u8; 3]], before: &[[u8; 3]]) -> Change {
     let probes = pixels.chunks(PROBE).zip(before.chunks(PROBE)).step_by(ONE_IN);
     let (mut probed, mut changed, mut slightly) = (0, 0, 0);
     for (now, was) in probes {
@@ -104,7 +106,34 @@ pub(crate) fn change(pixels: &[[u8; 3]], before: &[[u8; 3]]) -> Change {
     }
 }
 
-/// Draws whatever is not seen right; all of the frame if it is the first or no index is left to mean nothing.
+/// What a frame is, beside the one before it.
+#[derive(Debug)]
+pub(crate) struct Kind {
+    /// Its colours, if it is to be drawn without loss.
+    pub(crate) few: Option<FewColours>,
+    /// Whether it has at most 256 colours but drifts, and so is drawn like frames of more.
+    pub(crate) drifts: bool,
+    pub(crate) change: Change,
+}
+
+impl Kind {
+    /// `previous`: the pixels of the frame before it, and whether that one drifts.
+    pub(crate) fn of(pixels: &[[u8; 3]], previous: Option<(&[[u8; 3]], bool)>) -> Self {
+        let few = few_colours(pixels);
+        let change = match previous {
+            Some((before, _)) if few.is_some() => change(pixels, before),
+            _ => Change::Large,
+        };
+        let drifts = match change {
+            Change::Little => previous.is_some_and(|(_, drifts)| drifts),
+            Change::Slight => true,
+            Change::Large => false,
+        };
+        Self { few: few.filter(|_| !drifts), drifts, change }
+    }
+}
+
+/// Draws the pixels that are not seen right; all of the frame if it is the first, or if no index is left for transparent.
 pub(crate) fn draw(
     pixels: &[[u8; 3]],
     width: usize,
@@ -123,7 +152,7 @@ pub(crate) fn draw(
             *wrong = now != seen;
             if *wrong && last != Some(now) {
                 last = Some(now);
-                // There is room: all are colours of the frame.
+                // There is always room, as all are colours of the frame.
                 drawn.add(*now);
             }
         }
@@ -134,17 +163,17 @@ pub(crate) fn draw(
     for rgb in parts.flat_map(|part| part.colours) {
         drawn.add(rgb);
     }
-    let (colours, clear) = match u8::try_from(drawn.colours.len()) {
-        Ok(clear) if !first => (&drawn, Some(clear)),
+    let (colours, transparent) = match u8::try_from(drawn.colours.len()) {
+        Ok(transparent) if !first => (&drawn, Some(transparent)),
         _ => (frame_colours, None),
     };
-    let area = match clear {
+    let area = match transparent {
         Some(_) => Area::around(&wrong, width, |&wrong| wrong),
         None => Some(Area::whole(width, pixels.len())),
     };
     let Some(area) = area else { return Block::nothing(delay_cs) };
-    let sheet = Sheet { area, width, colours: &colours.colours, clear, delay_cs, stripes: 1 };
-    let (block, _) = stripe::in_stripes(sheet, seen, |writer, first_row, seen| {
+    let layout = Layout { area, width, colours: &colours.colours, transparent, delay_cs, stripes: 1 };
+    let (block, _) = stripe::in_stripes(layout, seen, |writer, first_row, seen| {
         let mut last = ([0; 3], colours.find([0; 3]).ok());
         for (y, seen) in (first_row..).zip(seen.chunks_exact_mut(width)) {
             for x in area.left..area.right {
@@ -152,17 +181,17 @@ pub(crate) fn draw(
                 if last.0 != now {
                     last = (now, colours.find(now).ok());
                 }
-                // What is seen right may be drawn or left, whichever LZW knows.
-                let right = clear.filter(|_| now == seen[x]);
+                // What is seen right may be drawn or left, whichever continues the string.
+                let right = transparent.filter(|_| now == seen[x]);
                 let index = last.1;
                 match (right, index) {
                     (None, index) => writer.put(index.unwrap_or(0)),
-                    (Some(clear), Some(index)) => {
-                        if !writer.extend(clear) && !writer.extend(index) {
-                            writer.put(clear);
+                    (Some(transparent), Some(index)) => {
+                        if !writer.extend(transparent) && !writer.extend(index) {
+                            writer.put(transparent);
                         }
                     }
-                    (Some(clear), None) => writer.put(clear),
+                    (Some(transparent), None) => writer.put(transparent),
                 }
                 seen[x] = now;
             }
@@ -188,5 +217,25 @@ mod tests {
         assert_eq!(change(&with(20, 100), &before), Change::Little);
         assert_eq!(change(&with(2, 1), &before), Change::Slight);
         assert_eq!(change(&with(2, 100), &before), Change::Large);
+    }
+
+    #[test]
+    fn a_frame_drifts_from_the_first_slight_change_to_the_next_large_one() {
+        let colours = |by: u32| (0..10_000).map(|k| [((k + by) / 64) as u8, 10, 20]).collect::<Vec<_>>();
+        let kind = |previous: Option<(u32, bool)>, now: u32| {
+            let before = previous.map(|(by, drifts)| (colours(by), drifts));
+            let kind =
+                Kind::of(&colours(now), before.as_ref().map(|(before, drifts)| (&before[..], *drifts)));
+            (kind.few.is_some(), kind.drifts)
+        };
+        assert_eq!(kind(None, 0), (true, false));
+        assert_eq!(kind(Some((0, false)), 0), (true, false));
+        assert_eq!(kind(Some((0, false)), 64), (false, true));
+        assert_eq!(kind(Some((64, true)), 64), (false, true));
+        assert_eq!(kind(Some((64, true)), 64 * 90), (true, false));
+        // A frame of many colours never is, whatever came before.
+        let many = (0..300_u32).map(|k| [k as u8, (k / 256) as u8, 0]).collect::<Vec<_>>();
+        let kind = Kind::of(&many, Some((&many, true)));
+        assert!(kind.few.is_none() && !kind.drifts);
     }
 }

@@ -1,7 +1,8 @@
 //! Which colours a frame has, and how often.
 //!
-//! Colours are counted in a hash table, exactly while they are few, in cells of 2, 4 or 8 levels a channel when there
-//! are more than [`MOST_BINS`]: a frame with so many has them far apart in its palette, too.
+//! Colours are counted in a hash table: each by itself while there are at most [`MOST_BINS`], else together with its
+//! neighbours in cells of 2, 4 or 8 levels a channel. A frame with so many colours has a palette whose colours are farther
+//! apart than that.
 
 /// The most bins that a histogram grows to.
 pub(crate) const MOST_BINS: usize = 1 << 14;
@@ -10,15 +11,15 @@ const EMPTY: u32 = u32::MAX;
 /// Counts of colours.
 #[derive(Debug)]
 pub(crate) struct Histogram {
-    /// Of the low bits of a level, how many do not tell bins apart.
+    /// How many low bits of a level are ignored.
     shift: u32,
-    /// A power of two of them, at least twice as many as there are bins.
+    /// Their number is a power of two, at least twice that of the bins.
     slots: Vec<Slot>,
     most_bins: usize,
     bins: Vec<Bin>,
 }
 
-/// Few enough to be at hand.
+/// Few enough to stay in the cache.
 const FIRST_SLOTS: usize = 1 << 12;
 
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +37,7 @@ pub(crate) struct Bin {
     key: u32,
     /// Pixels counted.
     pub(crate) count: u32,
-    /// By how much their levels are above those of `key`, all together.
+    /// The sum, over all pixels, of how much each level is above that of `key`.
     above: [u64; 3],
 }
 
@@ -51,7 +52,7 @@ impl Bin {
         [mean(r, self.above[0]), mean(g, self.above[1]), mean(b, self.above[2])]
     }
 
-    /// The same with another cell's key.
+    /// The same pixels in a cell with another key.
     fn moved(mut self, key: u32) -> Self {
         let (from, to) = (self.key.to_be_bytes(), key.to_be_bytes());
         for k in 0..3 {

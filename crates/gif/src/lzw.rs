@@ -1,27 +1,27 @@
 //! LZW as the format has it: codes of growing width, at most 4,096 of them.
 //!
-//! Image data is written in parts side by side, each with a book of strings of its own, and joined bit by bit. A book is
-//! begun anew as soon as it is full: frames change too much from top to bottom for an old book to be worth keeping
-//! (measured: files grow by 0 to 2 % when it is kept while it fits as well as it did).
+//! Image data is written in parts in parallel, each with a code table of its own, and the parts are joined bit by bit. A
+//! code table that is full is cleared at once: frames change too much from top to bottom for an old one to be worth
+//! keeping (measured: files grow by 0 to 2 % when it is kept while it compresses as well as it did).
 
 /// The most codes that the format allows.
 const MOST_CODES: u16 = 4096;
 /// Slots of the hash table: at most half of them are in use.
 const SLOTS: usize = 8192;
-/// Cannot be a string: the last code gets no longer ones.
+/// An empty slot. No string looks like that: it would continue the last code, and the table is cleared before.
 const EMPTY: u32 = u32::MAX;
 
-/// What has been seen since the last clear code: strings of indices, each one longer than its parent by one index.
+/// The strings of indices since the last clear code, each one index longer than its parent.
 #[derive(Debug)]
-struct Book {
+struct CodeTable {
     /// Parent, index and code of each string in 12, 8 and 12 bits, where the hash of the first two puts it.
     slots: Box<[u32; SLOTS]>,
     next: u16,
-    /// For each string a bit for each of the indices that continue it, modulo 32.
-    followed: Box<[u32; MOST_CODES as usize]>,
+    /// For each string a set of the indices that continue it, modulo 32, one bit each.
+    continued: Box<[u32; MOST_CODES as usize]>,
 }
 
-impl Book {
+impl CodeTable {
     /// The code of the string `parent` with `index` after it, or the slot to put it in.
     fn find(&self, parent: u16, index: u8) -> Result<u16, usize> {
         let key = u32::from(parent) << 8 | u32::from(index);
@@ -38,10 +38,10 @@ impl Book {
         }
     }
 
-    /// The code of the string `parent` with `index` after it. Mostly there is none, which one look tells.
+    /// The code of the string `parent` with `index` after it. Mostly there is none, which one bit tells.
     fn code(&self, parent: u16, index: u8) -> Option<u16> {
-        let followed = self.followed[usize::from(parent)] >> (index & 31) & 1 != 0;
-        if followed { self.find(parent, index).ok() } else { None }
+        let continued = self.continued[usize::from(parent)] >> (index & 31) & 1 != 0;
+        if continued { self.find(parent, index).ok() } else { None }
     }
 }
 
@@ -49,8 +49,8 @@ impl Book {
 #[derive(Debug)]
 pub(crate) struct Writer {
     bits: u8,
-    book: Book,
-    /// Code of the string of indices that is not yet written.
+    table: CodeTable,
+    /// The code of the current string, which is not yet written.
     string: Option<u16>,
     width: u32,
     codes: Codes,
@@ -59,38 +59,38 @@ pub(crate) struct Writer {
 impl Writer {
     /// For indices below 2^`bits`, of 2 to 8 bits.
     pub(crate) fn new(bits: u8) -> Self {
-        let book = Book {
+        let table = CodeTable {
             slots: Box::new([EMPTY; SLOTS]),
             next: (1 << bits) + 2,
-            followed: Box::new([0; MOST_CODES as usize]),
+            continued: Box::new([0; MOST_CODES as usize]),
         };
-        Self { bits, book, string: None, width: u32::from(bits) + 1, codes: Codes::default() }
+        Self { bits, table, string: None, width: u32::from(bits) + 1, codes: Codes::default() }
     }
 
-    /// Whether the string goes on with any index.
+    /// Whether any index continues the current string.
     pub(crate) fn is_known(&self) -> bool {
-        self.string.is_none_or(|string| self.book.followed[usize::from(string)] != 0)
+        self.string.is_none_or(|string| self.table.continued[usize::from(string)] != 0)
     }
 
-    /// Whether the string goes on with this index: it costs nothing yet.
+    /// Whether this index continues the current string, and so costs no code.
     pub(crate) fn continues(&self, index: u8) -> bool {
-        self.string.is_none_or(|string| self.book.code(string, index).is_some())
+        self.string.is_none_or(|string| self.table.code(string, index).is_some())
     }
 
-    /// A bit for each of some indices that the string may go on with; the others it does not go on with.
+    /// One bit for each of the indices: 0 if it does not continue the current string, 1 if it may.
     pub(crate) fn may_continue<const N: usize>(&self, indices: &[u8; N]) -> u32 {
-        let followed = self.string.map_or(u32::MAX, |string| self.book.followed[usize::from(string)]);
+        let continued = self.string.map_or(u32::MAX, |string| self.table.continued[usize::from(string)]);
         let mut bits = 0;
         for (k, index) in indices.iter().enumerate() {
-            bits |= (followed >> (index & 31) & 1) << k;
+            bits |= (continued >> (index & 31) & 1) << k;
         }
         bits
     }
 
-    /// Writes the index if the string goes on with it.
+    /// Writes the index if it continues the current string, and says whether it did.
     pub(crate) fn extend(&mut self, index: u8) -> bool {
         let longer = match self.string {
-            Some(string) => self.book.code(string, index),
+            Some(string) => self.table.code(string, index),
             None => Some(u16::from(index)),
         };
         if longer.is_some() {
@@ -102,22 +102,22 @@ impl Writer {
     /// Writes an index.
     pub(crate) fn put(&mut self, index: u8) {
         let found = match self.string {
-            Some(string) => self.book.find(string, index).map_err(|at| (string, at)),
+            Some(string) => self.table.find(string, index).map_err(|at| (string, at)),
             None => Ok(u16::from(index)),
         };
         self.string = match found {
             Ok(longer) => Some(longer),
             Err((string, at)) => {
                 self.end_string(string);
-                self.book.slots[at] =
-                    u32::from(string) << 20 | u32::from(index) << 12 | u32::from(self.book.next);
-                self.book.followed[usize::from(string)] |= 1 << (index & 31);
-                self.book.next += 1;
-                if self.book.next == MOST_CODES {
+                self.table.slots[at] =
+                    u32::from(string) << 20 | u32::from(index) << 12 | u32::from(self.table.next);
+                self.table.continued[usize::from(string)] |= 1 << (index & 31);
+                self.table.next += 1;
+                if self.table.next == MOST_CODES {
                     self.codes.put(1 << self.bits, self.width);
-                    self.book.slots.fill(EMPTY);
-                    self.book.followed.fill(0);
-                    self.book.next = (1 << self.bits) + 2;
+                    self.table.slots.fill(EMPTY);
+                    self.table.continued.fill(0);
+                    self.table.next = (1 << self.bits) + 2;
                     self.width = u32::from(self.bits) + 1;
                 }
                 Some(u16::from(index))
@@ -127,13 +127,13 @@ impl Writer {
 
     fn end_string(&mut self, string: u16) {
         self.codes.put(string, self.width);
-        // The decoder knows its next code one step later, so the width grows when the code itself does not fit.
-        if u32::from(self.book.next) == 1 << self.width {
+        // The decoder adds a string one code later than the encoder, so the width grows one code later, too.
+        if u32::from(self.table.next) == 1 << self.width {
             self.width += 1;
         }
     }
 
-    /// The part, to be [joined](join).
+    /// Ends the part, which is then [joined](join) to others. `last`: whether it is the image's last.
     pub(crate) fn finish(mut self, last: bool) -> Part {
         if let Some(string) = self.string {
             self.end_string(string);
@@ -147,7 +147,7 @@ impl Writer {
 #[derive(Debug)]
 pub(crate) struct Part(Codes);
 
-/// The format's image data without its blocks: first `bits`, then the codes of all parts.
+/// The format's image data, not yet divided into sub-blocks: first `bits`, then the codes of all parts.
 pub(crate) fn join(bits: u8, parts: &[Part]) -> Vec<u8> {
     let bytes = parts.iter().map(|part| part.0.bytes.len() + 9).sum::<usize>();
     let mut all = Codes { bytes: Vec::with_capacity(bytes + 2), ..Codes::default() };
@@ -168,7 +168,7 @@ pub(crate) fn join(bits: u8, parts: &[Part]) -> Vec<u8> {
     all.finish()
 }
 
-/// Numbers one after the other, bit by bit, the lowest first.
+/// Codes one after the other, bit by bit, the lowest bit first.
 #[derive(Debug, Default)]
 struct Codes {
     bytes: Vec<u8>,

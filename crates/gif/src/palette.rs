@@ -1,7 +1,8 @@
-//! The best few colours for many.
+//! The few colours that fit a frame's many colours best.
 //!
-//! Clusters are split at the mean of their widest coordinate, always the one with the largest error first, and then
-//! settled by k-means (Lloyd 1982), where a colour looks only at centres closer than twice its distance from its own.
+//! The colours are divided into clusters: again and again the cluster with the largest error is split at the mean of its
+//! widest coordinate. Then k-means (Lloyd 1982) improves them; a colour compares only centres that are closer to its own
+//! than twice its distance from that, as by the triangle inequality no other can be nearer.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -13,9 +14,9 @@ use crate::histogram::{Bin, Histogram};
 
 /// Rounds of k-means at most.
 const ROUNDS: usize = 5;
-/// The most colours that are looked at one by one.
+/// The most colours that are clustered one by one; more are counted in coarser bins first.
 const SAMPLES: usize = 1 << 13;
-/// How many of a colour's nearest others are kept at hand.
+/// How many of a palette colour's nearest others are stored.
 pub(crate) const NEIGHBOURS: usize = 16;
 
 /// A weighted colour.
@@ -39,35 +40,35 @@ impl From<&Bin> for Sample {
     }
 }
 
-/// How many of a colour's nearest others may be drawn in its place.
-const AROUND: usize = 8;
+/// How many of a palette colour's nearest others may be drawn in its place.
+const ALTERNATIVES: usize = 8;
 
-/// Colours to draw with; for each its point and its nearest others.
+/// The colours to draw with, and for each its point and its nearest others.
 #[derive(Debug, Clone)]
 pub(crate) struct Palette {
     pub(crate) colours: Vec<[u8; 3]>,
     pub(crate) points: Vec<Point>,
     /// What may be drawn in the place of each.
-    pub(crate) around: Vec<Around>,
+    pub(crate) alternatives: Vec<Alternatives>,
     neighbours: Neighbours,
 }
 
-/// A colour's nearest others.
+/// A palette colour's nearest others.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Around {
-    pub(crate) indices: [u8; AROUND],
-    /// Far from everything where there are fewer.
-    pub(crate) levels: [[f32; 3]; AROUND],
+pub(crate) struct Alternatives {
+    pub(crate) indices: [u8; ALTERNATIVES],
+    /// Where there are fewer, the rest is far from every colour.
+    pub(crate) levels: [[f32; 3]; ALTERNATIVES],
 }
 
-impl Around {
+impl Alternatives {
     fn of(near: &[Neighbour], colours: &[[u8; 3]]) -> Self {
-        let mut around = Self { indices: [0; AROUND], levels: [[1e9; 3]; AROUND] };
-        for (at, neighbour) in near.iter().take(AROUND).enumerate() {
-            around.indices[at] = neighbour.index;
-            around.levels[at] = colour::levels(colours[usize::from(neighbour.index)]);
+        let mut alternatives = Self { indices: [0; ALTERNATIVES], levels: [[1e9; 3]; ALTERNATIVES] };
+        for (at, neighbour) in near.iter().take(ALTERNATIVES).enumerate() {
+            alternatives.indices[at] = neighbour.index;
+            alternatives.levels[at] = colour::levels(colours[usize::from(neighbour.index)]);
         }
-        around
+        alternatives
     }
 }
 
@@ -78,16 +79,16 @@ pub(crate) struct Neighbour {
     pub(crate) apart: f32,
 }
 
-/// About where each bin of a histogram is in a palette.
+/// For each bin of a histogram a palette entry that is near it: where to begin the search for the nearest.
 #[derive(Debug)]
 pub(crate) struct Guesses {
-    /// The bins, if they are not those of the histogram itself.
+    /// The bins that `indices` counts, if they are not those of the histogram itself.
     coarse: Option<Histogram>,
     indices: Vec<u8>,
 }
 
 impl Guesses {
-    /// An index near a bin, by its number and its mean colour.
+    /// The index of an entry near a bin, given by its number and its mean colour.
     pub(crate) fn of(&self, number: usize, mean: [f32; 3]) -> u8 {
         let at = match &self.coarse {
             None => Some(number),
@@ -98,15 +99,17 @@ impl Guesses {
 }
 
 impl Palette {
-    /// Colours as they are, at most 256.
+    /// Of these colours, at most 256.
     pub(crate) fn new(colours: Vec<[u8; 3]>) -> Self {
         let points = colours.iter().map(|&rgb| colour::point_of(rgb)).collect::<Vec<_>>();
         let neighbours = Neighbours::of(&points);
-        let around = (0..colours.len()).map(|at| Around::of(neighbours.at(at as u8), &colours)).collect();
-        Self { colours, points, around, neighbours }
+        let alternatives =
+            (0..colours.len()).map(|at| Alternatives::of(neighbours.at(at as u8), &colours)).collect();
+        Self { colours, points, alternatives, neighbours }
     }
 
-    /// The colours of the bins, given as samples, too, if there are at most `size`, else so many that fit them well.
+    /// The colours of the bins themselves if there are at most `size`, else `size` colours that fit them well. The samples
+    /// are those of the bins.
     pub(crate) fn of_bins(histogram: &Histogram, samples: &[Sample], size: usize) -> (Self, Guesses) {
         let bins = histogram.bins();
         if histogram.is_exact() && bins.len() <= size {
@@ -124,7 +127,8 @@ impl Palette {
         (palette, Guesses { coarse: Some(coarse), indices })
     }
 
-    /// At most `size` colours that fit the samples well, of which there is at least one; and for each sample one near it.
+    /// At most `size` colours that fit the samples well, and for each sample the index of one near it. There is at least one
+    /// sample.
     fn of(samples: &[Sample], size: usize) -> (Self, Vec<u8>) {
         let mut owners = split(samples, size);
         let mut near: Option<Neighbours> = None;
@@ -132,7 +136,7 @@ impl Palette {
             let centres = centres(samples, &mut owners);
             let points = centres.iter().map(|&rgb| colour::point(rgb)).collect::<Vec<_>>();
             let near = match &mut near {
-                // Centres move little: which of them are near hardly changes.
+                // Centres move little: which of them are neighbours hardly changes.
                 Some(near) if near.points == points.len() => {
                     near.measure(&points);
                     near
@@ -162,7 +166,7 @@ impl Palette {
         (Self::new(colours), indices)
     }
 
-    /// The nearest colour; `guess` is where to start looking.
+    /// The index of the nearest colour. The search begins at `guess`.
     pub(crate) fn nearest(&self, point: &Point, guess: u8) -> u8 {
         self.neighbours.nearest(&self.points, point, guess)
     }
@@ -179,7 +183,7 @@ struct Neighbours {
 
 impl Neighbours {
     fn of(points: &[Point]) -> Self {
-        // Coordinate by coordinate, and to the end: several distances are worked out at once.
+        // One coordinate after the other, with padding at the end, so that several distances are worked out at once.
         let mut columns = [[0.0_f32; 256]; DIMENSIONS];
         for (index, point) in points.iter().enumerate() {
             for (column, &at) in columns.iter_mut().zip(point) {
@@ -195,13 +199,13 @@ impl Neighbours {
                     *sum += (at - other) * (at - other);
                 }
             }
-            // The last bits are the index instead.
+            // The lowest bits are replaced by the index.
             let mut keys = [f32::INFINITY; 256];
             for (index, (key, apart)) in (0..).zip(keys.iter_mut().zip(&apart[..points.len()])) {
                 *key = f32::from_bits(apart.to_bits() & !0xFF | index);
             }
             keys[own] = f32::INFINITY;
-            // The least of each 16, of which the least is taken out again and again.
+            // The least of each block of 16; the least of these is taken out again and again.
             let (blocks, _) = keys.as_chunks_mut::<16>();
             let mut leasts = [0.0; 16];
             for (least_of, block) in leasts.iter_mut().zip(&*blocks) {
@@ -226,7 +230,7 @@ impl Neighbours {
         &self.all[usize::from(index) * self.each..][..self.each]
     }
 
-    /// Works out distances anew, and puts the neighbours in order again.
+    /// Works out the distances for points that have moved, and sorts the neighbours again.
     fn measure(&mut self, points: &[Point]) {
         for (own, near) in points.iter().zip(self.all.chunks_exact_mut(self.each.max(1))) {
             for neighbour in near.iter_mut() {
@@ -240,7 +244,7 @@ impl Neighbours {
         let from_guess = colour::error(point, &points[usize::from(guess)]);
         let (mut best, mut least) = (guess, from_guess);
         for neighbour in self.at(guess) {
-            // Triangle inequality: a colour twice as far from the guess as the point is cannot be nearer to it.
+            // By the triangle inequality, a colour twice as far from the guess as the point is cannot be nearer to the point.
             if neighbour.apart >= 4.0 * from_guess {
                 return best;
             }
@@ -265,7 +269,7 @@ impl Neighbours {
     }
 }
 
-/// Four at a time, which `fold` by itself would not do.
+/// The least number, four at a time, which `fold` does not do by itself.
 fn least(numbers: &[f32; 16]) -> f32 {
     let lesser = |a: f32, b: f32| if b < a { b } else { a };
     let mut least = [f32::INFINITY; 4];
@@ -277,7 +281,7 @@ fn least(numbers: &[f32; 16]) -> f32 {
     lesser(lesser(least[0], least[1]), lesser(least[2], least[3]))
 }
 
-/// Mean colours of the clusters; owners are renumbered so that no cluster is empty.
+/// Mean colours of the clusters. The owners, the cluster of each sample, are renumbered so that no cluster is empty.
 fn centres(samples: &[Sample], owners: &mut [u8]) -> Vec<[f32; 3]> {
     let mut sums = [[0.0_f64; 4]; 256];
     for (sample, &owner) in samples.iter().zip(owners.iter()) {
@@ -302,9 +306,9 @@ fn centres(samples: &[Sample], owners: &mut [u8]) -> Vec<[f32; 3]> {
 }
 
 struct Cluster {
-    /// Weighted difference from the mean, about.
+    /// About the sum of the distances from the mean.
     error: f64,
-    /// The coordinate with the largest part in it, and its mean.
+    /// The coordinate in which the members differ most, and its mean.
     widest: usize,
     mean: f32,
     members: std::ops::Range<usize>,
@@ -327,7 +331,7 @@ impl Cluster {
         let spread = |k: usize| squares[k] - sums[k] * sums[k] / weight;
         let widest = (1..DIMENSIONS).fold(0, |best, k| if spread(k) > spread(best) { k } else { best });
         let squares = if members.len() > 1 { (0..DIMENSIONS).map(spread).sum::<f64>() } else { 0.0 };
-        // The mean of differences, not of their squares: the eye is not helped by a few colours that are right.
+        // Distances, not their squares: to the eye, a few exact colours are worth less than many that are near.
         let error = (squares.max(0.0) * weight).sqrt();
         Self { error, widest, mean: (sums[widest] / weight) as f32, members }
     }
@@ -378,7 +382,7 @@ fn split(samples: &[Sample], size: usize) -> Vec<u8> {
     owners
 }
 
-/// Moves what is wanted to the front and says how many there are.
+/// Moves the wanted items to the front and returns how many there are.
 fn partition<T>(items: &mut [T], wanted: impl Fn(&T) -> bool) -> usize {
     let mut front = 0;
     for k in 0..items.len() {

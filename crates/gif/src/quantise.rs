@@ -1,102 +1,81 @@
-//! A frame and what a viewer sees before it, to the block that turns the one into the other.
+//! Turns frames into blocks, each of which turns what a viewer sees before it into its frame.
 //!
-//! Two frames are worked on at once: while one is drawn, the next is prepared. To [look](crate::look) at it is the step
-//! between them; then a palette is made of the colours that need drawing, and each colour has its [ink](crate::ink),
-//! while the [stripes](crate::stripe) choose the indices of the frame before.
+//! Two frames are worked on at once: while one is drawn, the next one is prepared. To prepare a frame is to [compare
+//! it](crate::needs) with what will be seen before it, and to [plan](crate::plan) how it is drawn; to draw it is to choose
+//! its indices, in [stripes](crate::stripe).
 
 use image::RgbImage;
 
 use crate::allowance::{Allowance, Loan, Redrawn};
 use crate::block::{Area, Block};
-use crate::colour::Near;
-use crate::exact::{self, Change, FewColours};
+use crate::colour::LocalMetric;
+use crate::exact::{self, Change, Kind};
 use crate::histogram::{Histogram, MOST_BINS};
-use crate::ink::{self, Ink};
-use crate::look::{Before, Need, Needs, TOLERATED, TOLERATED_IF_EXACT};
-use crate::palette::{Palette, Sample};
-use crate::stripe::{self, Inks, Row, Sheet, Stripe};
+use crate::needs::{LEFT_ERROR, LEFT_ERROR_IF_EXACT, Need, Needs, Previous};
+use crate::plan::{LossyPlan, Plan, Quantised};
+use crate::stripe::{self, Colours, Layout, Row, Stripe};
 
-/// Parts of a frame whose colours are counted side by side.
+/// Parts of a frame whose colours are counted in parallel.
 const PARTS: usize = 2;
-/// Mean squared error (see [`colour`](crate::colour)) up to which a palette of half as many colours is taken: it takes up
-/// half as many bytes, and the indices fewer, too. More of it by a number for all pixels together, up to a limit: where
-/// little is drawn, a palette is much of the file.
-const GOOD_ENOUGH: f32 = 0.8;
-const BY_PIXELS: f32 = 5000.0;
-const AT_MOST: f32 = 3.0;
-/// The fewest colours that a palette is halved to, with the one that is clear.
-const FEWEST: usize = 16;
-/// With more bins than that, no palette is good enough but by much work.
-const MOST_BINS_HALVED: usize = 4096;
 
-/// From which part of a frame on that changes many stripes cost little size. Several to a thread, for one of them begins
-/// late: it has prepared the next frame.
+/// If at least this part of a frame is drawn because it changed, it is divided into so many stripes: there the file grows
+/// little by more of them. Several for each thread, as one of them has prepared the next frame and begins later.
 const MOST: f64 = 0.5;
 const STRIPES_IF_MOST: usize = 5;
-/// From how many colours on a book is soon full, so that two stripes cost next to nothing.
+/// With so many colours a code table is soon full, so that a second stripe makes the file hardly larger.
 const MANY_COLOURS: usize = 4096;
 
 /// Turns frames into blocks, one after the other.
 #[derive(Debug)]
 pub(crate) struct Quantiser {
-    waiting: Option<Waiting>,
+    /// The frame that is drawn next.
+    prepared: Option<Prepared>,
     /// What a viewer sees after the last block.
     seen: RgbImage,
     allowance: Allowance,
     /// Used for each frame anew.
     parts: Vec<Histogram>,
-    spare: Option<(Needs, Histogram)>,
+    spare: Option<Buffers>,
     /// Mean level error of what the last palette draws.
     drawn_error: f32,
 }
 
+/// What a frame is prepared in.
+#[derive(Debug)]
+struct Buffers {
+    needs: Needs,
+    /// The colours that are drawn.
+    histogram: Histogram,
+}
+
 /// A frame that is ready to be drawn.
 #[derive(Debug)]
-struct Waiting {
+struct Prepared {
     frame: RgbImage,
     delay_cs: u16,
     /// Whether there is none before it.
     first: bool,
-    /// Whether it has at most 256 colours and is not exact, because it changes slightly from frame to frame.
+    /// See [`Kind`].
     drifts: bool,
-    needs: Needs,
-    histogram: Histogram,
+    buffers: Buffers,
     plan: Plan,
 }
 
-/// How a frame is to be drawn.
-#[derive(Debug)]
-enum Plan {
-    /// Without loss.
-    Exactly(FewColours),
-    With(Paint),
-}
-
-#[derive(Debug)]
-struct Paint {
-    /// `None` for the first frame.
-    loan: Option<Loan>,
-    /// The part of the frame that is drawn because it changed.
-    changed: f64,
-    /// `None` if nothing is to be drawn.
-    area: Option<Area>,
-    inked: Box<Inked>,
-    /// Mean level error of what is drawn.
-    level_error: f32,
-}
-
-/// A palette, which of its colours is nearest to each bin, and the mean squared error of what is drawn.
-#[derive(Debug)]
-struct Inked {
-    palette: Palette,
-    of_bins: Vec<Ink>,
-    error: f32,
+/// What it takes to prepare a frame.
+struct Preparation<'a> {
+    pixels: &'a [[u8; 3]],
+    width: usize,
+    previous: Option<&'a Prepared>,
+    drawn_error: f32,
+    allowance: &'a mut Allowance,
+    parts: &'a mut [Histogram],
+    buffers: &'a mut Buffers,
 }
 
 impl Quantiser {
     pub(crate) fn new() -> Self {
         Self {
-            waiting: None,
+            prepared: None,
             seen: RgbImage::default(),
             allowance: Allowance::new(),
             parts: (1..PARTS).map(|_| Histogram::new(MOST_BINS)).collect(),
@@ -105,195 +84,157 @@ impl Quantiser {
         }
     }
 
-    /// Takes the next frame, and gives the block of the one before it.
+    /// Takes the next frame, and returns the block of the one before it.
     pub(crate) fn push(&mut self, frame: RgbImage, delay_cs: u16) -> Option<Block> {
-        // All of it in the pool: each part by itself would have to get in.
+        // The whole step runs in the pool: otherwise each part of it would have to wait for a thread.
         rayon::scope(|_| self.step(frame, delay_cs))
     }
 
     fn step(&mut self, frame: RgbImage, delay_cs: u16) -> Option<Block> {
-        let (width, pixels) = (frame.width() as usize, frame.as_raw().as_chunks::<3>().0);
-        let before = self.waiting.take();
-        let first = before.is_none();
+        let previous = self.prepared.take();
+        let first = previous.is_none();
         if first {
             self.seen = RgbImage::new(frame.width(), frame.height());
         }
-        let spare = self.spare.take();
-        let (mut needs, mut histogram) =
-            spare.unwrap_or_else(|| (Needs::default(), Histogram::new(MOST_BINS)));
-
-        let (seen, allowance, parts) = (&mut self.seen, &mut self.allowance, &mut self.parts);
-        let error = self.drawn_error;
-        let mut drifting = false;
-        let mut look = |seen: &RgbImage, needs: &mut Needs| {
-            let before = before.as_ref();
-            let few = exact::few_colours(pixels);
-            let change = match before {
-                Some(before) if few.is_some() => exact::change(pixels, before.frame.as_raw().as_chunks().0),
-                _ => Change::Large,
-            };
-            let drifts = match change {
-                Change::Little => before.is_some_and(|before| before.drifts),
-                Change::Slight => true,
-                Change::Large => false,
-            };
-            let few = few.filter(|_| !drifts);
-            let before = before.filter(|_| few.is_none()).map(|before| Before {
-                frame: before.frame.as_raw().as_chunks().0,
-                needs: &before.needs.pixels,
-                seen: seen.as_raw().as_chunks().0,
-                error,
-                tolerated: if drifts { TOLERATED_IF_EXACT } else { TOLERATED },
-                inks: match &before.plan {
-                    Plan::Exactly(_) => None,
-                    Plan::With(paint) => Some((&before.histogram, &paint.inked.of_bins)),
-                },
-            });
-            let loan = match before {
-                Some(before) => {
-                    let still =
-                        needs.look(pixels, width, before, change != Change::Slight && allowance.is_left());
-                    let loan = allowance.lend(&still, pixels.len());
-                    allowance.waited = needs.confine(loan.least_error, allowance.waited);
-                    Some(loan)
-                }
-                None => {
-                    needs.want_all(width, pixels.len());
-                    None
-                }
-            };
-            drifting = drifts;
-            (few, loan)
+        let Self { seen, allowance, parts, spare, drawn_error, .. } = self;
+        let mut buffers = spare.take().unwrap_or_else(Buffers::new);
+        let mut preparation = Preparation {
+            pixels: pixels_of(&frame),
+            width: frame.width() as usize,
+            previous: previous.as_ref(),
+            drawn_error: *drawn_error,
+            allowance,
+            parts,
+            buffers: &mut buffers,
         };
-        let (plan, drawn) = match &before {
-            // What will be seen is the frame itself.
-            Some(before) if matches!(before.plan, Plan::Exactly(_)) => {
-                let plan = || {
-                    let looked = look(&before.frame, &mut needs);
-                    Plan::new(pixels, width, looked, &mut needs, &mut histogram, parts)
-                };
-                let (plan, drawn) = rayon::join(plan, || before.draw(seen));
-                (plan, Some(drawn))
-            }
-            before => {
-                let looked = look(seen, &mut needs);
-                let plan = || Plan::new(pixels, width, looked, &mut needs, &mut histogram, parts);
-                rayon::join(plan, || match before {
-                    Some(before) => Some(before.draw(seen)),
-                    None => {
-                        Near::prepare();
+        let ((plan, drifts), drawn) = match &previous {
+            None => {
+                let compared = preparation.compare(seen);
+                rayon::join(
+                    || preparation.plan(compared),
+                    || {
+                        LocalMetric::prepare();
                         None
-                    }
-                })
+                    },
+                )
+            }
+            // What will be seen is the previous frame itself.
+            Some(previous) if matches!(previous.plan, Plan::Lossless(_)) => rayon::join(
+                || {
+                    let compared = preparation.compare(&previous.frame);
+                    preparation.plan(compared)
+                },
+                || Some(previous.draw(seen)),
+            ),
+            Some(previous) => {
+                let compared = preparation.compare(seen);
+                rayon::join(|| preparation.plan(compared), || Some(previous.draw(seen)))
             }
         };
-        if let Plan::With(Paint { area: Some(_), level_error, .. }) = plan {
+        if let Plan::Lossy(LossyPlan { area: Some(_), level_error, .. }) = plan {
             self.drawn_error = level_error;
         }
-        self.waiting = Some(Waiting { frame, delay_cs, first, drifts: drifting, needs, histogram, plan });
-        let (before, (block, redrawn)) = (before?, drawn?);
-        if let Plan::With(Paint { loan: Some(loan), changed, .. }) = &before.plan {
+        self.prepared = Some(Prepared { frame, delay_cs, first, drifts, buffers, plan });
+        let (previous, (block, redrawn)) = (previous?, drawn?);
+        if let Plan::Lossy(LossyPlan { loan: Some(loan), changed, .. }) = &previous.plan {
             self.allowance.pay(loan, &redrawn, *changed);
         }
-        self.spare = Some((before.needs, before.histogram));
+        self.spare = Some(previous.buffers);
         Some(block)
     }
 
     /// The block of the last frame.
     pub(crate) fn finish(&mut self) -> Option<Block> {
-        let last = self.waiting.take()?;
+        let last = self.prepared.take()?;
         rayon::scope(|_| Some(last.draw(&mut self.seen).0))
     }
 }
 
-impl Plan {
-    fn new(
-        pixels: &[[u8; 3]],
-        width: usize,
-        (few, loan): (Option<FewColours>, Option<Loan>),
-        needs: &mut Needs,
-        histogram: &mut Histogram,
-        parts: &mut [Histogram],
-    ) -> Self {
-        match few {
-            Some(colours) => Self::Exactly(colours),
-            None => Self::With(Paint::new(pixels, width, loan, needs, histogram, parts)),
-        }
+impl Buffers {
+    fn new() -> Self {
+        Self { needs: Needs::default(), histogram: Histogram::new(MOST_BINS) }
     }
 }
 
-impl Paint {
-    fn new(
-        pixels: &[[u8; 3]],
-        width: usize,
-        loan: Option<Loan>,
-        needs: &mut Needs,
-        histogram: &mut Histogram,
-        parts: &mut [Histogram],
-    ) -> Self {
-        let least = loan.as_ref().map_or(0.0, |loan| loan.least_error);
-        let changed = needs.count(pixels, least, histogram, parts) as f64 / pixels.len() as f64;
-        let area = Area::around(&needs.pixels, width, |need| matches!(need, Need::Draw | Need::Better));
-        let bins = Sample::of_bins(histogram);
-        let inked = match loan {
-            // A viewer may see it for long, or see nothing else.
-            None => Inked::new(histogram, &bins, 256),
-            Some(_) => Inked::new(histogram, &bins, 255).of_fewer_colours(histogram, &bins),
+impl Preparation<'_> {
+    /// Finds out what the frame needs, and what it may use of the allowance; no loan if all of it is drawn. `seen`: what a
+    /// viewer sees before the previous frame is drawn.
+    fn compare(&mut self, seen: &RgbImage) -> (Kind, Option<Loan>) {
+        let Self { pixels, width, previous, drawn_error, .. } = *self;
+        let kind = Kind::of(pixels, previous.map(|previous| (pixels_of(&previous.frame), previous.drifts)));
+        let needs = &mut self.buffers.needs;
+        let Some(previous) = previous.filter(|_| kind.few.is_none()) else {
+            needs.draw_all(width, pixels.len());
+            return (kind, None);
         };
-        let level_error = ink::mean_level_error(histogram, &inked.of_bins, &inked.palette);
-        Self { loan, changed, area, inked: Box::new(inked), level_error }
+        let left_error = if kind.drifts { LEFT_ERROR_IF_EXACT } else { LEFT_ERROR };
+        let previous = previous.seen_after(seen, drawn_error, left_error);
+        let refining = kind.change != Change::Slight && self.allowance.is_left();
+        let still = needs.compare(pixels, width, previous, refining);
+        let loan = self.allowance.lend(&still, pixels.len());
+        self.allowance.waited = needs.confine(loan.least_error, self.allowance.waited);
+        (kind, Some(loan))
+    }
+
+    /// How the frame is drawn, and whether it drifts.
+    fn plan(self, (kind, loan): (Kind, Option<Loan>)) -> (Plan, bool) {
+        let Self { pixels, width, parts, buffers: Buffers { needs, histogram }, .. } = self;
+        let plan = match kind.few {
+            Some(colours) => Plan::Lossless(colours),
+            None => Plan::Lossy(LossyPlan::new(pixels, width, loan, needs, histogram, parts)),
+        };
+        (plan, kind.drifts)
     }
 }
 
-impl Inked {
-    /// With at most so many colours.
-    fn new(histogram: &Histogram, bins: &[Sample], size: usize) -> Self {
-        let (palette, guesses) = Palette::of_bins(histogram, bins, size);
-        let of_bins = Ink::of_bins(bins, &palette, &guesses);
-        let error = ink::mean_error(histogram, &of_bins);
-        Self { palette, of_bins, error }
+impl Prepared {
+    /// What the next frame is compared with. `seen`: what a viewer sees before this one is drawn.
+    fn seen_after<'a>(&'a self, seen: &'a RgbImage, error: f32, left_error: f32) -> Previous<'a> {
+        Previous {
+            frame: pixels_of(&self.frame),
+            needs: &self.buffers.needs.pixels,
+            seen: pixels_of(seen),
+            error,
+            left_error,
+            nearest: match &self.plan {
+                Plan::Lossless(_) => None,
+                Plan::Lossy(plan) => Some((&self.buffers.histogram, &plan.quantised.nearest)),
+            },
+        }
     }
 
-    /// Halves the palette as long as what it draws stays good enough; one index is left free.
-    fn of_fewer_colours(mut self, histogram: &Histogram, bins: &[Sample]) -> Self {
-        if bins.len() > MOST_BINS_HALVED {
-            return self;
-        }
-        let bound = GOOD_ENOUGH + (BY_PIXELS / histogram.pixels() as f32).min(AT_MOST);
-        // Half as many colours draw with twice the error or more.
-        while self.error * 2.0 <= bound {
-            let size = (self.palette.colours.len() + 1).next_power_of_two() / 2;
-            if size < FEWEST {
-                break;
-            }
-            let fewer = Self::new(histogram, bins, size - 1);
-            if fewer.error > bound {
-                break;
-            }
-            self = fewer;
-        }
-        self
-    }
-}
-
-impl Waiting {
-    /// Gives the block, and what was drawn anew.
+    /// Returns the block, and which of the pixels that stay were drawn anew.
     fn draw(&self, seen: &mut RgbImage) -> (Block, Vec<Redrawn>) {
-        let (width, pixels) = (self.frame.width() as usize, self.frame.as_raw().as_chunks::<3>().0);
+        let (width, pixels) = (self.frame.width() as usize, pixels_of(&self.frame));
         let seen = seen.as_chunks_mut::<3>().0;
         match &self.plan {
-            Plan::Exactly(colours) => {
+            Plan::Lossless(colours) => {
                 (exact::draw(pixels, width, self.first, seen, colours, self.delay_cs), Vec::new())
             }
-            Plan::With(Paint { area: None, .. }) => (Block::nothing(self.delay_cs), Vec::new()),
-            Plan::With(Paint { area: Some(area), inked, changed, .. }) => {
-                let Inked { palette, of_bins, error } = &**inked;
-                let clear = (!self.first).then_some(palette.colours.len() as u8);
+            Plan::Lossy(LossyPlan { area: None, .. }) => (Block::nothing(self.delay_cs), Vec::new()),
+            Plan::Lossy(LossyPlan { area: Some(area), quantised, changed, .. }) => {
+                let Quantised { palette, nearest, error } = &**quantised;
+                let transparent = (!self.first).then_some(palette.colours.len() as u8);
+                let histogram = &self.buffers.histogram;
                 let (changed, error) = (*changed, *error);
-                let inks = Inks { palette, of_bins, histogram: &self.histogram, clear, changed, error };
-                draw(pixels, width, *area, &self.needs.pixels, seen, inks, self.delay_cs)
+                let colours = Colours { palette, nearest, histogram, transparent, changed, error };
+                draw(pixels, width, *area, &self.buffers.needs.pixels, seen, colours, self.delay_cs)
             }
         }
+    }
+}
+
+fn pixels_of(image: &RgbImage) -> &[[u8; 3]] {
+    image.as_raw().as_chunks().0
+}
+
+/// How many stripes at least a frame is divided into, given the part of it that is drawn because it changed and the number
+/// of its colours.
+fn least_stripes(changed: f64, colours: usize) -> usize {
+    match colours {
+        _ if changed >= MOST => STRIPES_IF_MOST,
+        0..MANY_COLOURS => 1,
+        _ => 2,
     }
 }
 
@@ -303,18 +244,19 @@ fn draw(
     area: Area,
     needs: &[Need],
     seen: &mut [[u8; 3]],
-    inks: Inks<'_>,
+    colours: Colours<'_>,
     delay_cs: u16,
 ) -> (Block, Vec<Redrawn>) {
-    let colours = &inks.palette.colours;
-    let stripes = match inks.histogram.bins().len() {
-        _ if inks.changed >= MOST => STRIPES_IF_MOST,
-        0..MANY_COLOURS => 1,
-        _ => 2,
+    let layout = Layout {
+        area,
+        width,
+        colours: &colours.palette.colours,
+        transparent: colours.transparent,
+        delay_cs,
+        stripes: least_stripes(colours.changed, colours.histogram.bins().len()),
     };
-    let sheet = Sheet { area, width, colours, clear: inks.clear, delay_cs, stripes };
-    stripe::in_stripes(sheet, seen, |writer, top, seen| {
-        let mut stripe = Stripe::new(inks, writer);
+    stripe::in_stripes(layout, seen, |writer, top, seen| {
+        let mut stripe = Stripe::new(colours, writer);
         for (y, seen) in (top..).zip(seen.chunks_exact_mut(width)) {
             let part = y * width + area.left..y * width + area.right;
             let above = if y == 0 { part.clone() } else { part.start - width..part.end - width };
@@ -327,4 +269,57 @@ fn draw(
         }
         stripe.redrawn()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stripes_where_they_cost_little() {
+        assert_eq!(least_stripes(0.0, MANY_COLOURS - 1), 1);
+        assert_eq!(least_stripes(0.49, MANY_COLOURS), 2);
+        assert_eq!(least_stripes(MOST, 1), STRIPES_IF_MOST);
+    }
+
+    /// Many colours, of which those from row `from` on are `by` levels higher.
+    fn frame(from: u32, by: u8) -> RgbImage {
+        let level = |x: u32, y: u32| [x as u8 * 2, y as u8 * 2, (x + y) as u8];
+        RgbImage::from_fn(64, 64, |x, y| {
+            let [r, g, b] = level(x, y);
+            image::Rgb(if y >= from { [r, g + by, b] } else { [r, g, b] })
+        })
+    }
+
+    #[test]
+    fn each_frame_is_planned_by_what_is_seen_before_it() {
+        let mut quantiser = Quantiser::new();
+        assert!(quantiser.push(frame(64, 0), 5).is_none());
+        let Some(Prepared { first: true, plan: Plan::Lossy(plan), .. }) = &quantiser.prepared else {
+            panic!("{:?}", quantiser.prepared)
+        };
+        assert_eq!((plan.area.map(|area| area.size()), plan.changed), (Some(64 * 64), 1.0));
+        assert!(plan.loan.is_none());
+
+        let whole = quantiser.push(frame(48, 100), 6).unwrap();
+        assert_eq!((whole.area.size(), whole.transparent, whole.delay_cs), (64 * 64, None, 5));
+        let Some(Prepared { first: false, plan: Plan::Lossy(plan), .. }) = &quantiser.prepared else {
+            panic!("{:?}", quantiser.prepared)
+        };
+        // What is refined above it is left for a later frame, or is part of the area.
+        assert!(plan.area.is_some_and(|area| area.bottom == 64 && area.top <= 48));
+        assert_eq!(plan.changed, 0.25);
+        assert!(plan.loan.is_some());
+
+        let block = quantiser.finish().unwrap();
+        assert_eq!(block.delay_cs, 6);
+        assert!(block.transparent.is_some());
+    }
+
+    #[test]
+    fn few_colours_are_planned_without_loss() {
+        let mut quantiser = Quantiser::new();
+        quantiser.push(RgbImage::from_pixel(16, 16, image::Rgb([9; 3])), 5);
+        assert!(matches!(quantiser.prepared, Some(Prepared { plan: Plan::Lossless(_), .. })));
+    }
 }

@@ -1,101 +1,109 @@
-//! Indices of rows of pixels, chosen as LZW reads them.
+//! Chooses the palette index of each pixel while LZW reads the indices.
 //!
-//! LZW writes a string of indices that it has met before as one code. So where the best index would end such a string
-//! and another one, nearly as good, would not, the other is taken. What is amiss then, and what the palette has no colour
-//! for, the pixels to the right and below make good in part: the more, the farther off the palette's colours are, and
-//! only where the surroundings are smooth enough for the mean to be seen. Mostly that only tips the choice of what
-//! continues a string; a colour that is not the nearest begins a new one only when that saves much. So gradients are mixed
-//! for few bytes, and errors do not add up. Where much changes, and more so in rough surroundings, the palette's own error
-//! is the measure of what is nearly as good. Frames are worked on in stripes of rows side by side, each a part of the
-//! image's data of its own.
+//! LZW writes a string of indices that is in its code table as one code. So where the best index would end the string, an
+//! index that is nearly as good and continues it is taken instead.
+//!
+//! The palette's error is spread by error diffusion: the residual of a pixel, what was meant minus what is shown, is
+//! divided between the pixels to the right and below. Three rules keep the file small:
+//!
+//! - A pixel corrects a part of the residual that reaches it, the more the farther its nearest palette entry is from it,
+//!   and only in smooth surroundings, where the eye sees the mean of neighbouring pixels.
+//! - Mostly this only decides between indices that continue the string. An index that is not the nearest begins a new
+//!   string only when that saves much error.
+//! - Where much of the frame changes, the tolerance grows with the palette's own error, and more in rough surroundings.
+//!
+//! A block is divided into stripes of rows, which are worked on in parallel; each is a part of the image data with a code
+//! table of its own.
 
 use rayon::prelude::*;
 
 use crate::allowance::Redrawn;
 use crate::block::{self, Area, Block};
-use crate::colour::{self, Near};
+use crate::colour::{self, LocalMetric};
 use crate::histogram::Histogram;
-use crate::ink::Ink;
-use crate::look::Need;
 use crate::lzw::{Part, Writer};
+use crate::nearest::Nearest;
+use crate::needs::Need;
 use crate::palette::Palette;
 
-/// How much more squared error (see [`colour`](crate::colour)) an index may have that makes the file smaller.
-const LENIENCE: f32 = 6.0;
-/// The same where much changes, if that is more: so much for each unit of the palette's mean error. What is soon drawn
-/// anew needs no better colours than the palette has.
-const LENIENCE_BY_ERROR: f32 = 1.4;
-/// More of it there, where the surroundings are not smooth.
-const LENIENCE_IF_ROUGH: f32 = 10.0;
-/// A pixel that stays is drawn anew only if its squared error becomes so many times smaller: less gained would not be worth
+/// The additional squared error (see [`colour`]) that an index may have if it makes the file smaller.
+const TOLERANCE: f32 = 6.0;
+/// The same where much of the frame changes, for each unit of the palette's mean error; the larger of the two holds. Such
+/// pixels are soon drawn anew, and need no better colours than the palette has.
+const TOLERANCE_BY_ERROR: f32 = 1.4;
+/// Added to it there where the surroundings are not smooth.
+const TOLERANCE_IF_ROUGH: f32 = 10.0;
+/// A pixel that stays is drawn anew only if its squared error becomes so many times smaller: a smaller gain is not worth
 /// the flicker.
 const MUCH_BETTER: f32 = 2.0;
-/// The level error against the pixels to the left and above, together, up to which the surroundings are smooth; more by
-/// `SMOOTH_BY_ERROR` for each unit of the nearest colour's squared error.
+/// The surroundings of a pixel are smooth if its level errors against the pixels to the left and above add up to at most
+/// this, and `SMOOTH_BY_ERROR` more for each unit of its nearest entry's squared error.
 const SMOOTH: f32 = 24.0;
 const SMOOTH_BY_ERROR: f32 = 0.6;
-/// The squared error of the nearest colour up to which a pixel makes nothing good.
+/// The squared error of the nearest entry up to which a pixel corrects nothing.
 const SMALL: f32 = 6.0;
-/// The part of what is amiss that a pixel makes good, for each unit of error beyond that, and at most.
-const MADE_GOOD: f32 = 0.022;
-const MOST_MADE_GOOD: f32 = 0.8;
-/// The part of a frame that is drawn because it changed from which on all that holds in full. Below, proportionally less
-/// is made good, down to a least part of it.
+/// The part of the residual that a pixel corrects for each unit of error above `SMALL`, and the largest part.
+const CORRECTED: f32 = 0.022;
+const MOST_CORRECTED: f32 = 0.8;
+/// From this part of the frame on that is drawn because it changed, a pixel corrects as much as stated. Below, it corrects
+/// proportionally less, but at least `LEAST_PART` of it.
 const MUCH_CHANGED: f64 = 0.4;
 const LEAST_PART: f32 = 0.4;
-/// The part that is handed on, half of it to the right, half down; and how many levels at most.
-const HANDED_ON: f32 = 0.8;
-const MOST_AMISS: f32 = 24.0;
-/// How much squared error a colour that is not the nearest must save to begin a new string.
-const FRESH: f32 = 40.0;
-/// How much more squared error than it has by itself the nearest colour may have, with what is amiss, to be taken without
-/// a look at others if it continues the string.
+/// The part of a residual that is diffused, one half of it to the right and one half down.
+const DIFFUSED: f32 = 0.8;
+/// The largest residual of a channel, in levels.
+const MOST_RESIDUAL: f32 = 24.0;
+/// The squared error that an index other than the nearest must save to begin a new string.
+const NEW_STRING: f32 = 40.0;
+/// The nearest entry is taken without comparing others if it continues the string and the residual adds at most this to
+/// its squared error.
 const AT_ONCE: f32 = 3.0;
-/// Pixels of a stripe, at most. Fewer cost size: each stripe begins with an empty book.
+/// The most pixels of a stripe. Smaller stripes make the file larger: each begins with an empty code table.
 const STRIPE: usize = 160_000;
 /// Smaller ones are not worth a thread.
 const LEAST_STRIPE: usize = 30_000;
 
 /// What a frame is drawn with.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Inks<'a> {
+pub(crate) struct Colours<'a> {
     pub(crate) palette: &'a Palette,
-    pub(crate) of_bins: &'a [Ink],
+    /// The nearest entry of each bin of the histogram.
+    pub(crate) nearest: &'a [Nearest],
     pub(crate) histogram: &'a Histogram,
     /// The index that leaves a pixel as it is.
-    pub(crate) clear: Option<u8>,
+    pub(crate) transparent: Option<u8>,
     /// The part of the frame that is drawn because it changed.
     pub(crate) changed: f64,
     /// Mean squared error of what is drawn.
     pub(crate) error: f32,
 }
 
-/// What a block is drawn on.
+/// Where a block lies, and how it is divided.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Sheet<'a> {
+pub(crate) struct Layout<'a> {
     pub(crate) area: Area,
     /// Of the whole frame.
     pub(crate) width: usize,
     /// The palette, and the index that leaves a pixel as it is.
     pub(crate) colours: &'a [[u8; 3]],
-    pub(crate) clear: Option<u8>,
+    pub(crate) transparent: Option<u8>,
     pub(crate) delay_cs: u16,
-    /// The least number of stripes, as far as each is worth a thread.
+    /// The least number of stripes, unless they would be too small to be worth a thread.
     pub(crate) stripes: usize,
 }
 
-/// Runs `draw` on stripes of whole rows of a sheet, side by side: with a writer, the first row and what is seen from it
-/// on. Gives the block and the results.
+/// Runs `draw` on stripes of whole rows of the layout's area, in parallel: with a writer, the stripe's first row, and what
+/// is seen in whole rows of the frame from there on. Returns the block and the results.
 pub(crate) fn in_stripes<R: Send>(
-    sheet: Sheet<'_>,
+    layout: Layout<'_>,
     seen: &mut [[u8; 3]],
     draw: impl Fn(&mut Writer, usize, &mut [[u8; 3]]) -> R + Sync,
 ) -> (Block, Vec<R>) {
-    let Sheet { area, width, colours, clear, delay_cs, stripes } = sheet;
-    let bits = block::bits(colours.len() + usize::from(clear.is_some()));
+    let Layout { area, width, colours, transparent, delay_cs, stripes } = layout;
+    let bits = block::bits(colours.len() + usize::from(transparent.is_some()));
     let height = area.bottom - area.top;
     let pixels = (area.right - area.left) * height;
-    // By size alone, an odd one out would be drawn while other threads wait.
+    // An even number: with an odd one, one of two threads would wait for the last stripe.
     let count = match pixels.div_ceil(STRIPE) {
         1 => stripes.min((pixels / LEAST_STRIPE).max(1)),
         many => many.next_multiple_of(2).max(stripes),
@@ -108,47 +116,47 @@ pub(crate) fn in_stripes<R: Send>(
         (writer.finish((number + 1) * rows >= height), result)
     });
     let (parts, results): (Vec<Part>, Vec<R>) = drawn.unzip();
-    (Block::new(area, colours, clear, delay_cs, &parts), results)
+    (Block::new(area, colours, transparent, delay_cs, &parts), results)
 }
 
 /// Chooses indices row by row.
 #[derive(Debug)]
 pub(crate) struct Stripe<'a> {
-    inks: Inks<'a>,
+    colours: Colours<'a>,
     writer: &'a mut Writer,
     redrawn: Redrawn,
-    near: Near,
-    /// The part of what is amiss that a pixel makes good, for each unit of error.
-    made_good: f32,
+    metric: LocalMetric,
+    /// The part of the residual that a pixel corrects, for each unit of error.
+    corrected: f32,
     /// Where the surroundings are smooth, and where not.
-    leniences: [f32; 2],
-    /// What the pixels above hand down to each of the row.
-    handed_down: Vec<[f32; 3]>,
+    tolerances: [f32; 2],
+    /// The residual that each pixel of the row above diffuses down.
+    from_above: Vec<[f32; 3]>,
 }
 
-/// Part of a row: what is meant, what it needs, and what a viewer sees.
+/// Part of a row of a frame: its pixels, what they need, and what a viewer sees.
 pub(crate) struct Row<'a> {
     pub(crate) pixels: &'a [[u8; 3]],
-    /// What is meant in the row above.
+    /// Of the frame, in the row above.
     pub(crate) above: &'a [[u8; 3]],
     pub(crate) needs: &'a [Need],
     pub(crate) seen: &'a mut [[u8; 3]],
 }
 
 impl<'a> Stripe<'a> {
-    pub(crate) fn new(inks: Inks<'a>, writer: &'a mut Writer) -> Self {
-        let part = (inks.changed / MUCH_CHANGED).min(1.0) as f32;
+    pub(crate) fn new(colours: Colours<'a>, writer: &'a mut Writer) -> Self {
+        let part = (colours.changed / MUCH_CHANGED).min(1.0) as f32;
         // A viewer may see the first frame for long.
-        let soon_gone = if inks.clear.is_some() { part } else { 0.0 };
-        let lenience = LENIENCE.max(LENIENCE_BY_ERROR * inks.error * soon_gone);
+        let soon_gone = if colours.transparent.is_some() { part } else { 0.0 };
+        let tolerance = TOLERANCE.max(TOLERANCE_BY_ERROR * colours.error * soon_gone);
         Self {
-            inks,
+            colours,
             writer,
             redrawn: Redrawn::default(),
-            near: Near::new(),
-            made_good: MADE_GOOD * part.max(LEAST_PART),
-            leniences: [lenience, lenience + LENIENCE_IF_ROUGH * soon_gone],
-            handed_down: Vec::new(),
+            metric: LocalMetric::new(),
+            corrected: CORRECTED * part.max(LEAST_PART),
+            tolerances: [tolerance, tolerance + TOLERANCE_IF_ROUGH * soon_gone],
+            from_above: Vec::new(),
         }
     }
 
@@ -158,148 +166,156 @@ impl<'a> Stripe<'a> {
     }
 
     pub(crate) fn draw(&mut self, row: Row<'_>) {
-        let clear = self.inks.clear;
+        let transparent = self.colours.transparent;
         let mut previous = None;
         let mut last = ([0; 3], None);
-        self.handed_down.resize(row.pixels.len(), [0.0; 3]);
-        let mut handed_on = [0.0; 3];
+        self.from_above.resize(row.pixels.len(), [0.0; 3]);
+        let mut diffused = [0.0; 3];
         for k in 0..row.pixels.len() {
             let (now, need, seen) = (row.pixels[k], row.needs[k], row.seen[k]);
-            let above = self.handed_down[k];
-            let amiss = [handed_on[0] + above[0], handed_on[1] + above[1], handed_on[2] + above[2]];
-            handed_on = [0.0; 3];
+            let above = self.from_above[k];
+            let residual = [diffused[0] + above[0], diffused[1] + above[1], diffused[2] + above[2]];
+            diffused = [0.0; 3];
             let index = match need {
-                Need::Nothing => {
-                    let clear = clear.unwrap_or(0);
-                    self.writer.put(clear);
-                    clear
+                Need::Keep => {
+                    let transparent = transparent.unwrap_or(0);
+                    self.writer.put(transparent);
+                    transparent
                 }
-                Need::Free => self.free(now, seen, previous),
-                Need::Better | Need::Draw => {
+                Need::Either => self.kept_or_repeated(now, seen, previous),
+                Need::Refine | Need::Draw => {
                     if last.0 != now || last.1.is_none() {
-                        let bin = self.inks.histogram.find(now).unwrap_or(0);
-                        last = (now, Some(self.inks.of_bins[bin]));
+                        let bin = self.colours.histogram.find(now).unwrap_or(0);
+                        last = (now, Some(self.colours.nearest[bin]));
                     }
-                    let Some(ink) = last.1 else { continue };
+                    let Some(entry) = last.1 else { continue };
                     let levels = colour::levels(now);
-                    if ink.error > SMALL && row.is_smooth(k, ink.error) {
-                        let part = ((ink.error - SMALL) * self.made_good).min(MOST_MADE_GOOD);
+                    if entry.error > SMALL && row.is_smooth(k, entry.error) {
+                        let part = ((entry.error - SMALL) * self.corrected).min(MOST_CORRECTED);
                         let target = [
-                            levels[0] + part * amiss[0],
-                            levels[1] + part * amiss[1],
-                            levels[2] + part * amiss[2],
+                            levels[0] + part * residual[0],
+                            levels[1] + part * residual[1],
+                            levels[2] + part * residual[2],
                         ];
-                        let index = self.drawn(&row, k, target, ink, FRESH);
-                        let shown = if Some(index) == clear { seen } else { self.colour(index) };
-                        handed_on = hand_on(amiss, levels, colour::levels(shown));
+                        let index = self.drawn(&row, k, target, entry, NEW_STRING);
+                        let shown = if Some(index) == transparent { seen } else { self.colour(index) };
+                        diffused = diffuse(residual, levels, colour::levels(shown));
                         index
                     } else {
-                        self.drawn(&row, k, levels, ink, f32::INFINITY)
+                        self.drawn(&row, k, levels, entry, f32::INFINITY)
                     }
                 }
             };
-            self.handed_down[k] = handed_on;
+            self.from_above[k] = diffused;
             previous = Some(index);
-            if Some(index) != clear {
+            if Some(index) != transparent {
                 let colour = self.colour(index);
-                if need == Need::Better {
-                    self.redrawn.count(self.near.error(seen, colour), colour::levels_apart(seen, colour));
+                if need == Need::Refine {
+                    self.redrawn.count(self.metric.error(seen, colour), colour::levels_apart(seen, colour));
                 }
                 row.seen[k] = colour;
             }
         }
     }
 
-    /// The index before, if that is at least as good as nothing and nothing would end the string.
-    fn free(&mut self, now: [u8; 3], seen: [u8; 3], previous: Option<u8>) -> u8 {
-        let clear = self.inks.clear.unwrap_or(0);
-        if self.writer.extend(clear) {
-            return clear;
+    /// The index of a pixel that may be drawn or left: transparent, unless that would end the string and the index of the
+    /// pixel before does not, and is no worse.
+    fn kept_or_repeated(&mut self, now: [u8; 3], seen: [u8; 3], previous: Option<u8>) -> u8 {
+        let transparent = self.colours.transparent.unwrap_or(0);
+        if self.writer.extend(transparent) {
+            return transparent;
         }
-        let index = match previous.filter(|&index| index != clear) {
+        let index = match previous.filter(|&index| index != transparent) {
             Some(index)
                 if self.writer.continues(index)
-                    && self.near.error(now, self.colour(index)) <= self.near.error(now, seen) =>
+                    && self.metric.error(now, self.colour(index)) <= self.metric.error(now, seen) =>
             {
                 index
             }
-            _ => clear,
+            _ => transparent,
         };
         self.writer.put(index);
         index
     }
 
-    /// How much more error than of the best index is taken for the sake of the file's size.
-    fn lenience(&self, row: &Row<'_>, k: usize, ink: Ink) -> f32 {
-        let [smooth, rough] = self.leniences;
-        if rough > smooth && !row.is_smooth(k, ink.error) { rough } else { smooth }
+    /// The error above that of the best index that is accepted to make the file smaller.
+    fn tolerance(&self, row: &Row<'_>, k: usize, entry: Nearest) -> f32 {
+        let [smooth, rough] = self.tolerances;
+        if rough > smooth && !row.is_smooth(k, entry.error) { rough } else { smooth }
     }
 
-    /// The index for a pixel. `target` is what is meant with what is amiss around it; a colour that is not the nearest
-    /// begins a string only when that saves more error than `fresh`.
-    fn drawn(&mut self, row: &Row<'_>, k: usize, target: [f32; 3], ink: Ink, fresh: f32) -> u8 {
+    /// Writes the index of a pixel that is to be drawn, and returns it.
+    ///
+    /// `target`: the pixel's levels with the corrected part of the residual. `entry`: the palette entry nearest to the
+    /// pixel itself. `new_string`: the error that another index must save to begin a new string.
+    fn drawn(&mut self, row: &Row<'_>, k: usize, target: [f32; 3], entry: Nearest, new_string: f32) -> u8 {
         let (now, need, seen) = (row.pixels[k], row.needs[k], row.seen[k]);
-        // As good as can be, for nothing. What is seen right may be left, too.
-        if ink.error == 0.0 && (self.inks.clear.is_none() || now != seen) && self.writer.extend(ink.index) {
-            return ink.index;
+        // No error and no bytes. A pixel that is seen right may also be left, which is tried below.
+        if entry.error == 0.0
+            && (self.colours.transparent.is_none() || now != seen)
+            && self.writer.extend(entry.index)
+        {
+            return entry.index;
         }
-        let form = self.near.around(now);
-        let nearest = form.error(target, colour::levels(self.colour(ink.index)));
-        if let Some(clear) = self.inks.clear {
+        let form = self.metric.around(now);
+        let nearest = form.error(target, colour::levels(self.colour(entry.index)));
+        if let Some(transparent) = self.colours.transparent {
             let shown = form.error(target, colour::levels(seen));
-            let bound = if need == Need::Better { MUCH_BETTER * nearest } else { nearest };
+            let bound = if need == Need::Refine { MUCH_BETTER * nearest } else { nearest };
             if bound >= shown {
-                self.writer.put(clear);
-                return clear;
+                self.writer.put(transparent);
+                return transparent;
             }
-            if need != Need::Better
-                && shown <= nearest + self.leniences[1]
-                && shown <= nearest + self.lenience(row, k, ink)
-                && self.writer.extend(clear)
+            if need != Need::Refine
+                && shown <= nearest + self.tolerances[1]
+                && shown <= nearest + self.tolerance(row, k, entry)
+                && self.writer.extend(transparent)
             {
-                return clear;
+                return transparent;
             }
         }
-        let at_once = nearest <= ink.error + AT_ONCE;
-        if at_once && self.writer.extend(ink.index) {
-            return ink.index;
+        let at_once = nearest <= entry.error + AT_ONCE;
+        if at_once && self.writer.extend(entry.index) {
+            return entry.index;
         }
-        if nearest <= fresh && !self.writer.is_known() {
-            self.writer.put(ink.index);
-            return ink.index;
+        if nearest <= new_string && !self.writer.is_known() {
+            self.writer.put(entry.index);
+            return entry.index;
         }
-        let around = &self.inks.palette.around[usize::from(ink.index)];
-        let error = |at: usize| form.error(target, around.levels[at]);
-        let mut best = (ink.index, nearest);
-        if nearest > fresh {
-            for (at, &index) in around.indices.iter().enumerate() {
+        let others = &self.colours.palette.alternatives[usize::from(entry.index)];
+        let error = |at: usize| form.error(target, others.levels[at]);
+        // The index that may begin a new string.
+        let mut best = (entry.index, nearest);
+        if nearest > new_string {
+            for (at, &index) in others.indices.iter().enumerate() {
                 let error = error(at);
                 if error < best.1 {
                     best = (index, error);
                 }
             }
-            if nearest - best.1 < fresh {
-                best = (ink.index, nearest);
+            if nearest - best.1 < new_string {
+                best = (entry.index, nearest);
             }
         }
-        let tried = |index: u8| at_once && index == ink.index;
+        let tried = |index: u8| at_once && index == entry.index;
         if !tried(best.0) && self.writer.extend(best.0) {
             return best.0;
         }
-        let mut candidates = self.writer.may_continue(&around.indices);
+        // Of those that continue the string, the one with the least error within the tolerance.
+        let mut candidates = self.writer.may_continue(&others.indices);
         let mut found = best;
-        if candidates != 0 || best.0 != ink.index {
-            found.1 += self.lenience(row, k, ink);
-            if !at_once && best.0 != ink.index && nearest < found.1 && self.writer.continues(ink.index) {
-                found = (ink.index, nearest);
+        if candidates != 0 || best.0 != entry.index {
+            found.1 += self.tolerance(row, k, entry);
+            if !at_once && best.0 != entry.index && nearest < found.1 && self.writer.continues(entry.index) {
+                found = (entry.index, nearest);
             }
         }
         while candidates != 0 {
             let at = candidates.trailing_zeros() as usize;
             candidates &= candidates - 1;
             let error = error(at);
-            if error < found.1 && self.writer.continues(around.indices[at]) {
-                found = (around.indices[at], error);
+            if error < found.1 && self.writer.continues(others.indices[at]) {
+                found = (others.indices[at], error);
             }
         }
         self.writer.put(found.0);
@@ -307,12 +323,12 @@ impl<'a> Stripe<'a> {
     }
 
     fn colour(&self, index: u8) -> [u8; 3] {
-        self.inks.palette.colours[usize::from(index)]
+        self.colours.palette.colours[usize::from(index)]
     }
 }
 
 impl Row<'_> {
-    /// Whether a pixel whose nearest colour has an error is so much like those around that their mean is seen.
+    /// Whether the surroundings of a pixel are smooth. `error`: of its nearest palette entry.
     fn is_smooth(&self, k: usize, error: f32) -> bool {
         let (now, left) = (self.pixels[k], self.pixels[k.saturating_sub(1)]);
         let step = colour::level_error(now, left) + colour::level_error(now, self.above[k]);
@@ -320,10 +336,12 @@ impl Row<'_> {
     }
 }
 
-/// What each of two pixels is handed by one with what was amiss before, what is meant and what is shown.
-fn hand_on(amiss: [f32; 3], meant: [f32; 3], shown: [f32; 3]) -> [f32; 3] {
-    let channel =
-        |k: usize| (amiss[k] + meant[k] - shown[k]).clamp(-MOST_AMISS, MOST_AMISS) * (0.5 * HANDED_ON);
+/// What a pixel passes on to each of two others: its share of the residual that reached the pixel, plus what is meant,
+/// minus what is shown.
+fn diffuse(residual: [f32; 3], meant: [f32; 3], shown: [f32; 3]) -> [f32; 3] {
+    let channel = |k: usize| {
+        (residual[k] + meant[k] - shown[k]).clamp(-MOST_RESIDUAL, MOST_RESIDUAL) * (0.5 * DIFFUSED)
+    };
     [channel(0), channel(1), channel(2)]
 }
 
@@ -342,17 +360,17 @@ mod tests {
         let point = colour::point_of(rgb);
         let index = palette.nearest(&point, 0);
         let error = colour::error(&point, &palette.points[usize::from(index)]);
-        let of_bins = [Ink { index, error }];
-        let inks = Inks {
+        let nearest = [Nearest { index, error }];
+        let colours = Colours {
             palette: &palette,
-            of_bins: &of_bins,
+            nearest: &nearest,
             histogram: &histogram,
-            clear: None,
+            transparent: None,
             changed: 1.0,
             error,
         };
         let mut writer = Writer::new(8);
-        let mut stripe = Stripe::new(inks, &mut writer);
+        let mut stripe = Stripe::new(colours, &mut writer);
         let mut seen = vec![[0; 3]; SIDE * SIDE];
         for seen in seen.chunks_mut(SIDE) {
             let (pixels, needs) = ([rgb; SIDE], [Need::Draw; SIDE]);
@@ -363,6 +381,17 @@ mod tests {
 
     fn mean(seen: &[[u8; 3]]) -> [f32; 3] {
         [0, 1, 2].map(|c| seen.iter().map(|rgb| f32::from(rgb[c])).sum::<f32>() / seen.len() as f32)
+    }
+
+    #[test]
+    fn a_residual_is_halved_and_bounded() {
+        let half = 0.5 * DIFFUSED;
+        assert_eq!(
+            diffuse([1.0, -2.0, 0.0], [100.0; 3], [98.0, 104.0, 100.0]),
+            [3.0 * half, -6.0 * half, 0.0]
+        );
+        let most = MOST_RESIDUAL * half;
+        assert_eq!(diffuse([0.0; 3], [255.0, 0.0, 10.0], [0.0, 255.0, 0.0]), [most, -most, 10.0 * half]);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! at `100 k / fps` rounded, which carries the rounding error from frame to frame (30 fps gives 3, 4, 3, ...), and above
 //! 50 frames a second the first frame of each fiftieth of a second is kept, the others are dropped.
 
-use crate::Error;
+use crate::error::Error;
 
 /// The shortest delay that players keep to, in hundredths of a second.
 const SHORTEST_DELAY_CS: u64 = 2;

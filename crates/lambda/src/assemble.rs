@@ -9,9 +9,9 @@ use serde_json::Value;
 
 use crate::answer::{Answer, BatchItem, Failed, Outcome, chain, may_pass};
 use crate::context::{Call, Context};
-use crate::event::{Event, Message, Sweep};
+use crate::event::{Event, FAILURE_QUEUE, Message, Sweep, Unreadable};
 use crate::logs::ms;
-use crate::{Function, records};
+use crate::records;
 
 /// Works on a payload.
 ///
@@ -19,19 +19,27 @@ use crate::{Function, records};
 /// [`Failed`] when another try may end otherwise; for messages of the failure queue the answer says so instead.
 pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value) -> Result<Answer, Failed> {
     match Event::parse(payload) {
-        Ok(Event::Objects(objects)) => records::work(Function::Assemble, context, call, objects).await,
+        Ok(Event::Objects(objects)) => {
+            records::work(&context.bucket, &call.request_id, objects, |key| record(context, call, key)).await
+        }
         Ok(Event::Failures(messages)) => Ok(failures(context, call, messages).await),
         Ok(Event::Sweep(how)) => clean(context, call, how).await,
+        // Acknowledged, the batch would be deleted: so it comes again, and ends among the dead letters.
+        Err(Unreadable::Malformed { of: FAILURE_QUEUE, source }) => {
+            tracing::error!(request_id = %call.request_id, error = %source, "unreadable batch");
+            let error = Error::Malformed { key: "the failure queue's batch".into(), source: source.into() };
+            Err(Failed(vec![(FAILURE_QUEUE.into(), error)]))
+        }
         Err(error) => {
-            tracing::error!(request_id = %call.request_id, error = %error, "unreadable event");
+            tracing::error!(request_id = %call.request_id, unhandled = true, error = %error, "unreadable event");
             Ok(Answer::default())
         }
     }
 }
 
 /// Works on one claim.
-pub(crate) async fn record<S: Store>(context: &Context<S>, call: &Call, key: &str) -> Result<String, Error> {
-    let assembled = assemble(&context.invocation(&context.policy, call), &context.studio, key).await?;
+async fn record<S: Store>(context: &Context<S>, call: &Call, key: String) -> Result<String, Error> {
+    let assembled = assemble(&context.invocation(&context.policy, call), &context.animator, &key).await?;
     log(call, &assembled);
     Ok(format!("{:?}", assembled.status).to_lowercase())
 }
@@ -57,10 +65,16 @@ async fn failures<S: Store>(context: &Context<S>, call: &Call, messages: Vec<Mes
         let failures = match parse_record(body.as_bytes()) {
             Ok(failures) => failures,
             Err(error) => {
-                tracing::error!(request_id = %call.request_id, message = id, error = chain(&error), "unreadable record");
+                // It comes again, for a newer version may read it, until the queue moves it to the dead letters.
+                tracing::error!(request_id = %call.request_id, id, error = chain(&error), "unreadable record");
+                answer.batch_item_failures.push(BatchItem { item_identifier: id });
                 continue;
             }
         };
+        if failures.is_empty() {
+            // The schedule's, for example: the next sweep does what this one would have done.
+            tracing::error!(request_id = %call.request_id, id, unhandled = true, "a failed event about no object");
+        }
         for failure in failures {
             match write_down(context, call, &failure).await {
                 Ok(what) => answer.outcomes.push(Outcome { of: failure.key, what }),
@@ -135,7 +149,13 @@ async fn clean<S: Store>(context: &Context<S>, call: &Call, how: Sweep) -> Resul
             }
             // The next sweep comes soon; one animation's trouble is not the others'.
             Err(error) => {
-                tracing::error!(request_id = %call.request_id, animation = %animation, error = chain(&error), "failed");
+                tracing::error!(
+                    request_id = %call.request_id,
+                    unhandled = true,
+                    animation = %animation,
+                    error = chain(&error),
+                    "not swept"
+                );
             }
         }
     }
@@ -143,4 +163,129 @@ async fn clean<S: Store>(context: &Context<S>, call: &Call, how: Sweep) -> Resul
         tracing::warn!(request_id = %call.request_id, unvisited = swept.unvisited, "no time for all animations");
     }
     Ok(answer)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::Range;
+
+    use bytes::Bytes;
+    use rayfold_pipeline::store::{
+        ETag, ListPage, ListRequest, MemoryStore, MemoryUpload, Object, ObjectInfo, PutOptions,
+    };
+    use rayfold_pipeline::studio::Studio;
+    use rayfold_pipeline::{Randomness, Result, SystemClock, Timestamp};
+    use serde_json::json;
+
+    use super::*;
+    use crate::logs::tests::Kept;
+
+    /// A bucket that fails whatever is asked of one animation's GIF.
+    struct Faulty(MemoryStore<SystemClock>);
+
+    impl Store for Faulty {
+        type Upload = MemoryUpload<SystemClock>;
+
+        async fn get(&self, key: &str) -> Result<Object> {
+            self.0.get(key).await
+        }
+
+        async fn get_range(&self, key: &str, range: Range<u64>) -> Result<Object> {
+            self.0.get_range(key, range).await
+        }
+
+        async fn head(&self, key: &str) -> Result<ObjectInfo> {
+            match key {
+                "animations/bad.gif" => Err(Error::Refused { key: key.into(), source: "broken".into() }),
+                _ => self.0.head(key).await,
+            }
+        }
+
+        async fn put(&self, key: &str, body: Bytes, options: PutOptions) -> Result<ETag> {
+            self.0.put(key, body, options).await
+        }
+
+        async fn delete(&self, key: &str) -> Result<()> {
+            self.0.delete(key).await
+        }
+
+        async fn list(&self, request: ListRequest) -> Result<ListPage> {
+            self.0.list(request).await
+        }
+
+        async fn upload(&self, key: &str, options: PutOptions) -> Result<Self::Upload> {
+            self.0.upload(key, options).await
+        }
+    }
+
+    async fn context() -> Context<Faulty> {
+        let store = MemoryStore::new(SystemClock);
+        for key in ["scripts/bad/1.txt", "scripts/good/1.txt"] {
+            store.put(key, Bytes::from_static(b"Screen 1 1\nTrace"), PutOptions::always()).await.unwrap();
+        }
+        Context {
+            store: Faulty(store),
+            bucket: "films".into(),
+            studio: Studio::default(),
+            policy: Policy { request_attempts: 1, ..Policy::default() },
+            random: Randomness::seeded(1),
+        }
+    }
+
+    fn call() -> Call {
+        Call { request_id: "r".into(), deadline: Timestamp(u64::MAX) }
+    }
+
+    fn batch(bodies: &[&str]) -> Value {
+        let record = |(n, body): (usize, &&str)| json!({ "eventSource": "aws:sqs", "messageId": format!("m{n}"), "body": body });
+        json!({ "Records": bodies.iter().enumerate().map(record).collect::<Vec<_>>() })
+    }
+
+    #[tokio::test]
+    async fn the_sweep_of_an_animation_that_fails_reaches_the_alarm_and_the_others_are_swept() {
+        let context = context().await;
+        let (kept, _guard) = Kept::start();
+        let answer = handle(&context, &call(), json!({ "sweep": true })).await.unwrap();
+        let swept: Vec<_> = answer.outcomes.iter().map(|outcome| outcome.of.as_str()).collect();
+        assert_eq!(swept, ["good"]);
+        let unhandled = kept.unhandled();
+        assert_eq!(unhandled.len(), 1, "{unhandled:?}");
+        assert_eq!(
+            (&unhandled[0]["animation"], &unhandled[0]["message"]),
+            (&"bad".into(), &"not swept".into())
+        );
+    }
+
+    #[tokio::test]
+    async fn an_unreadable_failure_record_comes_again_until_it_is_a_dead_letter() {
+        let context = context().await;
+        let gone = r#"{"requestContext":{"condition":"RetriesExhausted","approximateInvokeCount":3},
+            "requestPayload":{"Records":[{"s3":{"object":{"key":"scripts/none/1.txt"}}}]},
+            "responsePayload":{"errorMessage":"busy"}}"#;
+        let answer = handle(&context, &call(), batch(&["no JSON", gone, "{}"])).await.unwrap();
+        let again: Vec<_> =
+            answer.batch_item_failures.iter().map(|item| item.item_identifier.as_str()).collect();
+        assert_eq!(again, ["m0", "m2"]);
+        assert_eq!(answer.outcomes.len(), 1);
+    }
+
+    #[tokio::test]
+    async fn an_unreadable_batch_fails_and_so_comes_again() {
+        let context = context().await;
+        let payload = json!({ "Records": [{ "eventSource": "aws:sqs", "messageId": 7 }] });
+        let failed = handle(&context, &call(), payload).await.unwrap_err();
+        assert!(failed.to_string().contains("the failure queue's batch"), "{failed}");
+    }
+
+    #[tokio::test]
+    async fn a_failed_schedule_and_an_unreadable_event_reach_the_alarm() {
+        let context = context().await;
+        let (kept, _guard) = Kept::start();
+        let schedule = r#"{"requestContext":{"condition":"RetriesExhausted","approximateInvokeCount":3},
+            "requestPayload":{"sweep":true},"responsePayload":{"errorMessage":"busy"}}"#;
+        let answer = handle(&context, &call(), batch(&[schedule])).await.unwrap();
+        assert_eq!(answer, Answer::default());
+        assert_eq!(handle(&context, &call(), json!({ "what": "else" })).await.unwrap(), Answer::default());
+        assert_eq!(kept.unhandled().len(), 2);
+    }
 }

@@ -6,8 +6,11 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use rayfold_pipeline::store::{S3Store, Store};
-use rayfold_pipeline::studio::Studio;
 use rayfold_pipeline::{Invocation, Policy, Randomness, SystemClock, Timestamp};
+
+use crate::animator::GifAnimator;
+use crate::limits::limits;
+use crate::raytracer::RayTracer;
 
 /// The store's client and what the steps are given.
 #[derive(Debug)]
@@ -16,8 +19,10 @@ pub struct Context<S> {
     pub store: S,
     /// Its name: events of others are not ours.
     pub bucket: String,
-    /// Draws and encodes.
-    pub studio: Studio,
+    /// Draws.
+    pub renderer: RayTracer,
+    /// Makes the GIF.
+    pub animator: GifAnimator,
     /// The numbers of the protocol.
     pub policy: Policy,
     /// Spreads the invocations that would collide.
@@ -36,7 +41,7 @@ pub struct Call {
 impl Context<S3Store> {
     /// From the function's environment: `RAYFOLD_BUCKET`, and the standard AWS variables for who and where.
     ///
-    /// `RAYFOLD_QUIET_MS` and `RAYFOLD_STUCK_AFTER_MS` change the pauses of the protocol, `RAYFOLD_ATTEMPTS` how often
+    /// `RAYFOLD_MAX_OBJECTS` and its like bound what a script may ask for. `RAYFOLD_QUIET_MS` and `RAYFOLD_STUCK_AFTER_MS` change the pauses of the protocol, `RAYFOLD_ATTEMPTS` how often
     /// the sweep wakes a frame before it gives it up; `RAYFOLD_SEED` makes random pauses repeatable.
     ///
     /// # Errors
@@ -44,7 +49,7 @@ impl Context<S3Store> {
     pub async fn from_environment() -> anyhow::Result<Self> {
         let bucket = env::var("RAYFOLD_BUCKET").context("RAYFOLD_BUCKET must name the bucket")?;
         let store = S3Store::from_environment(&bucket).await?;
-        let mut policy = Policy::default();
+        let mut policy = Policy::new(rayfold_tracer::PIXEL_VERSION);
         if let Some(ms) = number("RAYFOLD_QUIET_MS")? {
             policy.quiet = Duration::from_millis(ms);
         }
@@ -58,7 +63,8 @@ impl Context<S3Store> {
             Some(seed) => seed,
             None => getrandom::u64().context("no randomness from the system")?,
         };
-        Ok(Self { store, bucket, studio: Studio::default(), policy, random: Randomness::seeded(seed) })
+        let renderer = RayTracer { limits: limits(|name| env::var(name).ok())? };
+        Ok(Self { store, bucket, renderer, animator: GifAnimator, policy, random: Randomness::seeded(seed) })
     }
 }
 

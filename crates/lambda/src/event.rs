@@ -9,6 +9,9 @@ use rayfold_pipeline::keys::decode_event_key;
 use serde::Deserialize;
 use serde_json::Value;
 
+/// What a malformed batch of the failure queue looks like an event of.
+pub const FAILURE_QUEUE: &str = "SQS";
+
 /// Why a payload is none of ours. It would be the same at the next try.
 #[derive(Debug, thiserror::Error)]
 pub enum Unreadable {
@@ -84,7 +87,7 @@ impl Event {
                 Ok(Self::Objects(event.records.into_iter().map(ObjectEvent::of).collect()))
             }
             Some("aws:sqs") => {
-                let batch: Batch = serde_json::from_value(payload).map_err(malformed("SQS"))?;
+                let batch: Batch = serde_json::from_value(payload).map_err(malformed(FAILURE_QUEUE))?;
                 let messages = batch.records.into_iter();
                 Ok(Self::Failures(messages.map(|r| Message { id: r.message_id, body: r.body }).collect()))
             }

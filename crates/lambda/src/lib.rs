@@ -2,16 +2,22 @@
 //!
 //! The two binaries are this crate with another handler. The store's client is made once a cold start. Handlers take
 //! the payload as JSON and know nothing of the runtime, so that they are tested without it; what a step decides is not
-//! decided again here.
+//! decided again here. `raytracer` and `animator` are what the steps draw and animate with.
 //!
-//! Invariants: a batch gives an outcome a record; what another try cannot change never fails an invocation; logs are
-//! JSON and hold no script contents.
+//! Invariants: a batch gives an outcome a record; what another try cannot change never fails an invocation; what nothing
+//! here could handle stays in its queue, or is logged with `unhandled`, which an alarm watches; logs are JSON and hold no
+//! script contents.
 
+pub mod animator;
 pub mod answer;
 pub mod assemble;
 pub mod context;
 pub mod event;
+mod limits;
 mod logs;
+mod png;
+mod pool;
+pub mod raytracer;
 mod records;
 pub mod render;
 

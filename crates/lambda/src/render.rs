@@ -9,7 +9,7 @@ use crate::answer::{Answer, Failed};
 use crate::context::{Call, Context};
 use crate::event::Event;
 use crate::logs::ms;
-use crate::{Function, records};
+use crate::records;
 
 /// Works on a payload.
 ///
@@ -23,16 +23,16 @@ pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value)
             Vec::new()
         }
         Err(error) => {
-            tracing::error!(request_id = %call.request_id, error = %error, "unreadable event");
+            tracing::error!(request_id = %call.request_id, unhandled = true, error = %error, "unreadable event");
             Vec::new()
         }
     };
-    records::work(Function::Render, context, call, objects).await
+    records::work(&context.bucket, &call.request_id, objects, |key| record(context, call, key)).await
 }
 
 /// Works on one event.
-pub(crate) async fn record<S: Store>(context: &Context<S>, call: &Call, key: &str) -> Result<String, Error> {
-    let rendered = render_frame(&context.invocation(&context.policy, call), &context.studio, key).await?;
+async fn record<S: Store>(context: &Context<S>, call: &Call, key: String) -> Result<String, Error> {
+    let rendered = render_frame(&context.invocation(&context.policy, call), &context.renderer, &key).await?;
     let what = described(&rendered.outcome);
     log(call, &rendered, &what);
     Ok(what)

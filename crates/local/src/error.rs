@@ -3,21 +3,30 @@
 use std::io;
 use std::path::PathBuf;
 
-/// Why MinIO or the invoker could not be set up.
+/// Why the bucket or the invoker could not be set up.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// Neither MinIO nor what builds it is on this machine.
-    #[error(
-        "needs MinIO: put `minio` on the PATH, name it in RAYFOLD_MINIO, or install Go 1.25 or later ({0})"
-    )]
+    #[error("there is no MinIO: put `minio` on the PATH, or name it in RAYFOLD_MINIO ({0})")]
     NoMinio(String),
     /// RAYFOLD_MINIO names nothing.
     #[error("RAYFOLD_MINIO names {0}, which is no file")]
     NamedMinioMissing(PathBuf),
     /// `go install` ran and failed.
-    #[error("installing MinIO from source failed: {0}")]
+    #[error(
+        "MinIO could not be installed from source ({0}): put `minio` on the PATH, or name it in RAYFOLD_MINIO; its \
+         project is archived, and module proxies have begun to refuse it"
+    )]
     Install(String),
+    /// The folder is MinIO's own.
+    #[error(
+        "{} is the data folder of a MinIO and stays as it is: choose another folder", .0.display()
+    )]
+    MinioFolder(PathBuf),
+    /// The store built in did not start.
+    #[error(transparent)]
+    Store(rayfold_bucket::Error),
     /// MinIO ended or stayed unreachable while starting.
     #[error("MinIO did not start: {reason}; its log is {}", log.display())]
     MinioStart {
@@ -46,8 +55,27 @@ pub enum Error {
         source: io::Error,
     },
     /// A function's binary is not where it is looked for.
-    #[error("the function {} is missing: build it with `cargo build -p rayfold-lambda`", .0.display())]
-    NoFunction(PathBuf),
+    #[error(
+        "the function {function} is not in {}: build it with `cargo build -p rayfold-lambda`, or name the folder that \
+         has it in RAYFOLD_FUNCTIONS", folder.display()
+    )]
+    NoFunction {
+        /// Its binary's name.
+        function: &'static str,
+        /// Where it was looked for.
+        folder: PathBuf,
+    },
+    /// A function's binary is nowhere.
+    #[error(
+        "the function {function} is neither in {} nor on the PATH: install it with `cargo install --path \
+         crates/lambda` in rayfold's sources, or name the folder that has it in RAYFOLD_FUNCTIONS", folder.display()
+    )]
+    FunctionNowhere {
+        /// Its binary's name.
+        function: &'static str,
+        /// The folder of the running program.
+        folder: PathBuf,
+    },
     /// The function binaries could not be built.
     #[error("building the functions failed: {0}")]
     Build(String),

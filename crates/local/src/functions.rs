@@ -2,14 +2,16 @@
 //!
 //! They lie beside the program that runs them. In the project's own `target/` they may be missing, or older than the
 //! sources, as Cargo builds only what it is asked for; so they are built then, which costs a moment when they are fresh.
-//! They are built with the whole workspace's features, as is what `cargo run` runs: both share one AWS SDK.
+//! They are built with the whole workspace's features, as is what `cargo run` runs: both share one AWS SDK. Beside a
+//! program that was installed they may be missing too: then they are looked for on the PATH, and built in the sources
+//! that the program is of, where those are still there.
 
 use std::env;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use crate::error::{Error, Result};
 use crate::routes::Function;
-use crate::{Error, Result};
 
 /// The folder that holds the binaries.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,13 +25,13 @@ impl Functions {
         Self { folder: folder.into() }
     }
 
-    /// Those in the folder that RAYFOLD_FUNCTIONS names, which are taken as they are, or beside this program, built anew
-    /// when it lies in the workspace it was built from.
+    /// Those in the folder that RAYFOLD_FUNCTIONS names, which are taken as they are; or beside this program, built anew
+    /// when it lies in the workspace it was built from; or on the PATH; or built in that workspace.
     ///
     /// `say` hears what takes time, a line at a time.
     ///
     /// # Errors
-    /// [`Error::NoFunction`], [`Error::Build`].
+    /// [`Error::NoFunction`], [`Error::FunctionNowhere`], [`Error::Build`].
     pub fn locate(say: &mut dyn FnMut(&str)) -> Result<Self> {
         if let Some(named) = env::var_os("RAYFOLD_FUNCTIONS") {
             let functions = Self::in_folder(named);
@@ -37,24 +39,48 @@ impl Functions {
             return Ok(functions);
         }
         let program = env::current_exe().map_err(Error::file("the running program"))?;
-        let folder = program.parent().unwrap_or(Path::new("/"));
-        let functions = Self::in_folder(folder);
-        let workspace = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+        let beside = Self::in_folder(program.parent().unwrap_or(Path::new("/")));
+        let sources = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).canonicalize().ok();
         let by_cargo = env::var_os("CARGO").is_some()
             && env::var("CARGO_PKG_NAME").is_ok_and(|name| name.starts_with("rayfold"));
-        let in_workspace = workspace.canonicalize().is_ok_and(|workspace| program.starts_with(workspace));
-        if by_cargo || in_workspace {
-            match build(workspace, folder, say) {
-                Err(Error::Spawn { .. }) if functions.check().is_ok() => {
-                    say(
-                        "there is no cargo: the function binaries are used as they are, perhaps older than the sources",
-                    );
+        match sources {
+            Some(sources) if by_cargo || program.starts_with(&sources) => {
+                match build(&sources, &beside.folder, say) {
+                    Err(Error::Spawn { .. }) if beside.check().is_ok() => {
+                        say(
+                            "there is no cargo: the function binaries are used as they are, perhaps older than the sources",
+                        );
+                    }
+                    built => built?,
                 }
-                built => built?,
+                beside.check()?;
+                Ok(beside)
+            }
+            sources => beside.installed(sources.as_deref(), say),
+        }
+    }
+
+    /// Those beside an installed program, which is this, or wherever else they may be.
+    fn installed(self, sources: Option<&Path>, say: &mut dyn FnMut(&str)) -> Result<Self> {
+        let Err(_) = self.check() else { return Ok(self) };
+        let path = env::var_os("PATH").unwrap_or_default();
+        if let Some(found) =
+            env::split_paths(&path).map(Self::in_folder).find(|functions| functions.check().is_ok())
+        {
+            return Ok(found);
+        }
+        if let Some(sources) = sources.filter(|sources| sources.join("crates/lambda/Cargo.toml").is_file()) {
+            let built = Self::in_folder(sources.join("target/release"));
+            match build(sources, &built.folder, say) {
+                Err(Error::Spawn { .. }) => {}
+                outcome => {
+                    outcome?;
+                    built.check()?;
+                    return Ok(built);
+                }
             }
         }
-        functions.check()?;
-        Ok(functions)
+        Err(Error::FunctionNowhere { function: self.missing().unwrap_or_default(), folder: self.folder })
     }
 
     /// Of one of them.
@@ -67,10 +93,15 @@ impl Functions {
     /// # Errors
     /// [`Error::NoFunction`].
     pub fn check(&self) -> Result<()> {
-        match Function::ALL.map(|function| self.path(function)).into_iter().find(|path| !path.is_file()) {
-            Some(missing) => Err(Error::NoFunction(missing)),
+        match self.missing() {
+            Some(function) => Err(Error::NoFunction { function, folder: self.folder.clone() }),
             None => Ok(()),
         }
+    }
+
+    /// The first binary that is not there.
+    fn missing(&self) -> Option<&'static str> {
+        Function::ALL.into_iter().find(|function| !self.path(*function).is_file()).map(Function::binary)
     }
 }
 
@@ -80,7 +111,7 @@ fn build(workspace: &Path, folder: &Path, say: &mut dyn FnMut(&str)) -> Result<(
         Some("debug") | None => "dev",
         Some(name) => name,
     };
-    say("building the function binaries");
+    say(&format!("building the function binaries in {}", folder.display()));
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let status = Command::new(&cargo)
         .args(["build", "--quiet", "--workspace", "--profile", profile])
@@ -93,4 +124,22 @@ fn build(workspace: &Path, folder: &Path, say: &mut dyn FnMut(&str)) -> Result<(
         .status()
         .map_err(|source| Error::Spawn { program: cargo.into(), source })?;
     if status.success() { Ok(()) } else { Err(Error::Build(status.to_string())) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_function_that_is_nowhere_is_named_with_what_to_do() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("rayfold-render"), "").unwrap();
+        let error = Functions::in_folder(folder.path()).installed(None, &mut |_| {}).unwrap_err().to_string();
+        for part in ["rayfold-assemble", "cargo install --path crates/lambda", "RAYFOLD_FUNCTIONS"] {
+            assert!(error.contains(part), "{error}");
+        }
+        std::fs::write(folder.path().join("rayfold-assemble"), "").unwrap();
+        let found = Functions::in_folder(folder.path()).installed(None, &mut |_| {}).unwrap();
+        assert_eq!(found, Functions::in_folder(folder.path()));
+    }
 }

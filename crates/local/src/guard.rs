@@ -11,7 +11,7 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::{Mutex, PoisonError};
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 const SCRIPT: &str = r#"
 log=$1; shift
@@ -34,7 +34,6 @@ exit "$status"
 pub(crate) struct Guarded {
     shell: Mutex<Child>,
     lifeline: Option<ChildStdin>,
-    pid: u32,
 }
 
 impl Guarded {
@@ -66,14 +65,10 @@ impl Guarded {
         if let Some(out) = shell.stdout.take() {
             BufReader::new(out).read_line(&mut line).map_err(failed)?;
         }
-        let pid =
-            line.trim().parse().map_err(|_| failed(std::io::Error::other("the shell named no process")))?;
-        Ok(Self { shell: Mutex::new(shell), lifeline, pid })
-    }
-
-    /// The program's own process id.
-    pub(crate) fn pid(&self) -> u32 {
-        self.pid
+        if line.trim().parse::<u32>().is_err() {
+            return Err(failed(std::io::Error::other("the shell named no process")));
+        }
+        Ok(Self { shell: Mutex::new(shell), lifeline })
     }
 
     /// How the program ended, if it has.
@@ -99,17 +94,27 @@ mod tests {
         Command::new("kill").args(["-0", &pid.to_string()]).stderr(Stdio::null()).status().unwrap().success()
     }
 
-    fn sleeper(script: &str) -> (Guarded, tempfile::TempDir) {
+    /// A shell that writes its process id into a file and goes on with the script.
+    fn sleeper(script: &str) -> (Guarded, u32, tempfile::TempDir) {
         let folder = tempfile::tempdir().unwrap();
-        let args = ["-c".to_owned(), script.to_owned()];
+        let file = folder.path().join("pid");
+        let args =
+            ["-c".to_owned(), format!("echo $$ >'{0}.new'; mv '{0}.new' '{0}'; {script}", file.display())];
         let guarded = Guarded::spawn(Path::new("sh"), &args, [], &folder.path().join("log")).unwrap();
-        (guarded, folder)
+        let start = Instant::now();
+        let pid = loop {
+            if let Ok(text) = std::fs::read_to_string(&file) {
+                break text.trim().parse().unwrap();
+            }
+            assert!(start.elapsed() < Duration::from_secs(10));
+            std::thread::sleep(Duration::from_millis(5));
+        };
+        (guarded, pid, folder)
     }
 
     #[test]
     fn a_dropped_program_is_gone() {
-        let (guarded, _folder) = sleeper("while :; do sleep 0.05; done");
-        let pid = guarded.pid();
+        let (guarded, pid, _folder) = sleeper("while :; do sleep 0.05; done");
         assert!(alive(pid));
         drop(guarded);
         assert!(!alive(pid));
@@ -117,7 +122,7 @@ mod tests {
 
     #[test]
     fn a_program_that_ends_by_itself_is_seen() {
-        let (guarded, _folder) = sleeper("exit 7");
+        let (guarded, _, _folder) = sleeper("exit 7");
         let start = Instant::now();
         let status = loop {
             if let Some(status) = guarded.exited() {
@@ -131,8 +136,7 @@ mod tests {
 
     #[test]
     fn a_program_that_ignores_signals_is_killed() {
-        let (guarded, _folder) = sleeper("trap '' TERM; while :; do sleep 0.05; done");
-        let pid = guarded.pid();
+        let (guarded, pid, _folder) = sleeper("trap '' TERM; while :; do sleep 0.05; done");
         std::thread::sleep(Duration::from_millis(100));
         drop(guarded);
         assert!(!alive(pid));

@@ -16,7 +16,7 @@ use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::net::TcpListener;
 use tokio::task::{JoinHandle, JoinSet};
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 pub(crate) type Body = BoxBody<Bytes, hyper::Error>;
 
@@ -31,6 +31,11 @@ pub(crate) fn json(status: StatusCode, body: &serde_json::Value) -> Response<Bod
     *answer.status_mut() = status;
     answer.headers_mut().insert("content-type", hyper::header::HeaderValue::from_static("application/json"));
     answer
+}
+
+/// Where to listen when it does not matter: any free port of the loopback address.
+pub fn any_port() -> SocketAddr {
+    SocketAddr::from(([127, 0, 0, 1], 0))
 }
 
 /// Listens on `address`, port 0 standing for any free one.

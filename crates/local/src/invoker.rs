@@ -10,14 +10,16 @@
 mod chaos;
 mod events;
 mod failures;
+mod meter;
 mod pool;
+mod queue;
+mod ramp;
 mod runtime_api;
 mod sandbox;
+mod settings;
 
-use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::time::Duration;
 
 use bytes::Bytes;
 use tokio::net::TcpListener;
@@ -26,77 +28,22 @@ use tokio::sync::oneshot;
 use tokio::task::JoinSet;
 
 pub use chaos::{Chaos, Fate, Fates};
-pub use pool::Ramp;
+pub use ramp::Ramp;
+pub use settings::Settings;
 
-use crate::functions::Functions;
+use crate::error::{Error, Result};
 use crate::http::{Server, listen};
-
 use crate::observation::{Observation, Observer, Outcome};
 use crate::routes::Function;
-use crate::{Error, Result};
 use events::Pools;
-use pool::{Caller, Job, Pending, Workers};
+use pool::Workers;
+use queue::{Caller, Job, Pending};
 
 /// What the schedule of `infra/terraform` sends.
 const SWEEP: &str = r#"{"sweep":true}"#;
 
 /// The same when nobody has listened for events: what is pending is not on its way.
 const CATCH_UP: &str = r#"{"sweep":true,"catch_up":true}"#;
-
-/// What an invoker needs to know.
-#[derive(Clone)]
-pub struct Settings {
-    /// The binaries.
-    pub functions: Functions,
-    /// The processes' environment, beyond what Lambda sets.
-    pub environment: Vec<(String, String)>,
-    /// What differs by function, such as credentials of its own.
-    pub environment_of: BTreeMap<Function, Vec<(String, String)>>,
-    /// The store's S3 endpoint.
-    pub store: SocketAddr,
-    /// Where to listen for events.
-    pub webhook: SocketAddr,
-    /// What events have to carry.
-    pub webhook_token: String,
-    /// Processes of a function at once.
-    pub concurrency: usize,
-    /// How fast new ones may start.
-    pub ramp: Ramp,
-    /// What the processes are told of their memory.
-    pub memory_mb: u32,
-    /// From the handing out to the kill.
-    pub timeout: Duration,
-    /// Before each further try of an event that failed; Lambda's are one and two minutes.
-    pub retry_pauses: Vec<Duration>,
-    /// Between the sweeps after the one at the start.
-    pub sweep_every: Option<Duration>,
-    /// What goes wrong on purpose with events and processes.
-    pub chaos: Chaos,
-    /// What goes wrong on purpose with requests to the store.
-    pub fates: Option<Fates>,
-}
-
-impl Settings {
-    /// Those of a laptop.
-    pub fn new(functions: Functions, store: SocketAddr, webhook: SocketAddr, webhook_token: String) -> Self {
-        Self {
-            functions,
-            environment: Vec::new(),
-            environment_of: BTreeMap::new(),
-            store,
-            webhook,
-            webhook_token,
-            concurrency: 10,
-            ramp: Ramp::default(),
-            memory_mb: 1769,
-            timeout: Duration::from_secs(300),
-            retry_pauses: vec![Duration::from_millis(500), Duration::from_secs(1)],
-            sweep_every: Some(Duration::from_secs(30)),
-            chaos: Chaos::default(),
-            fates: None,
-        }
-    }
-}
 
 /// A running invoker.
 pub struct Invoker {
@@ -204,26 +151,5 @@ impl Invoker {
     /// Invocations that are queued, running, or waiting for another try.
     pub fn pending(&self) -> usize {
         self.pending.count()
-    }
-}
-
-/// An identifier in the shape of a version-4 UUID.
-fn random_id() -> String {
-    let bits = fastrand::u128(..) & !(0xf000 << 64) & !(0xc << 60) | (0x4000 << 64) | (0x8 << 60);
-    let hex = format!("{bits:032x}");
-    [&hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..]].join("-")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ids_are_version_4_uuids() {
-        let id = random_id();
-        let parts: Vec<&str> = id.split('-').collect();
-        assert_eq!(parts.iter().map(|part| part.len()).collect::<Vec<_>>(), [8, 4, 4, 4, 12]);
-        assert!(parts[2].starts_with('4') && parts[3].starts_with(['8', '9', 'a', 'b']), "{id}");
-        assert_ne!(id, random_id());
     }
 }

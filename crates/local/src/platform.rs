@@ -4,17 +4,19 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use rayfold_pipeline::store::{Connection, Notification, S3Store};
+use rayfold_bucket::Webhook;
+use rayfold_pipeline::store::{Notification, S3Store};
 use tokio::net::TcpListener;
 use tokio::sync::mpsc::UnboundedSender;
 
+use crate::credentials::token;
+use crate::error::{Error, Result};
 use crate::functions::Functions;
-use crate::http::listen;
+use crate::http::{any_port, listen};
 use crate::invoker::{Invoker, Settings};
-use crate::minio::{Minio, QUEUE_ARN, REGION, Webhook, any_port, find_or_install, token};
 use crate::observation::Observation;
 use crate::routes::Routes;
-use crate::{Error, Result};
+use crate::s3_server::{S3Server, StoreKind};
 
 /// How long MinIO may take to know its webhook.
 const QUEUE_TIMEOUT: Duration = Duration::from_secs(20);
@@ -22,7 +24,9 @@ const QUEUE_TIMEOUT: Duration = Duration::from_secs(20);
 /// What a platform is made of.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Where MinIO keeps its objects.
+    /// Which S3 server holds the bucket.
+    pub store: StoreKind,
+    /// Where it keeps its objects.
     pub data: PathBuf,
     /// Where S3 is to listen; port 0 stands for any.
     pub address: SocketAddr,
@@ -32,35 +36,34 @@ pub struct Plan {
     pub functions: Functions,
 }
 
-/// MinIO with a bucket whose events reach an invoker.
+/// An S3 server with a bucket whose events reach an invoker.
 pub struct Platform {
     invoker: Option<Invoker>,
-    /// Until the first invoker takes it, so that nobody else gets the port that MinIO was told.
+    /// Until the first invoker takes it, so that nobody else gets the port that the server was told.
     listener: Option<TcpListener>,
-    minio: Minio,
+    server: S3Server,
     store: S3Store,
     settings: Settings,
 }
 
 impl Platform {
-    /// Starts MinIO (found, or installed from source) and sets the bucket up; the invoker is started apart.
+    /// Starts the S3 server and sets the bucket up; the invoker is started apart.
     ///
     /// `change` may alter the invoker's settings; `say` hears what takes time.
     ///
     /// # Errors
-    /// Whatever keeps MinIO from starting or the bucket from being set up.
+    /// Whatever keeps the server from starting or the bucket from being set up.
     pub async fn start(
         plan: &Plan,
         change: impl FnOnce(&mut Settings),
         say: &mut (dyn FnMut(&str) + Send),
     ) -> Result<Self> {
         plan.functions.check()?;
-        let binary = find_or_install(say)?;
         let (listener, webhook) = listen(any_port()).await?;
         let secret = token(16)?;
         let hook = Webhook { url: format!("http://{webhook}/events"), token: secret.clone() };
-        let minio = Minio::start(&binary, &plan.data, plan.address, Some(&hook)).await?;
-        let store = S3Store::at(&connection(&minio), &plan.bucket);
+        let server = S3Server::start(plan.store, &plan.data, plan.address, Some(hook), say).await?;
+        let store = S3Store::at(&server.connection(), &plan.bucket);
         let failed = |source| Error::Bucket { bucket: plan.bucket.clone(), source };
         store.create_bucket().await.map_err(failed)?;
         let notifications: Vec<Notification> = Routes::shared()
@@ -68,15 +71,15 @@ impl Platform {
             .map(|route| Notification {
                 prefix: route.prefix.clone(),
                 events: route.events.clone(),
-                queue_arn: QUEUE_ARN.to_owned(),
+                queue_arn: server.queue_arn().to_owned(),
             })
             .collect();
         notify(&store, &notifications).await.map_err(failed)?;
-        let mut settings = Settings::new(plan.functions.clone(), minio.address(), webhook, secret);
-        settings.environment = minio.environment();
+        let mut settings = Settings::new(plan.functions.clone(), server.address(), webhook, secret);
+        settings.environment = server.environment();
         settings.environment.push(("RAYFOLD_BUCKET".into(), plan.bucket.clone()));
         change(&mut settings);
-        Ok(Self { invoker: None, listener: Some(listener), minio, store, settings })
+        Ok(Self { invoker: None, listener: Some(listener), server, store, settings })
     }
 
     /// Starts the invoker, which sweeps up what happened while there was none.
@@ -108,7 +111,7 @@ impl Platform {
         }
     }
 
-    /// Stops the invoker and its processes; MinIO goes on.
+    /// Stops the invoker and its processes; the S3 server goes on.
     pub async fn stop_invoker(&mut self) {
         if let Some(invoker) = self.invoker.take() {
             invoker.stop().await;
@@ -131,8 +134,14 @@ impl Platform {
     }
 
     /// The S3 server.
-    pub fn minio(&self) -> &Minio {
-        &self.minio
+    pub fn server(&self) -> &S3Server {
+        &self.server
+    }
+
+    /// Stops everything, and returns when the data may be used again.
+    pub async fn stop(mut self) {
+        self.stop_invoker().await;
+        self.server.stop().await;
     }
 }
 
@@ -151,20 +160,9 @@ async fn notify(store: &S3Store, notifications: &[Notification]) -> rayfold_pipe
     }
 }
 
-/// How to reach MinIO as its owner.
-pub fn connection(minio: &Minio) -> Connection {
-    Connection {
-        endpoint: minio.endpoint(),
-        region: REGION.to_owned(),
-        access_key: minio.credentials().access_key.clone(),
-        secret_key: minio.credentials().secret_key.clone(),
-        session_token: None,
-    }
-}
-
 impl Plan {
     /// A bucket named `rayfold` with its data in `data`.
-    pub fn new(data: &Path, functions: Functions) -> Self {
-        Self { data: data.to_owned(), address: any_port(), bucket: "rayfold".into(), functions }
+    pub fn new(store: StoreKind, data: &Path, functions: Functions) -> Self {
+        Self { store, data: data.to_owned(), address: any_port(), bucket: "rayfold".into(), functions }
     }
 }

@@ -17,7 +17,7 @@ use rayfold_scene::AnimationSettings;
 
 use crate::invocation::{Invocation, Mutation};
 use crate::keys::{Animation, Generation, Key, Receipt, Tag};
-use crate::manifest::{Frame, FrameState, Manifest, Reason, Status};
+use crate::manifest::{Frame, FrameState, Head, Manifest, Reason, Status};
 use crate::observe::Observation;
 use crate::store::{Condition, ObjectInfo, PutOptions, Store, Upload};
 use crate::{Clock, Error, Result, Timestamp};
@@ -25,7 +25,7 @@ use crate::{Clock, Error, Result, Timestamp};
 /// The name of the GIF's metadata that holds its generation.
 pub const GENERATION: &str = "generation";
 
-/// What encodes. The functions bring [`crate::studio::Studio`].
+/// What encodes. The assemble function brings a GIF encoder, the simulation something smaller.
 pub trait Animator: Send + Sync {
     /// An animation being encoded.
     type Encoding: Encoding;
@@ -89,6 +89,28 @@ pub async fn assemble<S: Store, C: Clock, A: Animator>(
     }
 }
 
+/// What is to be done about the GIF of a set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Due {
+    /// It is as it should be, or more is to come.
+    Nothing,
+    /// It is to be built.
+    Gif,
+    /// It is to go.
+    NoGif,
+}
+
+/// What is to be done about the GIF of a set that the manifest's head stands for.
+pub(crate) fn due(head: &Head, gif: Option<&ObjectInfo>) -> Due {
+    match head.status {
+        Status::Done if generation_of(gif) != Some(head.generation.as_str()) => Due::Gif,
+        Status::Empty | Status::Failed | Status::Refused if gif.is_some() => Due::NoGif,
+        Status::Done | Status::Empty | Status::Failed | Status::Refused => Due::Nothing,
+        // While more is to come the last GIF stays.
+        Status::Waiting | Status::Rendering => Due::Nothing,
+    }
+}
+
 /// How a build ended.
 enum Built {
     /// The GIF is put.
@@ -106,96 +128,110 @@ struct Quiet {
     waited: Duration,
 }
 
+/// What the rounds of an invocation have come to.
+struct Tally {
+    began: Timestamp,
+    quiet: Quiet,
+    rounds: u32,
+    built: u32,
+    frames: u64,
+    waited: Duration,
+    building: Duration,
+}
+
+impl Quiet {
+    /// How long to wait until `newest` is a quiet period old. A store's clock may run ahead of this one's, so a period
+    /// that was slept through counts as well.
+    fn left(&mut self, period: Duration, newest: Timestamp, now: Timestamp) -> Duration {
+        if self.newest != Some(newest) {
+            *self = Quiet { newest: Some(newest), waited: Duration::ZERO };
+        }
+        let wait = period.saturating_sub(now.since(newest).max(self.waited));
+        self.waited += wait;
+        wait
+    }
+}
+
+impl Tally {
+    fn new(began: Timestamp) -> Self {
+        let (waited, building) = (Duration::ZERO, Duration::ZERO);
+        Tally { began, quiet: Quiet::default(), rounds: 0, built: 0, frames: 0, waited, building }
+    }
+
+    fn of(self, head: &Head) -> Assembled {
+        let Tally { rounds, built, frames, waited, building, .. } = self;
+        let (animation, status, generation) = (head.animation.clone(), head.status, head.generation.clone());
+        Assembled { animation, status, generation, rounds, built, frames, waited, building }
+    }
+}
+
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
     async fn assemble<A: Animator>(&self, animator: &A, animation: &Animation) -> Result<Assembled> {
-        let mut quiet = Quiet::default();
-        let (mut rounds, mut built, mut frames) = (0, 0, 0);
-        let (mut waited, mut building) = (Duration::ZERO, Duration::ZERO);
-        let began = self.clock.now();
+        let mut tally = Tally::new(self.clock.now());
         loop {
-            rounds += 1;
+            tally.rounds += 1;
             let known = self.manifest(animation).await?;
             let gif = self.head(&animation.gif()).await?;
             let observation = self.observe(animation, known.as_ref()).await?;
             let observed = &observation.manifest;
-            let mut wrote = false;
-            if !known.as_ref().is_some_and(|known| known.manifest.agrees_with(observed)) {
-                wrote = true;
-                if self.commit(animation, known.as_ref(), observed.clone()).await?.is_none() {
-                    continue;
-                }
+            let agrees = known.as_ref().is_some_and(|known| known.manifest.agrees_with(observed));
+            if !agrees && self.commit(animation, known.as_ref(), observed.clone()).await?.is_none() {
+                continue;
             }
-            let head = &observed.head;
-            match head.status {
-                Status::Done if generation_of(gif.as_ref()) != Some(head.generation.as_str()) => {
-                    wrote = true;
-                    let wait = self.unsettled(&observation, &mut quiet);
-                    if wait > Duration::ZERO {
-                        self.clock.sleep(wait).await;
-                        waited += wait;
-                        continue;
-                    }
-                    let start = self.clock.now();
-                    match self.build(animator, observed, gif, began).await? {
-                        Built::Put => {
-                            built += 1;
-                            frames = head.total;
-                            wrote = !self.breaks(Mutation::AssemblerDoesNotLookAgain);
-                        }
-                        Built::Stale => {}
-                        Built::Refused(reason) => self.refuse(observed, &reason).await?,
-                    }
-                    building += self.clock.now().since(start);
-                }
-                Status::Empty | Status::Failed | Status::Refused if gif.is_some() => {
-                    self.delete(&animation.gif()).await?;
-                    wrote = true;
-                }
-                Status::Waiting | Status::Rendering if self.breaks(Mutation::AssemblerLeavesEarly) => {
-                    wrote = false;
-                }
-                _ => {}
-            }
+            let leaves_early = self.breaks(Mutation::AssemblerLeavesEarly) && !observed.head.is_terminal();
+            let wrote = match due(&observed.head, gif.as_ref()) {
+                Due::Nothing => !agrees && !leaves_early,
+                Due::NoGif => self.delete(&animation.gif()).await.map(|()| true)?,
+                Due::Gif => self.make_gif(animator, &observation, gif, &mut tally).await?,
+            };
             if !wrote {
-                let (status, generation) = (head.status, head.generation.clone());
-                let animation = animation.clone();
-                return Ok(Assembled {
-                    animation,
-                    status,
-                    generation,
-                    rounds,
-                    built,
-                    frames,
-                    waited,
-                    building,
-                });
+                return Ok(tally.of(&observed.head));
             }
         }
+    }
+
+    /// Waits until the set is settled, or builds its GIF; says whether to look again.
+    async fn make_gif<A: Animator>(
+        &self,
+        animator: &A,
+        observation: &Observation,
+        gif: Option<ObjectInfo>,
+        tally: &mut Tally,
+    ) -> Result<bool> {
+        let observed = &observation.manifest;
+        let wait = self.unsettled(observation, &mut tally.quiet);
+        if wait > Duration::ZERO {
+            self.clock.sleep(wait).await;
+            tally.waited += wait;
+            return Ok(true);
+        }
+        let start = self.clock.now();
+        let built = self.build(animator, observed, gif, tally.began).await?;
+        tally.building += self.clock.now().since(start);
+        match built {
+            Built::Put => {
+                tally.built += 1;
+                tally.frames = observed.head.total;
+                return Ok(!self.breaks(Mutation::AssemblerDoesNotLookAgain));
+            }
+            Built::Stale => {}
+            Built::Refused(reason) => self.refuse(observed, &reason).await?,
+        }
+        Ok(true)
     }
 
     /// How long to wait until the newest script is a quiet period old; zero when it is, or when `animation.json` says
     /// how many frames to wait for.
-    ///
-    /// A store's clock may run ahead of this one's, so a period that was slept through counts as well.
     fn unsettled(&self, observation: &Observation, quiet: &mut Quiet) -> Duration {
-        let expects =
-            observation.manifest.head.settings.value.as_ref().and_then(|settings| settings.frames());
-        let Some(newest) = observation.newest_script().filter(|_| expects.is_none()) else {
-            return Duration::ZERO;
-        };
-        if quiet.newest != Some(newest) {
-            *quiet = Quiet { newest: Some(newest), waited: Duration::ZERO };
+        let settings = observation.manifest.head.settings.value.as_ref();
+        let expects = settings.and_then(AnimationSettings::frames);
+        match observation.newest_script() {
+            Some(newest) if expects.is_none() => quiet.left(self.policy.quiet, newest, self.clock.now()),
+            _ => Duration::ZERO,
         }
-        let wait = self.policy.quiet.saturating_sub(self.clock.now().since(newest).max(quiet.waited));
-        quiet.waited += wait;
-        wait
     }
 
     /// Writes the GIF of a manifest that is done over the version that was there, or fails to.
-    ///
-    /// A set that cannot be assembled in the function's time is refused, but only by an invocation that had most of its
-    /// time for that; one that `began` long before, and has waited and built other sets since, leaves it to its next
-    /// attempt.
     async fn build<A: Animator>(
         &self,
         animator: &A,
@@ -205,8 +241,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     ) -> Result<Built> {
         let head = &manifest.head;
         let animation = &head.animation;
-        let settings = head.settings.value.unwrap_or_default();
-        let mut encoding = match animator.begin(&settings) {
+        let mut encoding = match animator.begin(&head.settings.value.unwrap_or_default()) {
             Ok(encoding) => encoding,
             Err(reason) => return Ok(Built::Refused(reason)),
         };
@@ -219,44 +254,17 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             .content_type("image/gif")
             .metadata(GENERATION, head.generation.as_str());
         let mut upload = self.store.upload(&animation.gif(), options).await?;
-        let keys: Vec<String> =
-            manifest.frames.iter().filter_map(|frame| frame_key(animation, frame)).collect();
-        let fetches = keys.into_iter().map(|key| async move { self.get(&key).await });
-        let mut images = stream::iter(fetches).buffered(self.policy.prefetch);
-        let start = self.clock.now();
-        let mut pushed = 0_u64;
-        let refusal = loop {
-            let Some(image) = images.next().await else { break None };
-            let image = match image {
-                Ok(Some(image)) => image,
-                Ok(None) => {
-                    upload.abort().await?;
-                    return Ok(Built::Stale);
-                }
-                Err(error) => {
-                    upload.abort().await?;
-                    return Err(error);
-                }
-            };
-            match encoding.push(image.body).await {
-                Ok(piece) if piece.is_empty() => {}
-                Ok(piece) => upload.write(piece).await?,
-                Err(reason) => break Some(reason),
+        let rest = match self.encode(&mut encoding, manifest, &mut upload, began).await {
+            Ok(None) => encoding.finish().await,
+            Ok(Some(Built::Refused(reason))) => Err(reason),
+            Ok(Some(ended)) => {
+                upload.abort().await?;
+                return Ok(ended);
             }
-            pushed += 1;
-            if self.is_out_of_time() {
-                if start.since(began) > self.clock.now().since(start) {
-                    upload.abort().await?;
-                    return Err(Error::OutOfTime {
-                        what: format!("{animation} became whole too late to assemble it"),
-                    });
-                }
-                break Some(out_of_time(pushed, head.total, self.clock.now().since(start)));
+            Err(error) => {
+                upload.abort().await?;
+                return Err(error);
             }
-        };
-        let rest = match refusal {
-            None => encoding.finish().await,
-            Some(reason) => Err(reason),
         };
         match rest {
             Err(reason) => {
@@ -274,6 +282,38 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 }
             }
         }
+    }
+
+    /// Fetches the frames, a few ahead of the encoder, and sends what it writes; says why, if it does not come to the
+    /// end.
+    async fn encode<E: Encoding, U: Upload>(
+        &self,
+        encoding: &mut E,
+        manifest: &Manifest,
+        upload: &mut U,
+        began: Timestamp,
+    ) -> Result<Option<Built>> {
+        let animation = &manifest.head.animation;
+        let keys = manifest.frames.iter().filter_map(|frame| frame_key(animation, frame));
+        let fetches: Vec<_> = keys.map(|key| async move { self.get(&key).await }).collect();
+        let mut images = stream::iter(fetches).buffered(self.policy.prefetch);
+        let start = self.clock.now();
+        let mut pushed = 0_u64;
+        while let Some(image) = images.next().await {
+            let Some(image) = image? else { return Ok(Some(Built::Stale)) };
+            match encoding.push(image.body).await {
+                Ok(piece) if piece.is_empty() => {}
+                Ok(piece) => upload.write(piece).await?,
+                Err(reason) => return Ok(Some(Built::Refused(reason))),
+            }
+            pushed += 1;
+            if self.is_out_of_time() {
+                let (before, building) = (start.since(began), self.clock.now().since(start));
+                return out_of_time(&manifest.head, pushed, before, building)
+                    .map(|reason| Some(Built::Refused(reason)));
+            }
+        }
+        Ok(None)
     }
 
     fn is_out_of_time(&self) -> bool {
@@ -302,10 +342,78 @@ pub fn generation_of(gif: Option<&ObjectInfo>) -> Option<&str> {
     gif?.metadata.get(GENERATION).map(String::as_str)
 }
 
-fn out_of_time(pushed: u64, total: u64, taken: Duration) -> Reason {
-    let seconds = taken.as_secs();
-    Reason::new(format!(
+/// What a build that has come to the end of its time means. A set that cannot be assembled in the function's time is
+/// refused, but only by an invocation that had most of its time for that; one that spent more `before`, waiting and
+/// building other sets, leaves it to its next attempt.
+fn out_of_time(head: &Head, pushed: u64, before: Duration, building: Duration) -> Result<Reason> {
+    if before > building {
+        let what = format!("{} became whole too late to assemble it", head.animation);
+        return Err(Error::OutOfTime { what });
+    }
+    let (total, seconds) = (head.total, building.as_secs());
+    Ok(Reason::new(format!(
         "{pushed} of {total} frames were assembled in the {seconds} s that the assemble function had: give it more \
          time or memory and retry, or fetch the frames and assemble them locally"
-    ))
+    )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::manifest::Settings;
+    use crate::reconcile::{Results, Scripts, reconcile};
+    use crate::store::{ETag, Metadata};
+
+    fn head(status: Status) -> Head {
+        let animation = Animation::new("film").unwrap();
+        let manifest = reconcile(&animation, &Scripts::default(), &Results::default(), &Settings::absent());
+        Head { status, total: 9, ..manifest.head }
+    }
+
+    fn gif(generation: Option<&str>) -> ObjectInfo {
+        let metadata = generation.map(|generation| (GENERATION.to_owned(), generation.to_owned()));
+        let metadata: Metadata = metadata.into_iter().collect();
+        ObjectInfo { etag: ETag::new("e"), size: 1, modified: Timestamp(0), metadata }
+    }
+
+    #[test]
+    fn what_is_due_follows_from_the_status_and_the_gifs_generation() {
+        let current = gif(Some(head(Status::Done).generation.as_str()));
+        let older = gif(Some("another"));
+        let unknown = gif(None);
+        let gifs = [None, Some(&current), Some(&older), Some(&unknown)];
+        for (status, expected) in [
+            (Status::Done, [Due::Gif, Due::Nothing, Due::Gif, Due::Gif]),
+            (Status::Empty, [Due::Nothing, Due::NoGif, Due::NoGif, Due::NoGif]),
+            (Status::Failed, [Due::Nothing, Due::NoGif, Due::NoGif, Due::NoGif]),
+            (Status::Refused, [Due::Nothing, Due::NoGif, Due::NoGif, Due::NoGif]),
+            (Status::Waiting, [Due::Nothing; 4]),
+            (Status::Rendering, [Due::Nothing; 4]),
+        ] {
+            assert_eq!(gifs.map(|gif| due(&head(status), gif)), expected, "{status:?}");
+        }
+    }
+
+    #[test]
+    fn quiet_is_waited_for_once_whatever_the_clocks_say() {
+        let (period, mut quiet) = (Duration::from_secs(5), Quiet::default());
+        let second = |seconds: u64| Timestamp(seconds * 1_000);
+        assert_eq!(quiet.left(period, second(10), second(12)), Duration::from_secs(3));
+        // The store's clock runs ahead of this one's: what was slept through counts.
+        assert_eq!(quiet.left(period, second(10), second(9)), Duration::from_secs(2));
+        assert_eq!(quiet.left(period, second(10), second(9)), Duration::ZERO);
+        // A newer script: all over again.
+        assert_eq!(quiet.left(period, second(14), second(15)), Duration::from_secs(4));
+        assert_eq!(Quiet::default().left(period, second(10), second(15)), Duration::ZERO);
+    }
+
+    #[test]
+    fn only_whoever_had_most_of_its_time_for_a_set_refuses_it() {
+        let head = head(Status::Done);
+        let (short, long) = (Duration::from_secs(10), Duration::from_secs(20));
+        assert!(matches!(out_of_time(&head, 3, long, short), Err(Error::OutOfTime { .. })));
+        let reason = out_of_time(&head, 3, short, long).unwrap();
+        assert!(reason.message.starts_with("3 of 9 frames were assembled in the 20 s"), "{}", reason.message);
+        assert!(out_of_time(&head, 3, short, short).is_ok());
+    }
 }

@@ -111,3 +111,16 @@ impl Error {
 
 /// What the pipeline's functions return.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// What is there, or `None`.
+///
+/// # Errors
+///
+/// All but [`Error::NotFound`].
+pub fn found<T>(answer: Result<T>) -> Result<Option<T>> {
+    match answer {
+        Ok(value) => Ok(Some(value)),
+        Err(error) if error.is_not_found() => Ok(None),
+        Err(error) => Err(error),
+    }
+}

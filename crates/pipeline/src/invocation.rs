@@ -12,7 +12,7 @@ use bytes::Bytes;
 use crate::keys::Animation;
 use crate::manifest::{Beginning, Fact, Head, Manifest, frames_of};
 use crate::store::{ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store};
-use crate::{Clock, Error, Randomness, Result, Timestamp};
+use crate::{Clock, Error, Randomness, Result, Timestamp, found};
 
 /// The numbers of the protocol. Each default has its reason; tests and the local invoker shorten some.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,10 +51,11 @@ pub struct Policy {
     pub draw_margin: Duration,
 }
 
-impl Default for Policy {
-    fn default() -> Self {
+impl Policy {
+    /// The usual numbers, for a renderer of this pixel version.
+    pub fn new(pixels: u32) -> Self {
         Policy {
-            pixels: rayfold_tracer::PIXEL_VERSION,
+            pixels,
             quiet: Duration::from_secs(5),
             pause_per_frame: Duration::from_millis(3),
             pause_cap: Duration::from_millis(500),
@@ -319,13 +320,5 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             }
         }
         request().await
-    }
-}
-
-fn found<T>(answer: Result<T>) -> Result<Option<T>> {
-    match answer {
-        Ok(value) => Ok(Some(value)),
-        Err(error) if error.is_not_found() => Ok(None),
-        Err(error) => Err(error),
     }
 }

@@ -19,12 +19,11 @@ pub mod retry;
 #[cfg(any(test, feature = "simulation"))]
 pub mod simulation;
 pub mod store;
-pub mod studio;
 pub mod sweep;
 
 pub use assemble::{Animator, Encoding, assemble};
 pub use clock::{Clock, Randomness, SystemClock, Timestamp};
-pub use error::{Cause, Error, Result};
+pub use error::{Cause, Error, Result, found};
 pub use failure::record_failure;
 pub use fold::fold;
 pub use invocation::{Invocation, Mutation, Policy};

@@ -11,7 +11,7 @@ use crate::invocation::{Invocation, Known};
 use crate::keys::{Animation, Key, Part, Receipt, ScriptName, Tag};
 use crate::manifest::{Fault, FrameState, Manifest, Reason, Rejected, Settings};
 use crate::reconcile::{MARK_EVERY, ReceiptFound, Results, ScriptFound, Scripts, reconcile};
-use crate::store::{ETag, ListRequest, Listed, Store};
+use crate::store::{ETag, ListRequest, Listed, Listing, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
 /// A listing of an animation and what it amounts to.
@@ -97,21 +97,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 
     /// Reads a listing up to and including `end`.
-    async fn list_range(&self, mut request: ListRequest, end: Option<String>) -> Result<Vec<Listed>> {
-        let beyond = |key: &str| end.as_deref().is_some_and(|end| key > end);
-        let mut listed = Vec::new();
-        loop {
-            let page = self.list(request.clone()).await?;
-            let last = page.objects.last().map(|object| object.key.as_str());
-            let at_end = last
-                .max(page.prefixes.last().map(String::as_str))
-                .is_some_and(|last| end.as_deref().is_some_and(|end| last >= end));
-            listed.extend(page.objects.into_iter().filter(|object| !beyond(&object.key)));
-            match page.next {
-                Some(next) if !at_end => request.continuation = Some(next),
-                _ => return Ok(listed),
-            }
-        }
+    async fn list_range(&self, request: ListRequest, end: Option<String>) -> Result<Vec<Listed>> {
+        Ok(Listing::read(request, end.as_deref(), |request| self.list(request)).await?.objects)
     }
 
     /// Reads `animation.json`, unless the manifest has it in this version.

@@ -230,3 +230,6 @@ fn marks(scripts: &Scripts) -> Vec<ScriptName> {
     let stride = MARK_EVERY.max(count.div_ceil(MOST_MARKS));
     names.into_iter().skip(stride - 1).step_by(stride).cloned().collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -19,10 +19,10 @@ use crate::invocation::{Glimpse, Invocation};
 use crate::keys::{Animation, Key, Part, Receipt, ScriptName, Tag};
 use crate::manifest::{Fact, Reason};
 use crate::observe::Standing;
-use crate::store::{ETag, ListRequest, Store};
+use crate::store::{ETag, ListRequest, Object, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
-/// What draws. The functions bring [`crate::studio::Studio`], the simulation something smaller.
+/// What draws. The render function brings a ray tracer, the simulation something smaller.
 pub trait Renderer: Send + Sync {
     /// Draws the script's one frame (`part` is `None`) or one of several.
     ///
@@ -108,16 +108,80 @@ pub async fn render_frame<S: Store, C: Clock, R: Renderer>(
     key: &str,
 ) -> Result<Rendered> {
     match key.parse()? {
-        Key::Script { animation, name } => invocation.render(renderer, animation, name, None, None).await,
-        Key::Retry { animation, name, tag, part, .. } => {
-            let version = part.map(|_| tag.version);
-            invocation.render(renderer, animation, name, part, version).await
-        }
-        Key::Part { animation, name, tag, number } => {
-            invocation.render(renderer, animation, name, Some(number), Some(tag.version)).await
-        }
         Key::Settings { animation } => invocation.follow_settings(animation).await,
-        _ => Err(Error::key(key, "this key wakes no rendering")),
+        other => match Subject::of(other) {
+            Some(subject) => invocation.render(renderer, subject).await,
+            None => Err(Error::key(key, "this key wakes no rendering")),
+        },
+    }
+}
+
+/// Which frame an event is about.
+#[derive(Debug, Clone, PartialEq)]
+struct Subject {
+    animation: Animation,
+    name: ScriptName,
+    part: Part,
+    /// The version that a part belongs to: of another one there is nothing to draw.
+    only: Option<ETag>,
+}
+
+/// A script as it is now.
+#[derive(Debug, PartialEq)]
+struct Script {
+    version: ETag,
+    uploaded: Timestamp,
+    body: Bytes,
+}
+
+/// What a script as it is now asks for.
+#[derive(Debug, PartialEq)]
+enum Due {
+    /// No result, only that the manifest shows this.
+    Nothing(Outcome, Fact),
+    /// A result of this version, unless there is one.
+    Version(Script),
+}
+
+impl Subject {
+    /// `None` for a key that is about no script.
+    fn of(key: Key) -> Option<Self> {
+        match key {
+            Key::Script { animation, name } => Some(Subject { animation, name, part: None, only: None }),
+            Key::Retry { animation, name, tag, part, .. } => {
+                let only = part.map(|_| tag.version);
+                Some(Subject { animation, name, part, only })
+            }
+            Key::Part { animation, name, tag, number } => {
+                Some(Subject { animation, name, part: Some(number), only: Some(tag.version) })
+            }
+            Key::Settings { .. }
+            | Key::Receipt { .. }
+            | Key::Manifest { .. }
+            | Key::Claim { .. }
+            | Key::Gif { .. } => None,
+        }
+    }
+
+    fn due(&self, script: Option<Object>) -> Due {
+        let name = || self.name.clone();
+        let Some(Object { info, body }) = script else {
+            return Due::Nothing(Outcome::Gone, Fact::Absent(name()));
+        };
+        if self.only.as_ref().is_some_and(|only| *only != info.etag) {
+            return Due::Nothing(Outcome::Superseded, Fact::Version(name(), info.etag));
+        }
+        Due::Version(Script { version: info.etag, uploaded: info.modified, body })
+    }
+}
+
+impl Outcome {
+    /// How long the fact holds that the outcome stands for.
+    fn age(&self) -> Age {
+        match self {
+            Outcome::Drawn | Outcome::Split(_) | Outcome::Faulty(_) => Age::New,
+            Outcome::Gone | Outcome::Settings | Outcome::Superseded | Outcome::Present => Age::Old,
+        }
     }
 }
 
@@ -132,53 +196,48 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Rendered { animation, script: None, outcome: Outcome::Settings, folded, stages })
     }
 
-    /// `only` is the version that a part belongs to.
-    async fn render<R: Renderer>(
-        &self,
-        renderer: &R,
-        animation: Animation,
-        name: ScriptName,
-        part: Part,
-        only: Option<ETag>,
-    ) -> Result<Rendered> {
+    async fn render<R: Renderer>(&self, renderer: &R, subject: Subject) -> Result<Rendered> {
         let mut stages = Stages::default();
         let start = self.clock.now();
-        let script = self.get(&animation.script(&name)).await?;
-        let (outcome, fact) = match script {
-            None => (Outcome::Gone, Fact::Absent(name.clone())),
-            Some(script) if only.is_some_and(|only| only != script.info.etag) => {
-                (Outcome::Superseded, Fact::Version(name.clone(), script.info.etag))
-            }
-            Some(script) => {
-                let (version, uploaded) = (script.info.etag, script.info.modified);
-                match self.standing(&animation, &name, &version, part).await? {
-                    Some(Standing::Split { tag, count }) => {
-                        stages.read = self.clock.now().since(start);
-                        return self.follow_split(animation, name, tag, count, uploaded, stages).await;
-                    }
-                    Some(standing) => (Outcome::Present, standing.fact(name.clone(), version, part)),
-                    None => {
-                        let read = self.clock.now();
-                        let drawing = self.draw(renderer, &name, script.body, part).await?;
-                        let drawn = self.clock.now();
-                        stages.draw = drawn.since(read);
-                        let put =
-                            self.put_drawing(&animation, &name, (version, uploaded), part, drawing).await?;
-                        stages.put = self.clock.now().since(drawn);
-                        put
-                    }
+        let script = self.get(&subject.animation.script(&subject.name)).await?;
+        let (outcome, fact) = match subject.due(script) {
+            Due::Nothing(outcome, fact) => (outcome, fact),
+            Due::Version(script) => match self.standing_of(&subject, &script.version).await? {
+                Some(Standing::Split { tag, count }) => {
+                    stages.read = self.clock.now().since(start);
+                    return self.follow_split(subject, tag, count, script.uploaded, stages).await;
                 }
-            }
+                Some(standing) => {
+                    (Outcome::Present, standing.fact(subject.name.clone(), script.version, subject.part))
+                }
+                None => self.draw_and_put(renderer, &subject, script, &mut stages).await?,
+            },
         };
         let before_fold = self.clock.now();
         stages.read = before_fold.since(start).saturating_sub(stages.draw + stages.put);
-        let age = match &outcome {
-            Outcome::Drawn | Outcome::Split(_) | Outcome::Faulty(_) => Age::New,
-            _ => Age::Old,
-        };
-        let folded = self.fold(&animation, &fact, age).await?;
+        let folded = self.fold(&subject.animation, &fact, outcome.age()).await?;
         stages.fold = self.clock.now().since(before_fold);
-        Ok(Rendered { animation, script: Some(name), outcome, folded, stages })
+        Ok(Rendered { animation: subject.animation, script: Some(subject.name), outcome, folded, stages })
+    }
+
+    async fn standing_of(&self, subject: &Subject, version: &ETag) -> Result<Option<Standing>> {
+        self.standing(&subject.animation, &subject.name, version, subject.part).await
+    }
+
+    async fn draw_and_put<R: Renderer>(
+        &self,
+        renderer: &R,
+        subject: &Subject,
+        script: Script,
+        stages: &mut Stages,
+    ) -> Result<(Outcome, Fact)> {
+        let before = self.clock.now();
+        let drawing = self.draw(renderer, &subject.name, script.body, subject.part).await?;
+        let drawn = self.clock.now();
+        stages.draw = drawn.since(before);
+        let put = self.put_drawing(subject, script.version, script.uploaded, drawing).await?;
+        stages.put = self.clock.now().since(drawn);
+        Ok(put)
     }
 
     /// Draws, but not beyond the deadline: what is killed cannot say why.
@@ -204,14 +263,14 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
 
     async fn put_drawing(
         &self,
-        animation: &Animation,
-        name: &ScriptName,
-        (version, uploaded): (ETag, Timestamp),
-        part: Part,
+        subject: &Subject,
+        version: ETag,
+        uploaded: Timestamp,
         drawing: Drawing,
     ) -> Result<(Outcome, Fact)> {
+        let Subject { animation, name, part, .. } = subject;
+        let (name, part) = (name.clone(), *part);
         let tag = Tag { version: version.clone(), pixels: self.policy.pixels };
-        let name = name.clone();
         Ok(match drawing {
             Drawing::Frame(image) => {
                 let receipt = Receipt::Frame { name: name.clone(), tag, part };
@@ -278,13 +337,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     /// that were put before this upload and have no result are woken anew.
     async fn follow_split(
         &self,
-        animation: Animation,
-        name: ScriptName,
+        subject: Subject,
         tag: Tag,
         count: NonZeroU64,
         uploaded: Timestamp,
         mut stages: Stages,
     ) -> Result<Rendered> {
+        let Subject { animation, name, .. } = subject;
         let start = self.clock.now();
         let known = self.manifest(&animation).await?;
         let pending = known.as_ref().and_then(|known| known.manifest.pending_parts(&name, &tag.version));
@@ -343,5 +402,52 @@ impl Standing {
             Standing::Drawn(pixels) => Fact::Drawn(name, version, part, pixels),
             Standing::Faulty(receipt) => Fact::Faulty(name, version, part, receipt),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::{Metadata, ObjectInfo};
+
+    fn subject(key: &str) -> Option<Subject> {
+        Subject::of(key.parse().unwrap())
+    }
+
+    fn script(version: &str) -> Object {
+        let (etag, modified) = (ETag::new(version), Timestamp(7));
+        Object { info: ObjectInfo { etag, size: 1, modified, metadata: Metadata::new() }, body: "x".into() }
+    }
+
+    #[test]
+    fn events_are_about_scripts_and_parts_of_one_version() {
+        let of = |key: &str| {
+            let Subject { name, part, only, .. } = subject(key)?;
+            Some((name.to_string(), part.map(NonZeroU64::get), only.map(|only| only.to_string())))
+        };
+        let one = || "1".to_owned();
+        assert_eq!(of("scripts/a/1.txt"), Some((one(), None, None)));
+        assert_eq!(of("retries/a/1@v-p1/2"), Some((one(), None, None)));
+        assert_eq!(of("retries/a/1@v-p1/3/2"), Some((one(), Some(3), Some("v".into()))));
+        assert_eq!(of("parts/a/1@v-p1/3.json"), Some((one(), Some(3), Some("v".into()))));
+        assert_eq!(of("frames/a/1@v-p1.png"), None);
+        assert_eq!(of("manifests/a.json"), None);
+    }
+
+    #[test]
+    fn a_script_as_it_is_now_decides_what_is_due() {
+        let name = || ScriptName::new("1").unwrap();
+        let whole = subject("scripts/a/1.txt").unwrap();
+        let part = subject("parts/a/1@v-p1/3.json").unwrap();
+        for subject in [&whole, &part] {
+            assert_eq!(subject.due(None), Due::Nothing(Outcome::Gone, Fact::Absent(name())));
+            assert!(matches!(subject.due(Some(script("v"))), Due::Version(Script { uploaded, .. })
+                if uploaded == Timestamp(7)));
+        }
+        // An event about an older version is an event for the current one; a part is of one version alone.
+        assert!(matches!(whole.due(Some(script("w"))), Due::Version(Script { version, .. })
+            if version == ETag::new("w")));
+        let superseded = Due::Nothing(Outcome::Superseded, Fact::Version(name(), ETag::new("w")));
+        assert_eq!(part.due(Some(script("w"))), superseded);
     }
 }

@@ -38,11 +38,13 @@ use crate::clock::Timestamp;
 mod bucket;
 #[cfg(any(test, feature = "conformance"))]
 pub mod conformance;
+mod listing;
 mod memory;
 #[cfg(feature = "s3")]
 mod s3;
 
 pub use bucket::Bucket;
+pub use listing::Listing;
 pub use memory::{MemoryStore, MemoryUpload};
 #[cfg(feature = "s3")]
 pub use s3::{Connection, Notification, S3Store, S3Upload};

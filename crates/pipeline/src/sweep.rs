@@ -11,7 +11,7 @@ use std::num::NonZeroU64;
 
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 
-use crate::assemble::generation_of;
+use crate::assemble::{Due, due};
 use crate::invocation::{Invocation, Known};
 use crate::keys::{Animation, Key, MANIFESTS, Part, Receipt, SCRIPTS, ScriptName, Tag};
 use crate::manifest::{Frame, FrameState, Manifest, Reason, Status};
@@ -132,11 +132,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let head = &observation.manifest.head;
         let manifest_differs =
             !known.as_ref().is_some_and(|known| known.manifest.agrees_with(&observation.manifest));
-        let gif_differs = match head.status {
-            Status::Done => generation_of(gif.as_ref()) != Some(head.generation.as_str()),
-            Status::Empty | Status::Failed | Status::Refused => gif.is_some(),
-            Status::Waiting | Status::Rendering => false,
-        };
+        let gif_differs = due(head, gif.as_ref()) != Due::Nothing;
         let nothing_at_all = known.is_none() && head.status == Status::Empty && gif.is_none();
         if (manifest_differs || gif_differs || visit.given_up > 0) && !nothing_at_all {
             self.claim(&claimable(&observation.manifest, known.as_ref())).await?;

@@ -18,7 +18,7 @@ use std::ops::Range;
 use annotate_snippets::{AnnotationKind, Level, Origin, Renderer, Snippet};
 use serde::{Deserialize, Serialize};
 
-use crate::report::visible;
+use crate::shown::visible;
 
 /// Whether a text is unusable or only doubtful.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]

@@ -13,7 +13,9 @@
 //! assert_eq!(parsed.diagnostics[0].help.as_deref(), Some("did you mean `Sphere`?"));
 //! ```
 
+mod command;
 pub mod diagnostic;
+mod form;
 mod limits;
 pub mod model;
 mod natural;
@@ -22,9 +24,12 @@ mod report;
 mod script;
 mod settings;
 mod shared_slice;
+mod shown;
 mod write;
 
+pub use command::Command;
 pub use diagnostic::{Code, Diagnostic, Severity};
+pub use form::{Field, Form, Kind, Unit, Values};
 pub use limits::Limits;
 pub use model::{
     Camera, Cuboid, DirectionalLight, InvalidValue, Light, Material, Object, Parameter, Pinhole, Scene,

@@ -8,9 +8,7 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
-
-use crate::model::{Camera, Light, Object, Scene, Screen, displayable};
+use crate::model::{Background, Camera, Light, Object, Scene, Screen};
 use crate::shared_slice::SharedSlice;
 
 /// The frames of a script, one for each `Trace`, at least one.
@@ -34,7 +32,7 @@ pub struct Script {
 pub(crate) struct View {
     pub(crate) screen: Screen,
     pub(crate) camera: Camera,
-    pub(crate) background: DVec3,
+    pub(crate) background: Background,
 }
 
 /// What a `Trace` sees: an index into the views, ranges of the lists.
@@ -77,7 +75,7 @@ impl Script {
     fn scene(&self, frame: &Frame) -> Scene {
         let view = &self.views[frame.view];
         let mut scene = Scene::new(view.screen, view.camera);
-        scene.restore_background(view.background);
+        scene.background = view.background;
         scene.objects = self.objects.part(frame.objects.clone());
         scene.lights = self.lights.part(frame.lights.clone());
         scene
@@ -90,7 +88,7 @@ pub(crate) struct Recorder {
     objects: List<Object>,
     lights: List<Light>,
     camera: Camera,
-    background: DVec3,
+    background: Background,
     views: Vec<View>,
     frames: Vec<Frame>,
 }
@@ -108,14 +106,14 @@ impl Recorder {
         self.camera = camera;
     }
 
-    pub(crate) fn set_background(&mut self, color: DVec3) {
-        self.background = displayable(color);
+    pub(crate) fn set_background(&mut self, background: Background) {
+        self.background = background;
     }
 
     pub(crate) fn clear(&mut self) {
         self.objects.clear();
         self.lights.clear();
-        self.background = DVec3::ZERO;
+        self.background = Background::default();
     }
 
     pub(crate) fn trace(&mut self, screen: Screen) {

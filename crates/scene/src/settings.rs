@@ -18,7 +18,8 @@ use serde_json::value::RawValue;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::limits::Limits;
 use crate::model::{InvalidValue, Parameter};
-use crate::report::{BYTE_ORDER_MARK, Fault, Line, Report, quoted};
+use crate::report::{BYTE_ORDER_MARK, Fault, Line, Report};
+use crate::shown::quoted;
 
 const FIELDS: [&str; 3] = ["frames", "fps", "loop"];
 

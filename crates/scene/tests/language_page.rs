@@ -1,6 +1,6 @@
 //! `docs/language.md` tells the truth: its examples are parsed, its messages and limits are the real ones.
 
-use rayfold_scene::{AnimationSettings, Limits, parse, parse_settings};
+use rayfold_scene::{AnimationSettings, Command, Field, Limits, parse, parse_settings};
 
 const PAGE: &str = include_str!("../../../docs/language.md");
 
@@ -25,17 +25,43 @@ fn the_message_is_what_is_told_about_the_example_misspelt() {
     assert_eq!(parsed.diagnostics[0].render(false), block("error: "));
 }
 
+/// The cells of the table under a heading, without its head.
+fn table(heading: &str) -> Vec<Vec<&'static str>> {
+    let rows =
+        PAGE.lines().skip_while(|line| *line != heading).skip_while(|line| !line.starts_with('|')).skip(2);
+    let cells = |row: &'static str| row.trim_matches('|').split('|').map(str::trim).collect();
+    rows.take_while(|line| line.starts_with('|')).map(cells).collect()
+}
+
 #[test]
 fn every_command_is_written_as_the_table_says() {
-    for line in PAGE.lines().skip_while(|line| *line != "## Commands").skip(4).take(10) {
-        let cells: Vec<_> = line.split('|').map(|cell| cell.trim().trim_matches('`')).collect();
-        let (command, parameters) = (cells[1], cells[2].split_whitespace().collect::<Vec<_>>().join(" "));
-        let script = format!("{command} {}", "x ".repeat(16));
-        let parsed = parse("a.txt", script.as_bytes(), &Limits::default());
-        let help =
-            parsed.diagnostics.iter().filter_map(|d| d.help.as_deref()).find(|h| h.starts_with("write"));
-        assert_eq!(help, Some(format!("write `{}`", format!("{command} {parameters}").trim()).as_str()));
-    }
+    let usages: Vec<_> = table("## Commands")
+        .iter()
+        .map(|row| {
+            let [command, parameters] = [row[0], row[1]].map(|cell| cell.trim_matches('`'));
+            [command].into_iter().chain(parameters.split_whitespace()).collect::<Vec<_>>().join(" ")
+        })
+        .collect();
+    assert_eq!(usages, Command::ALL.iter().map(|command| command.form().to_string()).collect::<Vec<_>>());
+}
+
+#[test]
+fn every_parameter_is_told_with_what_it_counts_by_and_may_be() {
+    let rows: Vec<_> = table("### Parameters").iter().map(|row| row.join(" | ")).collect();
+    let told = |command: Command, field: &Field| {
+        let optional = if field.optional { ", may be left out" } else { "" };
+        format!(
+            "`{}` | `{}` | {} | {} | {}{optional}",
+            command.name(),
+            field.names.join(" "),
+            field.kind,
+            field.kind.unit(),
+            field.values
+        )
+    };
+    let fields = Command::ALL.iter().flat_map(|command| command.form().fields.iter().map(|f| (*command, f)));
+    let expect: Vec<_> = fields.map(|(command, field)| told(command, field)).collect();
+    assert_eq!(rows, expect, "the page should have\n| {} |", expect.join(" |\n| "));
 }
 
 #[test]
@@ -46,11 +72,11 @@ fn the_settings_are_settings() {
 
 #[test]
 fn the_limits_are_the_defaults() {
-    let rows: Vec<_> = PAGE.lines().skip_while(|line| *line != "## Limits").skip(4).take(5).collect();
+    let rows = table("## Limits");
     let limits = Limits::default();
     let numbers: Vec<u64> = rows
         .iter()
-        .map(|row| row.chars().filter(char::is_ascii_digit).collect::<String>().parse().unwrap_or(0))
+        .map(|row| row[1].chars().filter(char::is_ascii_digit).collect::<String>().parse().unwrap_or(0))
         .collect();
     let expect = [
         limits.max_script_bytes as u64 >> 20,

@@ -67,7 +67,7 @@ run "bucket" {
     error_message = "the bucket's policy must deny what does not come by TLS, and allow nobody anything"
   }
   assert {
-    condition     = length(aws_s3_bucket_logging.this) == 0 && length(aws_kms_key.this) == 0 && length(aws_kms_alias.this) == 0
+    condition     = length(aws_s3_bucket_logging.this) == 0 && length(aws_budgets_budget.this) == 0 && !aws_s3_bucket_notification.this.eventbridge && length(aws_s3_bucket_notification.this.topic) == 0
     error_message = "what costs or needs something from outside is off until it is asked for"
   }
 }
@@ -115,8 +115,8 @@ run "lifecycle" {
 
 run "functions" {
   assert {
-    condition     = { for key, function in aws_lambda_function.this : key => function.function_name } == { render = "demo-render", assemble = "demo-assemble" }
-    error_message = "there must be these two functions"
+    condition     = { for key, function in aws_lambda_function.this : key => function.function_name } == { render = "demo-render", assemble = "demo-assemble", record = "demo-record" }
+    error_message = "there must be these functions"
   }
   assert {
     condition = alltrue([
@@ -129,15 +129,17 @@ run "functions" {
         one(function.logging_config).application_log_level == "INFO",
         one(function.ephemeral_storage).size == 512,
         function.reserved_concurrent_executions == null,
-        one(function.environment).variables == tomap({ RAYFOLD_BUCKET = "demo-123456789012-eu-central-1" }),
+        function.code_signing_config_arn == null,
+        length(function.vpc_config) == 0,
+        one(function.environment).variables["RAYFOLD_BUCKET"] == "demo-123456789012-eu-central-1",
       ])
     ])
-    error_message = "runtime, architecture, tracing, logs and settings of both functions"
+    error_message = "runtime, architecture, tracing, logs and settings of the functions"
   }
   assert {
     condition = {
       for key, function in aws_lambda_function.this : key => [function.memory_size, function.timeout]
-    } == { render = [1769, 300], assemble = [3008, 900] }
+    } == { render = [1769, 300], assemble = [3008, 900], record = [512, 60] }
     error_message = "memory (MB) and timeout (s)"
   }
   assert {
@@ -146,6 +148,7 @@ run "functions" {
       } == {
       render   = filebase64sha256("tests/packages/rayfold-render.zip")
       assemble = filebase64sha256("tests/packages/rayfold-assemble.zip")
+      record   = filebase64sha256("tests/packages/rayfold-assemble.zip")
     }
     error_message = "a changed package must change the function"
   }
@@ -162,8 +165,29 @@ run "functions" {
     error_message = "each function must write into its own log group, which forgets"
   }
   assert {
-    condition     = { for key, config in aws_lambda_function_recursion_config.this : config.function_name => config.recursive_loop } == { demo-render = "Terminate", demo-assemble = "Terminate" }
+    condition     = { for key, config in aws_lambda_function_recursion_config.this : config.function_name => config.recursive_loop } == { demo-render = "Terminate", demo-assemble = "Terminate", demo-record = "Terminate" }
     error_message = "Lambda's recursion detection must stay on"
+  }
+}
+
+run "limits_fit_the_memory" {
+  assert {
+    condition = aws_lambda_function.this["render"].environment[0].variables == tomap({
+      RAYFOLD_BUCKET           = "demo-123456789012-eu-central-1"
+      RAYFOLD_MAX_FRAMES       = "10000"
+      RAYFOLD_MAX_LIGHTS       = "1024"
+      RAYFOLD_MAX_OBJECTS      = "1817300"
+      RAYFOLD_MAX_PIXELS       = "64000000"
+      RAYFOLD_MAX_SCRIPT_BYTES = "268435456"
+    })
+    error_message = "4 million spheres take 1,971 MiB, and the function has 1,769 MB"
+  }
+  assert {
+    condition = alltrue([
+      for function in ["assemble", "record"] :
+      aws_lambda_function.this[function].environment[0].variables == tomap({ RAYFOLD_BUCKET = "demo-123456789012-eu-central-1" })
+    ])
+    error_message = "only the render function reads scripts"
   }
 }
 
@@ -211,16 +235,16 @@ run "failures" {
   assert {
     condition = alltrue([
       aws_lambda_event_source_mapping.failures.event_source_arn == aws_sqs_queue.failures.arn,
-      aws_lambda_event_source_mapping.failures.function_name == "arn:aws:lambda:eu-central-1:123456789012:function:demo-assemble",
+      aws_lambda_event_source_mapping.failures.function_name == "arn:aws:lambda:eu-central-1:123456789012:function:demo-record",
       aws_lambda_event_source_mapping.failures.function_response_types == toset(["ReportBatchItemFailures"]),
       aws_lambda_event_source_mapping.failures.batch_size == 10,
       one(aws_lambda_event_source_mapping.failures.scaling_config).maximum_concurrency == 2,
     ])
-    error_message = "the assemble function must read the failure queue, and answer for each record"
+    error_message = "the record function must read the failure queue, and answer for each record"
   }
   assert {
-    condition     = aws_sqs_queue.failures.visibility_timeout_seconds == 6 * aws_lambda_function.this["assemble"].timeout
-    error_message = "a batch that is being worked on must not be handed out again"
+    condition     = aws_sqs_queue.failures.visibility_timeout_seconds == 6 * aws_lambda_function.this["record"].timeout && aws_sqs_queue.failures.visibility_timeout_seconds == 360
+    error_message = "a batch that is being worked on must not be handed out again, and a record that fails once must not wait for 90 minutes"
   }
   assert {
     condition = jsondecode(aws_sqs_queue.failures.redrive_policy) == {
@@ -268,7 +292,7 @@ run "sweep" {
       aws_scheduler_schedule.sweep.schedule_expression == "rate(15 minutes)",
       one(aws_scheduler_schedule.sweep.flexible_time_window).mode == "OFF",
       one(aws_scheduler_schedule.sweep.target).arn == "arn:aws:lambda:eu-central-1:123456789012:function:demo-assemble",
-      one(aws_scheduler_schedule.sweep.target).role_arn == "arn:aws:iam::123456789012:role/demo-sweep-schedule",
+      one(aws_scheduler_schedule.sweep.target).role_arn == "arn:aws:iam::123456789012:role/demo-eu-central-1-sweep-schedule",
       jsondecode(one(aws_scheduler_schedule.sweep.target).input) == { sweep = true },
       one(one(aws_scheduler_schedule.sweep.target).dead_letter_config).arn == aws_sqs_queue.dead_letters.arn,
       one(one(aws_scheduler_schedule.sweep.target).retry_policy).maximum_event_age_in_seconds == 840,
@@ -282,62 +306,140 @@ run "alarms" {
   assert {
     condition = toset(concat(
       [for alarm in aws_cloudwatch_metric_alarm.function : alarm.alarm_name],
-      [for alarm in aws_cloudwatch_metric_alarm.dead_letters : alarm.alarm_name],
-      )) == toset([
-      "demo-render-errors", "demo-render-throttles", "demo-render-near-timeouts", "demo-render-dropped-events",
-      "demo-render-undelivered-failures", "demo-assemble-errors", "demo-assemble-throttles",
-      "demo-assemble-near-timeouts", "demo-assemble-dropped-events", "demo-assemble-undelivered-failures",
-      "demo-dead-letters",
-    ])
+      [for alarm in aws_cloudwatch_metric_alarm.error_rate : alarm.alarm_name],
+      [for alarm in aws_cloudwatch_metric_alarm.unhandled : alarm.alarm_name],
+      [for alarm in aws_cloudwatch_metric_alarm.queue : alarm.alarm_name],
+      aws_cloudwatch_metric_alarm.sweep[*].alarm_name,
+      )) == toset(concat(
+      [for pair in setproduct(["render", "assemble"], ["old-events", "dropped-events", "undelivered-failures"]) : "demo-${pair[0]}-${pair[1]}"],
+      [for pair in setproduct(["render", "assemble", "record"], ["error-rate", "throttles", "near-timeouts", "unhandled"]) : "demo-${pair[0]}-${pair[1]}"],
+      ["demo-old-failures", "demo-dead-letters", "demo-missed-sweeps"],
+    ))
     error_message = "there must be these alarms"
+  }
+  assert {
+    condition = sum([
+      length(aws_cloudwatch_metric_alarm.function), 2 * length(aws_cloudwatch_metric_alarm.error_rate),
+      length(aws_cloudwatch_metric_alarm.unhandled), length(aws_cloudwatch_metric_alarm.queue),
+      length(aws_cloudwatch_metric_alarm.sweep),
+    ]) == 24
+    error_message = "`rayfold cost` estimates 24 metrics: change it and docs/cost.md too"
   }
   assert {
     condition = {
       for key, alarm in aws_cloudwatch_metric_alarm.function : key => [alarm.namespace, alarm.metric_name, alarm.statistic, alarm.threshold, alarm.evaluation_periods]
       } == {
-      render-errors                 = ["AWS/Lambda", "Errors", "Sum", 1, 1]
       render-throttles              = ["AWS/Lambda", "Throttles", "Sum", 1, 3]
       render-near-timeouts          = ["AWS/Lambda", "Duration", "Maximum", 270000, 1]
+      render-old-events             = ["AWS/Lambda", "AsyncEventAge", "Maximum", 3600000, 1]
       render-dropped-events         = ["AWS/Lambda", "AsyncEventsDropped", "Sum", 1, 1]
       render-undelivered-failures   = ["AWS/Lambda", "DestinationDeliveryFailures", "Sum", 1, 1]
-      assemble-errors               = ["AWS/Lambda", "Errors", "Sum", 1, 1]
       assemble-throttles            = ["AWS/Lambda", "Throttles", "Sum", 1, 3]
       assemble-near-timeouts        = ["AWS/Lambda", "Duration", "Maximum", 810000, 1]
+      assemble-old-events           = ["AWS/Lambda", "AsyncEventAge", "Maximum", 3600000, 1]
       assemble-dropped-events       = ["AWS/Lambda", "AsyncEventsDropped", "Sum", 1, 1]
       assemble-undelivered-failures = ["AWS/Lambda", "DestinationDeliveryFailures", "Sum", 1, 1]
+      record-throttles              = ["AWS/Lambda", "Throttles", "Sum", 1, 3]
+      record-near-timeouts          = ["AWS/Lambda", "Duration", "Maximum", 54000, 1]
     }
     error_message = "what the alarms look at"
   }
   assert {
     condition = alltrue([for key, alarm in aws_cloudwatch_metric_alarm.function : alltrue([
-      alarm.dimensions == tomap({ FunctionName = startswith(key, "render-") ? "demo-render" : "demo-assemble" }),
+      alarm.dimensions == tomap({ FunctionName = "demo-${split("-", key)[0]}" }),
       alarm.treat_missing_data == "notBreaching",
       alarm.comparison_operator == "GreaterThanOrEqualToThreshold",
     ])])
     error_message = "each alarm must look at its own function, and be quiet while nothing happens"
   }
+}
+
+run "no_alarm_for_retries_that_succeed" {
   assert {
-    condition = alltrue([
-      one(aws_cloudwatch_metric_alarm.dead_letters[*].metric_name) == "ApproximateNumberOfMessagesVisible",
-      one(aws_cloudwatch_metric_alarm.dead_letters[*].dimensions) == tomap({ QueueName = "demo-dead-letters" }),
-      one(aws_cloudwatch_metric_alarm.dead_letters[*].threshold) == 1,
-      one(aws_cloudwatch_metric_alarm.dead_letters[*].statistic) == "Maximum",
-    ])
-    error_message = "one dead letter must set off its alarm"
+    condition = alltrue([for key, alarm in aws_cloudwatch_metric_alarm.error_rate : alltrue([
+      [for query in alarm.metric_query : query.expression if query.return_data == true] == ["100 * errors / invocations"],
+      { for query in alarm.metric_query : query.id => one(query.metric).metric_name if query.id != "percent" } == { errors = "Errors", invocations = "Invocations" },
+      alltrue([for query in alarm.metric_query : one(query.metric).dimensions == tomap({ FunctionName = "demo-${key}" }) if query.id != "percent"]),
+      alarm.threshold == 10,
+      alarm.datapoints_to_alarm == 3,
+      alarm.treat_missing_data == "notBreaching",
+    ])]) && length(aws_cloudwatch_metric_alarm.error_rate) == 3
+    error_message = "errors must be many, and last: one that a retry makes good is none"
+  }
+  assert {
+    condition     = alltrue([for alarm in aws_cloudwatch_metric_alarm.function : alarm.metric_name != "Errors"])
+    error_message = "no alarm may count single errors"
+  }
+}
+
+run "what_nothing_handles_reaches_an_alarm" {
+  assert {
+    condition = alltrue([for key, filter in aws_cloudwatch_log_metric_filter.unhandled : alltrue([
+      filter.log_group_name == "/aws/lambda/demo-${key}",
+      filter.pattern == "{ $.unhandled IS TRUE }",
+      one(filter.metric_transformation).namespace == aws_cloudwatch_metric_alarm.unhandled[key].namespace,
+      one(filter.metric_transformation).name == aws_cloudwatch_metric_alarm.unhandled[key].metric_name,
+      aws_cloudwatch_metric_alarm.unhandled[key].threshold == 1,
+    ])]) && keys(aws_cloudwatch_metric_alarm.unhandled) == ["assemble", "record", "render"]
+    error_message = "a line with `unhandled` must set off the alarm of its function"
+  }
+  assert {
+    condition = {
+      for key, alarm in aws_cloudwatch_metric_alarm.queue : key => [alarm.namespace, alarm.metric_name, alarm.statistic, alarm.dimensions["QueueName"], alarm.threshold]
+      } == {
+      old-failures = ["AWS/SQS", "ApproximateAgeOfOldestMessage", "Maximum", "demo-failures", 1800]
+      dead-letters = ["AWS/SQS", "ApproximateNumberOfMessagesVisible", "Maximum", "demo-dead-letters", 1]
+    }
+    error_message = "one dead letter, and a failed event that nobody writes down, must set off their alarms"
+  }
+}
+
+run "a_sweep_that_does_not_run_sets_off_an_alarm" {
+  assert {
+    condition = alltrue([for alarm in aws_cloudwatch_metric_alarm.sweep : alltrue([
+      alarm.namespace == "AWS/Scheduler",
+      alarm.metric_name == "InvocationAttemptCount",
+      alarm.dimensions == tomap({ ScheduleGroup = "demo" }),
+      alarm.comparison_operator == "LessThanThreshold",
+      alarm.threshold == 1,
+      alarm.period == 900,
+      alarm.evaluation_periods == 2,
+      alarm.treat_missing_data == "breaching",
+    ])]) && length(aws_cloudwatch_metric_alarm.sweep) == 1
+    error_message = "silence of the schedule must be told"
+  }
+}
+
+run "each_alarm_says_what_to_do" {
+  assert {
+    condition = alltrue([for alarm in concat(
+      values(aws_cloudwatch_metric_alarm.function), values(aws_cloudwatch_metric_alarm.error_rate),
+      values(aws_cloudwatch_metric_alarm.unhandled), values(aws_cloudwatch_metric_alarm.queue),
+      [for alarm in aws_cloudwatch_metric_alarm.sweep : alarm],
+    ) : can(regex("What to do: infra/terraform/RUNBOOK.md#[a-z-]+$", alarm.alarm_description))])
+    error_message = "each alarm must name its place in the runbook"
+  }
+  assert {
+    condition = alltrue([for alarm in concat(
+      values(aws_cloudwatch_metric_alarm.function), values(aws_cloudwatch_metric_alarm.error_rate),
+      values(aws_cloudwatch_metric_alarm.unhandled), values(aws_cloudwatch_metric_alarm.queue),
+      [for alarm in aws_cloudwatch_metric_alarm.sweep : alarm],
+    ) : strcontains(file("RUNBOOK.md"), "\n## ${regex("#([a-z-]+)$", alarm.alarm_description)[0]}\n")])
+    error_message = "the runbook must have the heading that each alarm names"
   }
 }
 
 run "dashboard" {
   assert {
-    condition     = one(aws_cloudwatch_dashboard.this[*].dashboard_name) == "demo" && length(jsondecode(one(aws_cloudwatch_dashboard.this[*].dashboard_body)).widgets) == 8
+    condition     = one(aws_cloudwatch_dashboard.this[*].dashboard_name) == "demo-eu-central-1" && length(jsondecode(one(aws_cloudwatch_dashboard.this[*].dashboard_body)).widgets) == 8
     error_message = "there must be a dashboard of eight widgets"
   }
   assert {
     condition = toset(flatten([
       for widget in jsondecode(one(aws_cloudwatch_dashboard.this[*].dashboard_body)).widgets : [for metric in widget.properties.metrics : metric[3]]
       if widget.type == "metric"
-    ])) == toset(["demo-render", "demo-assemble", "demo-failures", "demo-dead-letters"])
-    error_message = "the graphs must show both functions and both queues"
+    ])) == toset(["demo-render", "demo-assemble", "demo-record", "demo-failures", "demo-dead-letters"])
+    error_message = "the graphs must show all functions and both queues"
   }
   assert {
     condition = alltrue([
@@ -345,6 +447,17 @@ run "dashboard" {
       widget.properties.region == "eu-central-1" && widget.x + widget.width <= 24
     ])
     error_message = "every widget must look at the stack's region and fit the page"
+  }
+}
+
+run "the_dashboard_shows_timeouts_and_lack_of_memory" {
+  assert {
+    condition = alltrue([
+      for widget in jsondecode(one(aws_cloudwatch_dashboard.this[*].dashboard_body)).widgets :
+      strcontains(widget.properties.query, "level in ['WARN', 'ERROR'] or record.status in ['error', 'failure', 'timeout']")
+      if widget.type == "log"
+    ])
+    error_message = "of what the platform ends only the platform tells"
   }
 }
 
@@ -363,20 +476,21 @@ run "outputs" {
   }
   assert {
     condition = alltrue([
-      output.function_names == { render = "demo-render", assemble = "demo-assemble" },
+      output.function_names == { render = "demo-render", assemble = "demo-assemble", record = "demo-record" },
       output.function_arns == {
         render   = "arn:aws:lambda:eu-central-1:123456789012:function:demo-render"
         assemble = "arn:aws:lambda:eu-central-1:123456789012:function:demo-assemble"
+        record   = "arn:aws:lambda:eu-central-1:123456789012:function:demo-record"
       },
       output.role_arns == {
-        render   = "arn:aws:iam::123456789012:role/demo-render"
-        assemble = "arn:aws:iam::123456789012:role/demo-assemble"
+        render   = "arn:aws:iam::123456789012:role/demo-eu-central-1-render"
+        assemble = "arn:aws:iam::123456789012:role/demo-eu-central-1-assemble"
+        record   = "arn:aws:iam::123456789012:role/demo-eu-central-1-record"
       },
-      output.log_group_names == { render = "/aws/lambda/demo-render", assemble = "/aws/lambda/demo-assemble" },
+      output.log_group_names == { render = "/aws/lambda/demo-render", assemble = "/aws/lambda/demo-assemble", record = "/aws/lambda/demo-record" },
       output.failure_queue_url == "https://sqs.eu-central-1.amazonaws.com/123456789012/demo-failures",
       output.dead_letter_queue_url == "https://sqs.eu-central-1.amazonaws.com/123456789012/demo-dead-letters",
-      output.kms_key_arn == null,
-      output.dashboard_url == "https://eu-central-1.console.aws.amazon.com/cloudwatch/home?region=eu-central-1#dashboards/dashboard/demo",
+      output.dashboard_url == "https://eu-central-1.console.aws.amazon.com/cloudwatch/home?region=eu-central-1#dashboards/dashboard/demo-eu-central-1",
     ])
     error_message = "names and addresses of what was made"
   }
@@ -389,6 +503,10 @@ run "tags" {
       [for resource in aws_cloudwatch_log_group.this : resource.tags],
       [for resource in aws_iam_role.function : resource.tags],
       [for resource in aws_cloudwatch_metric_alarm.function : resource.tags],
+      [for resource in aws_cloudwatch_metric_alarm.error_rate : resource.tags],
+      [for resource in aws_cloudwatch_metric_alarm.unhandled : resource.tags],
+      [for resource in aws_cloudwatch_metric_alarm.queue : resource.tags],
+      aws_cloudwatch_metric_alarm.sweep[*].tags,
       [aws_s3_bucket.this.tags, aws_sqs_queue.failures.tags, aws_sqs_queue.dead_letters.tags, aws_iam_role.scheduler.tags],
     ) : tags == tomap({ Application = "demo" })])
     error_message = "everything must say which stack it belongs to"

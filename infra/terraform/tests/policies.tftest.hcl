@@ -15,7 +15,8 @@ variables {
 run "roles" {
   assert {
     condition = alltrue([for key, role in aws_iam_role.function : alltrue([
-      role.name == "demo-${key}",
+      role.name == "demo-eu-central-1-${key}",
+      role.path == "/",
       role.permissions_boundary == null,
       jsondecode(role.assume_role_policy) == jsondecode(jsonencode({
         Version = "2012-10-17"
@@ -47,9 +48,9 @@ run "roles" {
   }
   assert {
     condition = (
-      { for key, policy in aws_iam_role_policy.objects : key => policy.role } == { render = "demo-render", assemble = "demo-assemble" } &&
-      { for key, policy in aws_iam_role_policy.platform : key => policy.role } == { render = "demo-render", assemble = "demo-assemble" } &&
-      aws_iam_role_policy.scheduler.role == "demo-sweep-schedule"
+      { for key, policy in aws_iam_role_policy.objects : key => policy.role } == { for key in ["render", "assemble", "record"] : key => "demo-eu-central-1-${key}" } &&
+      { for key, policy in aws_iam_role_policy.platform : key => policy.role } == { for key in ["render", "assemble", "record"] : key => "demo-eu-central-1-${key}" } &&
+      aws_iam_role_policy.scheduler.role == "demo-eu-central-1-sweep-schedule"
     )
     error_message = "each document must belong to its own role"
   }
@@ -58,7 +59,7 @@ run "roles" {
 run "objects" {
   assert {
     condition = alltrue([for key, policy in aws_iam_role_policy.objects : jsondecode(policy.policy) == jsondecode(
-      replace(file("policies/${key}.json.tftpl"), "$${bucket_arn}", "arn:aws:s3:::demo-123456789012-eu-central-1")
+      replace(file("policies/${key == "record" ? "assemble" : key}.json.tftpl"), "$${bucket_arn}", "arn:aws:s3:::demo-123456789012-eu-central-1")
     )])
     error_message = "a role must have the document that the end-to-end tests enforce"
   }
@@ -86,6 +87,7 @@ run "objects" {
       } == {
       render   = "s3:GetObject s3:ListBucket s3:PutObject"
       assemble = "s3:AbortMultipartUpload s3:DeleteObject s3:GetObject s3:ListBucket s3:PutObject"
+      record   = "s3:AbortMultipartUpload s3:DeleteObject s3:GetObject s3:ListBucket s3:PutObject"
     }
     error_message = "the functions need these actions; render never deletes, and neither touches old versions or settings"
   }
@@ -99,6 +101,7 @@ run "objects" {
       } == {
       render   = "assemblies/* frames/* manifests/* parts/*"
       assemble = "animations/* assemblies/* frames/*.error.json manifests/* retries/*"
+      record   = "animations/* assemblies/* frames/*.error.json manifests/* retries/*"
     }
     error_message = "nobody writes scripts, and only assemble writes GIFs"
   }
@@ -148,14 +151,40 @@ run "platform" {
           Resource = "*"
         },
         {
-          Sid      = "HandOverAndReadFailedEvents"
+          Sid      = "HandOverFailedEvents"
           Effect   = "Allow"
-          Action   = ["sqs:DeleteMessage", "sqs:GetQueueAttributes", "sqs:ReceiveMessage", "sqs:SendMessage"]
+          Action   = ["sqs:SendMessage"]
           Resource = "arn:aws:sqs:eu-central-1:123456789012:demo-failures"
         },
       ]
     }))
-    error_message = "assemble: its own log, traces, and the failure queue to write to and to read"
+    error_message = "assemble: its own log, traces, and the failure queue to write to"
+  }
+  assert {
+    condition = jsondecode(aws_iam_role_policy.platform["record"].policy) == jsondecode(jsonencode({
+      Version = "2012-10-17"
+      Statement = [
+        {
+          Sid      = "WriteOwnLog"
+          Effect   = "Allow"
+          Action   = ["logs:CreateLogStream", "logs:PutLogEvents"]
+          Resource = "arn:aws:logs:eu-central-1:123456789012:log-group:/aws/lambda/demo-record:*"
+        },
+        {
+          Sid      = "SendTraces"
+          Effect   = "Allow"
+          Action   = ["xray:PutTelemetryRecords", "xray:PutTraceSegments"]
+          Resource = "*"
+        },
+        {
+          Sid      = "ReadFailedEvents"
+          Effect   = "Allow"
+          Action   = ["sqs:DeleteMessage", "sqs:GetQueueAttributes", "sqs:ReceiveMessage"]
+          Resource = "arn:aws:sqs:eu-central-1:123456789012:demo-failures"
+        },
+      ]
+    }))
+    error_message = "record: its own log, traces, and the failure queue to read"
   }
   assert {
     condition = jsondecode(aws_iam_role_policy.scheduler.policy) == jsondecode(jsonencode({
@@ -181,7 +210,8 @@ run "platform" {
 
 run "with_a_key" {
   variables {
-    customer_managed_key = true
+    kms_key_arn         = "arn:aws:kms:eu-central-1:123456789012:key/11111111-2222-3333-4444-555555555555"
+    former_kms_key_arns = ["arn:aws:kms:eu-central-1:123456789012:key/99999999-2222-3333-4444-555555555555"]
   }
 
   assert {
@@ -193,7 +223,7 @@ run "with_a_key" {
       Condition = {
         StringEquals = { "kms:ViaService" = ["s3.eu-central-1.amazonaws.com", "sqs.eu-central-1.amazonaws.com"] }
       }
-    })) && length(jsondecode(policy.policy).Statement) == 4])
+    })) && length(jsondecode(policy.policy).Statement) == 5])
     error_message = "the functions may use the key for the bucket's objects and the failure queue, and for nothing else"
   }
   assert {
@@ -207,33 +237,73 @@ run "with_a_key" {
     error_message = "the schedule may use the key for the dead-letter queue"
   }
   assert {
-    condition = jsondecode(one(aws_kms_key.this[*].policy)) == jsondecode(jsonencode({
-      Version = "2012-10-17"
-      Statement = [
-        {
-          Sid       = "AccountAdministersByIam"
-          Effect    = "Allow"
-          Principal = { AWS = "arn:aws:iam::123456789012:root" }
-          Action    = "kms:*"
-          Resource  = "*"
-        },
-        {
-          Sid       = "LogGroupsOfTheFunctions"
-          Effect    = "Allow"
-          Principal = { Service = "logs.eu-central-1.amazonaws.com" }
-          Action    = ["kms:Decrypt", "kms:DescribeKey", "kms:Encrypt", "kms:GenerateDataKey*", "kms:ReEncrypt*"]
-          Resource  = "*"
-          Condition = {
-            ArnEquals = {
-              "kms:EncryptionContext:aws:logs:arn" = [
-                "arn:aws:logs:eu-central-1:123456789012:log-group:/aws/lambda/demo-assemble",
-                "arn:aws:logs:eu-central-1:123456789012:log-group:/aws/lambda/demo-render",
-              ]
-            }
-          }
-        },
+    condition = alltrue([for policy in concat(values(aws_iam_role_policy.platform)[*].policy, values(output.user_policies)) : anytrue([
+      for statement in jsondecode(policy).Statement : jsonencode(statement) == jsonencode({
+        Sid       = "ReadWhatItEncrypted0"
+        Effect    = "Allow"
+        Action    = ["kms:Decrypt"]
+        Resource  = "arn:aws:kms:eu-central-1:123456789012:key/99999999-2222-3333-4444-555555555555"
+        Condition = { StringEquals = { "kms:ViaService" = ["s3.eu-central-1.amazonaws.com"] } }
+      })
+    ])])
+    error_message = "what a former key encrypted must stay readable, for functions and people"
+  }
+  assert {
+    condition = {
+      for user, policy in output.user_policies : user => [
+        for statement in jsondecode(policy).Statement : join(" ", statement.Action) if statement.Sid == "UseTheKeyThroughTheBucket"
       ]
-    }))
-    error_message = "the key: the account by its IAM policies, and the log service for these two groups"
+      } == {
+      viewer   = ["kms:Decrypt"]
+      uploader = ["kms:Decrypt kms:GenerateDataKey"]
+      operator = ["kms:Decrypt kms:GenerateDataKey"]
+    }
+    error_message = "who uploads needs the key to encrypt, who looks to decrypt"
+  }
+}
+
+run "in_another_partition" {
+  variables {
+    kms_key_arn = "arn:aws-cn:kms:cn-north-1:123456789012:key/11111111-2222-3333-4444-555555555555"
+  }
+
+  override_data {
+    target = data.aws_partition.current
+    values = { partition = "aws-cn", dns_suffix = "amazonaws.com.cn" }
+  }
+
+  override_data {
+    target = data.aws_region.current
+    values = { region = "cn-north-1" }
+  }
+
+  assert {
+    condition = alltrue(flatten([for policy in aws_iam_role_policy.platform : [
+      for statement in jsondecode(policy.policy).Statement :
+      statement.Condition.StringEquals["kms:ViaService"] == ["s3.cn-north-1.amazonaws.com.cn", "sqs.cn-north-1.amazonaws.com.cn"]
+      if statement.Sid == "UseTheKeyThroughBucketAndQueue"
+    ]]))
+    error_message = "the key must be reached by the partition's own service names"
+  }
+  assert {
+    condition     = startswith(output.dashboard_url, "https://cn-north-1.console.amazonaws.cn/cloudwatch/home?region=cn-north-1#")
+    error_message = output.dashboard_url
+  }
+}
+
+run "people" {
+  assert {
+    condition = alltrue([for user in ["viewer", "uploader", "operator"] : jsondecode(output.user_policies[user]) == jsondecode(
+      replace(file("policies/${user}.json.tftpl"), "$${bucket_arn}", "arn:aws:s3:::demo-123456789012-eu-central-1")
+    )]) && length(output.user_policies) == 3
+    error_message = "people must get the documents that the tests of the commands enforce"
+  }
+  assert {
+    condition = alltrue(flatten([for policy in output.user_policies : [
+      for statement in jsondecode(policy).Statement : [
+        for action in flatten([statement.Action]) : statement.Effect == "Allow" && !strcontains(action, "*")
+      ]
+    ]]))
+    error_message = "actions must be named one by one"
   }
 }

@@ -1,4 +1,4 @@
-//! Whole images: cost and error of each way on each scene.
+//! Whole images: cost and error of each backend on each scene.
 
 use anyhow::{Context, Result};
 use glam::DVec3;
@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::flip::flip;
 use super::rays;
+use crate::backends::{self, Backend, packets};
 use crate::cpu_time;
 use crate::oracle;
-use crate::tracers::{self, Tracer, packets};
 
 /// The deepest recursion that is measured: what the error of stopping early is taken against.
 pub(crate) const DEEPEST: u32 = 16;
@@ -30,9 +30,9 @@ pub(crate) struct Subject {
     pub(crate) deep: bool,
 }
 
-/// A way on a scene, at a depth.
+/// A backend on a scene, at a depth.
 pub(crate) struct Measurement {
-    pub(crate) tracer: String,
+    pub(crate) backend: String,
     pub(crate) bounces: u32,
     pub(crate) rays: u64,
     /// Of one image, on one thread: the median of the rounds.
@@ -41,7 +41,7 @@ pub(crate) struct Measurement {
     pub(crate) error: Error,
     /// Root mean square against the truth of the greatest depth, in levels.
     pub(crate) unfinished: f64,
-    /// Whether no other way and depth is both as fast and as close to the truth of the greatest depth.
+    /// Whether no other backend and depth is both as fast and as close to the truth of the greatest depth.
     pub(crate) on_front: bool,
 }
 
@@ -58,12 +58,12 @@ pub(crate) struct Error {
     pub(crate) nans: u64,
 }
 
-/// All ways on a scene.
+/// All backends on a scene.
 pub(crate) struct Comparison {
     pub(crate) scene: String,
     pub(crate) objects: usize,
     pub(crate) size: (u32, u32),
-    /// Way by way, each from the least depth to the greatest; depths that add no ray are left out.
+    /// Backend by backend, each from the least depth to the greatest; depths that add no ray are left out.
     pub(crate) measurements: Vec<Measurement>,
     pub(crate) truth: Truth,
 }
@@ -81,7 +81,7 @@ impl Comparison {
 
 /// The error of the image that the others are compared with.
 pub(crate) struct Truth {
-    pub(crate) tracer: String,
+    pub(crate) backend: String,
     /// Pixels that the oracle drew as well.
     pub(crate) samples: usize,
     /// Largest difference from the oracle in a channel, in levels; pixels that see another object apart.
@@ -93,18 +93,18 @@ pub(crate) struct Truth {
 
 /// An image that waits to be judged.
 struct Drawn {
-    tracer: String,
+    backend: String,
     depth: usize,
     image: RgbImage,
     nans: u64,
     seconds: Vec<f64>,
 }
 
-/// Draws the scene with every way at every depth in turn.
+/// Draws the scene with every backend at every depth in turn.
 pub(crate) fn compare(subject: &Subject) -> Result<Comparison> {
     let scene = &subject.scene;
     let counter = if subject.plain {
-        tracers::reference()
+        backends::reference()
     } else {
         packets("f64", RenderOptions { precision: Precision::F64, ..Default::default() })
     };
@@ -113,40 +113,40 @@ pub(crate) fn compare(subject: &Subject) -> Result<Comparison> {
         |bounces: &u32| *bounces == MAX_BOUNCES || counts[*bounces as usize] > counts[*bounces as usize - 1];
     let depths: Vec<u32> =
         if subject.deep { (1..=DEEPEST).filter(adds).collect() } else { vec![MAX_BOUNCES] };
-    let ways: Vec<Vec<Tracer>> = depths.iter().map(|&bounces| tracers::for_pictures(bounces)).collect();
-    let truth_of = |ways: &[Tracer]| if subject.plain { 0 } else { ways.len() - 1 };
+    let backends: Vec<Vec<Backend>> = depths.iter().map(|&bounces| backends::for_pictures(bounces)).collect();
+    let truth_of = |backends: &[Backend]| if subject.plain { 0 } else { backends.len() - 1 };
     let mut drawn: Vec<Drawn> = Vec::new();
-    for way in 0..ways[0].len() {
-        for (depth, ways) in ways.iter().enumerate() {
-            let tracer = &ways[way];
-            if way == 0 && !subject.plain {
+    for k in 0..backends[0].len() {
+        for (depth, backends) in backends.iter().enumerate() {
+            let backend = &backends[k];
+            if k == 0 && !subject.plain {
                 continue;
             }
             rayfold_tracer::take_nans();
-            let (seconds, image) = cpu_time::of(|| tracer.render(scene))?;
-            let (tracer, nans) = (tracer.name.clone(), rayfold_tracer::take_nans());
-            drawn.push(Drawn { tracer, depth, image: image?, nans, seconds: vec![seconds] });
+            let (seconds, image) = cpu_time::of(|| backend.render(scene))?;
+            let (backend, nans) = (backend.name.clone(), rayfold_tracer::take_nans());
+            drawn.push(Drawn { backend, depth, image: image?, nans, seconds: vec![seconds] });
         }
     }
     for _ in 1..subject.rounds {
         for one in &mut drawn {
             // The plain tracer takes long, and its time is no figure of interest.
-            let tracer = ways[one.depth].iter().skip(1).find(|tracer| tracer.name == one.tracer);
-            if let Some(tracer) = tracer {
-                let (seconds, image) = cpu_time::of(|| tracer.render(scene))?;
+            let backend = backends[one.depth].iter().skip(1).find(|backend| backend.name == one.backend);
+            if let Some(backend) = backend {
+                let (seconds, image) = cpu_time::of(|| backend.render(scene))?;
                 image?;
                 one.seconds.push(seconds);
             }
         }
     }
-    let truth = &ways[0][truth_of(&ways[0])];
+    let truth = &backends[0][truth_of(&backends[0])];
     let truths: Vec<&RgbImage> =
-        drawn.iter().filter(|one| one.tracer == truth.name).map(|one| &one.image).collect();
+        drawn.iter().filter(|one| one.backend == truth.name).map(|one| &one.image).collect();
     let last = truths.last().context("no truth")?;
     let mut measurements: Vec<Measurement> = drawn
         .par_iter()
         .map(|one| Measurement {
-            tracer: one.tracer.clone(),
+            backend: one.backend.clone(),
             bounces: depths[one.depth],
             rays: counts[depths[one.depth] as usize],
             seconds: cpu_time::median(one.seconds.clone()),
@@ -191,7 +191,7 @@ fn rmse(image: &RgbImage, truth: &RgbImage) -> f64 {
 }
 
 /// The truth's colours against the oracle's, at pixels spread evenly over the image.
-fn against_oracle(subject: &Subject, tracer: &Tracer, image: &RgbImage) -> Truth {
+fn against_oracle(subject: &Subject, backend: &Backend, image: &RgbImage) -> Truth {
     let scene = &subject.scene;
     let (width, height) = image.dimensions();
     let pixels = u64::from(width) * u64::from(height);
@@ -214,7 +214,7 @@ fn against_oracle(subject: &Subject, tracer: &Tracer, image: &RgbImage) -> Truth
     let other = if subject.plain { 0.5 } else { 2.0 };
     let near = |e: &&f64| **e <= other;
     Truth {
-        tracer: tracer.name.clone(),
+        backend: backend.name.clone(),
         samples: count,
         largest: errors.iter().filter(near).copied().fold(0.0, f64::max),
         off: errors.len() - errors.iter().filter(near).count(),

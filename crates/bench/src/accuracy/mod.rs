@@ -1,4 +1,4 @@
-//! `rayfold-bench accuracy`: how far each way to trace is from the truth, and what it costs.
+//! `rayfold-bench accuracy`: how far each backend is from the truth, and what it costs.
 
 mod flip;
 mod images;
@@ -12,11 +12,11 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use rayfold_tracer::MAX_BOUNCES;
 
+use crate::backends;
 use crate::cpu_time::{self, median};
 use crate::hard_cases::{CASES, SEED, Size, one_of_each};
 use crate::plot::{Labels, Series, log_log};
 use crate::scenes::{EXAMPLES, example, rock, table};
-use crate::tracers;
 use images::{Comparison, DEEPEST, Measurement, Subject, compare};
 
 /// What to measure.
@@ -69,14 +69,14 @@ fn introduction(quick: bool) -> String {
          Written by `cargo run --release -p rayfold-bench -- accuracy{command}`; all figures are of one run, with a load \
          of {load} (`/proc/loadavg`) when it ended. `... accuracy --hard-cases` measures the hard cases at full size and \
          writes `hard-cases.md`.\n\n\
-         Every way to trace draws the same scenes on one thread, in turn, and its processor time is taken (the machine \
+         Every backend draws the same scenes on one thread, in turn, and its processor time is taken (the machine \
          may be busy with other work; the median of the rounds is shown). `f32 naive` is the same packet machinery, tiles \
          and trees with textbook formulas: quadratic roots, edges and slabs without error bounds, rays that start 1e-4 off \
          their surface. `auto` is what users get: `f32 robust`, or `f64` where bounds on the errors of `f32` say so.\n\n\
          The truth is the plain `f64` tracer (`reference`) at the same depth, whose own error is measured against an oracle \
          that computes with 640 bits. *Depth* is how often light is followed through mirrors; {MAX_BOUNCES} is the \
          language's; up to {DEEPEST} are drawn, those that add rays. *Unfinished* is the root mean square of the difference \
-         from the truth at the greatest depth, rounding and stopping early together. *Front*: no other way and depth is both as fast and as close to that truth.\n\n\
+         from the truth at the greatest depth, rounding and stopping early together. *Front*: no other backend and depth is both as fast and as close to that truth.\n\n\
          RMSE and the largest error are in levels (0 to 255) over the three channels; FLIP is the mean of LDR-FLIP \
          (Andersson et al. 2020) at 67 pixels a degree; NaN counts channels that were not a number before they became \
          a level. Rays are those that the language asks for: from the camera, to each light that a surface faces, from \
@@ -107,12 +107,12 @@ fn cost_of_robustness(subjects: &[Subject], quick: bool) -> Result<String> {
     let pairs = if quick { 3 } else { 31 };
     let mut text = format!(
         "## What robustness costs\n\nCPU time of `f32 robust` over that of `f32 naive`, both by packets, drawn in turn {pairs} \
-         times: the ratio of the fastest, and the median of the ratios. The naive way has three kernels, the robust one for \
+         times: the ratio of the fastest, and the median of the ratios. The naive backend has three kernels, the robust one for \
          each kind of scene its own, which favours it.\n\n\
          | scene | naive, ms | robust, ms | fastest | median |\n| --- | --- | --- | --- | --- |\n"
     );
-    let ways = tracers::for_pictures(MAX_BOUNCES);
-    let find = |name: &str| ways.iter().find(|way| way.name == name).context("a way to trace");
+    let all = backends::for_pictures(MAX_BOUNCES);
+    let find = |name: &str| all.iter().find(|backend| backend.name == name).context("a backend");
     let (naive, robust) = (find("f32 naive")?, find("f32 robust")?);
     let named = |subject: &&Subject| EXAMPLES.contains(&subject.name.as_str());
     let others = |subject: &&Subject| ["table", "rock", "big mesh"].contains(&subject.name.as_str());
@@ -120,10 +120,10 @@ fn cost_of_robustness(subjects: &[Subject], quick: bool) -> Result<String> {
         let mut times = [Vec::new(), Vec::new()];
         for round in 0..pairs {
             // Each goes first every other time.
-            for way in [round % 2, 1 - round % 2] {
-                let (seconds, image) = cpu_time::of(|| [naive, robust][way].render(&subject.scene))?;
+            for which in [round % 2, 1 - round % 2] {
+                let (seconds, image) = cpu_time::of(|| [naive, robust][which].render(&subject.scene))?;
                 image?;
-                times[way].push(seconds);
+                times[which].push(seconds);
             }
         }
         let ratios = times[1].iter().zip(&times[0]).map(|(robust, naive)| robust / naive).collect();
@@ -150,16 +150,16 @@ fn tables(comparisons: &[Comparison]) -> Result<String> {
             text,
             "\n### {}\n\n{} objects, {} x {} pixels. The truth is drawn by `{}`; its own error at {} pixels: largest \
              {:.1e} levels, {} see something else than the oracle.\n\n\
-             | way | depth | CPU ms | rays | Mrays/s | RMSE | largest | off by > 2 | FLIP | NaN | unfinished | front |\n\
+             | backend | depth | CPU ms | rays | Mrays/s | RMSE | largest | off by > 2 | FLIP | NaN | unfinished | front |\n\
              | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
-            c.scene, c.objects, c.size.0, c.size.1, truth.tracer, truth.samples, truth.largest, truth.off
+            c.scene, c.objects, c.size.0, c.size.1, truth.backend, truth.samples, truth.largest, truth.off
         )?;
         for m in &c.measurements {
             let e = &m.error;
             writeln!(
                 text,
                 "| {} | {} | {:.2} | {} | {:.2} | {:.4} | {} | {} ({:.4} %) | {:.5} | {} | {:.4} | {} |",
-                m.tracer,
+                m.backend,
                 m.bounces,
                 1e3 * m.seconds,
                 m.rays,
@@ -184,12 +184,12 @@ const NONE: f64 = 1e-4;
 /// Error over time: all scenes at the language's depth, and each scene of mirrors over all depths.
 fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
     let mut text = String::from("## Error over time\n\n![Error over time](accuracy-images.svg)\n\n");
-    let ways = comparisons.first().map_or(0, |c| c.pictures().count());
-    let names = comparisons.first().into_iter().flat_map(Comparison::pictures).map(|m| m.tracer.clone());
+    let count = comparisons.first().map_or(0, |c| c.pictures().count());
+    let names = comparisons.first().into_iter().flat_map(Comparison::pictures).map(|m| m.backend.clone());
     let series: Vec<Series> = names
         .filter(|name| name != "reference")
         .map(|name| {
-            let pictures = comparisons.iter().flat_map(Comparison::pictures).filter(|m| m.tracer == name);
+            let pictures = comparisons.iter().flat_map(Comparison::pictures).filter(|m| m.backend == name);
             Series {
                 points: pictures.map(|m| (m.seconds, m.error.rmse.max(NONE))).collect(),
                 name,
@@ -203,13 +203,13 @@ fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
         y: "RMSE in levels (1e-4: none)",
     };
     log_log(&folder.join("accuracy-images.svg"), &labels, &series)?;
-    for c in comparisons.iter().filter(|c| c.measurements.len() > ways) {
+    for c in comparisons.iter().filter(|c| c.measurements.len() > count) {
         let mut series: Vec<Series> = Vec::new();
-        for m in c.measurements.iter().filter(|m| m.tracer != "reference") {
+        for m in c.measurements.iter().filter(|m| m.backend != "reference") {
             let point = |m: &Measurement| (m.seconds, m.unfinished.max(NONE));
             match series.last_mut() {
-                Some(last) if last.name == m.tracer => last.points.push(point(m)),
-                _ => series.push(Series { name: m.tracer.clone(), points: vec![point(m)], joined: true }),
+                Some(last) if last.name == m.backend => last.points.push(point(m)),
+                _ => series.push(Series { name: m.backend.clone(), points: vec![point(m)], joined: true }),
             }
         }
         let file = format!("accuracy-{}.svg", c.scene.replace(' ', "-"));
@@ -227,9 +227,9 @@ fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
 
 /// The hard cases as a table.
 fn hard_cases(size: Size, args: &Args) -> Result<String> {
-    let mut tracers = tracers::all();
-    tracers.push(naive::tracer());
-    let textbook = naive::tracer().name;
+    let mut backends = backends::all();
+    backends.push(naive::backend());
+    let textbook = naive::backend().name;
     let quick = if size == Size::Quick { " --quick" } else { "" };
     let mut text = String::from(
         "| case | what | way | figure | bound | of | |\n| --- | --- | --- | --- | --- | --- | --- |\n",
@@ -245,19 +245,19 @@ fn hard_cases(size: Size, args: &Args) -> Result<String> {
     let mut times = String::from("\nSeconds by the clock that each case took, all ways together:");
     for case in CASES.iter().filter(|case| chosen(case.number)) {
         let began = Instant::now();
-        for figure in case.figures(&tracers, size)? {
+        for figure in case.figures(&backends, size)? {
             let bound = figure.bound.map_or("none".into(), |bound| format!("{bound:.1e}"));
             let verdict = if figure.passes() { "ok" } else { "**fails**" };
-            if !figure.passes() && figure.tracer != textbook {
+            if !figure.passes() && figure.backend != textbook {
                 beyond.push(format!(
                     "- {} {}, {}: {}, {:.2e} where {bound} is asked for, of {}\n",
-                    case.number, case.title, figure.tracer, figure.what, figure.measured, figure.samples
+                    case.number, case.title, figure.backend, figure.what, figure.measured, figure.samples
                 ));
             }
             writeln!(
                 text,
                 "| {} {} | {} | {} | {:.2e} | {bound} | {} | {verdict} |",
-                case.number, case.title, figure.what, figure.tracer, figure.measured, figure.samples
+                case.number, case.title, figure.what, figure.backend, figure.measured, figure.samples
             )?;
         }
         eprintln!("hard case {}: {}, {:.1} s", case.number, case.title, began.elapsed().as_secs_f64());

@@ -8,15 +8,15 @@ use image::RgbImage;
 use rayfold_scene::{Light, Object, Scene};
 use rayfold_tracer::MAX_BOUNCES;
 
+use crate::backends::{Arithmetic, Backend, Hit, Ray};
 use crate::scenes::pixel_ray;
-use crate::tracers::{Arithmetic, Hit, Ray, Tracer};
 
 /// How far from a surface a ray starts, in world units, as if all scenes had the same size.
 const EPSILON: f32 = 1e-4;
 
-/// The way itself.
-pub(crate) fn tracer() -> Tracer {
-    Tracer::new(
+/// The backend itself.
+pub(crate) fn backend() -> Backend {
+    Backend::new(
         "f32 naive, scalar",
         Arithmetic::Single,
         |scene, rays| {

@@ -4,12 +4,12 @@ use anyhow::Result;
 use glam::DVec3;
 use rayfold_scene::{Light, Scene, model::unit};
 
+use crate::backends::{Backend, Ray};
 use crate::scenes::pixel_ray;
-use crate::tracers::{Ray, Tracer};
 
 /// Rays from the camera, to lights and from mirrors, followed through 0, 1, 2 and so on up to `bounces` mirrors: what
 /// the language asks for, whatever a tracer saves.
-pub(crate) fn count(scene: &Scene, tracer: &Tracer, bounces: u32) -> Result<Vec<u64>> {
+pub(crate) fn count(scene: &Scene, backend: &Backend, bounces: u32) -> Result<Vec<u64>> {
     let (width, height) = (scene.screen.width(), scene.screen.height());
     let mut rays: Vec<Ray> = (0..width * height).map(|k| pixel_ray(scene, k % width, k / width)).collect();
     let mut counts = Vec::new();
@@ -17,7 +17,7 @@ pub(crate) fn count(scene: &Scene, tracer: &Tracer, bounces: u32) -> Result<Vec<
     for _ in 0..=bounces {
         total += rays.len() as u64;
         let mut mirrored = Vec::new();
-        for (ray, hit) in rays.iter().zip(tracer.nearest(scene, &rays)?) {
+        for (ray, hit) in rays.iter().zip(backend.nearest(scene, &rays)?) {
             let Some(hit) = hit else { continue };
             let normal = hit.normal;
             let lit = |light: &&Light| {

@@ -4,10 +4,11 @@ use anyhow::Result;
 use glam::DVec3;
 use rayfold_scene::{Material, Object, Sphere};
 
-use super::{Figures, Size, objects_only, random, worse};
+use super::figures::{Figures, Size, worse};
+use super::setup::{objects_only, random};
+use crate::backends::{Backend, Ray};
 use crate::oracle::{self, Real, Vector};
 use crate::scenes::single;
-use crate::tracers::{Ray, Tracer};
 
 /// Mirrorings that are followed.
 const BOUNCES: usize = 5;
@@ -25,7 +26,7 @@ fn exact(objects: &[Object], origin: &Vector, direction: &Vector) -> Option<Vect
 
 /// Rays about along the axis between a sphere and one a hundred times larger; the error of the last direction over
 /// what a small change of the first direction or position becomes by then.
-pub(super) fn face_to_face(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn face_to_face(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let surface = Material::new(DVec3::ZERO, DVec3::ZERO, DVec3::ONE)?;
     let objects = [
         Object::Sphere(Sphere::new(100.0, DVec3::new(0.0, 0.0, -101.0), surface)?),
@@ -55,26 +56,26 @@ pub(super) fn face_to_face(tracers: &[Tracer], size: Size, figures: &mut Figures
         starts.push((Ray { origin, direction }, last.to_dvec3(), growth));
     }
     anyhow::ensure!(starts.len() >= size.pick(15, 500), "rays leave the mirrors early");
-    for tracer in tracers {
+    for backend in backends {
         let mut worst = 0f64;
         for (start, last, growth) in &starts {
             let mut ray = *start;
             for _ in 0..BOUNCES {
-                let Some(hit) = tracer.nearest(&scene, &[ray])?[0] else {
+                let Some(hit) = backend.nearest(&scene, &[ray])?[0] else {
                     ray.direction = DVec3::NAN;
                     break;
                 };
                 let point = ray.origin + hit.t * ray.direction;
                 let mirrored = ray.direction - 2.0 * ray.direction.dot(hit.normal) * hit.normal;
                 // Off the surface by what the distance is uncertain.
-                let origin = point + 4.0 * tracer.ulp(100.0) * hit.normal;
+                let origin = point + 4.0 * backend.ulp(100.0) * hit.normal;
                 ray = Ray { origin, direction: mirrored.normalize() };
             }
             worst = worse(worst, (ray.direction - last).length() / growth);
         }
         let grown = starts.iter().map(|(_, _, growth)| *growth).fold(0.0, f64::max);
         figures.add(
-            tracer,
+            backend,
             format!("direction after {BOUNCES} bounces, over its growth of {grown:.0}"),
             starts.len(),
             worst,

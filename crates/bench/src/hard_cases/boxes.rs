@@ -4,8 +4,9 @@ use anyhow::Result;
 use glam::DVec3;
 use rayfold_scene::{Cuboid, Material, Object};
 
-use super::{Figures, Size, from_eyes, truths};
-use crate::tracers::{Ray, Tracer};
+use super::figures::{Figures, Size};
+use super::setup::{from_eyes, truths};
+use crate::backends::{Backend, Ray};
 
 fn cuboid(corners: [DVec3; 2]) -> Result<Object> {
     Ok(Object::Cuboid(Cuboid::new(corners, Material::default())?))
@@ -48,18 +49,18 @@ fn along_faces(corners: [DVec3; 2]) -> Vec<Ray> {
     rays
 }
 
-fn wrong(tracers: &[Tracer], boxes: &[[DVec3; 2]], figures: &mut Figures) -> Result<()> {
-    for tracer in tracers {
+fn wrong(backends: &[Backend], boxes: &[[DVec3; 2]], figures: &mut Figures) -> Result<()> {
+    for backend in backends {
         let (mut decisions, mut normals, mut distance, mut count) = (0, 0, 0f64, 0);
         for &corners in boxes {
             let object = cuboid(corners)?;
             let rays = along_faces(corners);
             let truths = truths(&[object], &rays);
-            for ((ray, truth), hit) in rays.iter().zip(truths).zip(from_eyes(tracer, object, &rays)?) {
+            for ((ray, truth), hit) in rays.iter().zip(truths).zip(from_eyes(backend, object, &rays)?) {
                 count += 1;
                 match (truth, hit) {
                     (Some(truth), Some(hit)) => {
-                        let ulps = (hit.t - truth.t).abs() / tracer.ulp(truth.t);
+                        let ulps = (hit.t - truth.t).abs() / backend.ulp(truth.t);
                         distance = distance.max(ulps);
                         // On an edge either face will do.
                         let faces = hit.normal.abs().max_element() == 1.0 && hit.normal.length() == 1.0;
@@ -74,22 +75,22 @@ fn wrong(tracers: &[Tracer], boxes: &[[DVec3; 2]], figures: &mut Figures) -> Res
                 }
             }
         }
-        figures.add(tracer, "wrong hits and misses", count, decisions as f64, 0.0);
-        figures.add(tracer, "wrong normals", count, normals as f64, 0.0);
-        figures.add(tracer, "t, ulp", count, distance, 4.0);
+        figures.add(backend, "wrong hits and misses", count, decisions as f64, 0.0);
+        figures.add(backend, "wrong normals", count, normals as f64, 0.0);
+        figures.add(backend, "t, ulp", count, distance, 4.0);
     }
     Ok(())
 }
 
 /// Rays parallel to one or two pairs of faces, outside, on and between them.
-pub(super) fn parallel(tracers: &[Tracer], _: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn parallel(backends: &[Backend], _: Size, figures: &mut Figures) -> Result<()> {
     let boxes =
         [[DVec3::splat(-1.0), DVec3::splat(1.0)], [DVec3::new(0.0, 1.0, -8.0), DVec3::new(2.0, 1.5, -0.5)]];
-    wrong(tracers, &boxes, figures)
+    wrong(backends, &boxes, figures)
 }
 
 /// The same rays on boxes that are a rectangle, a segment, a point.
-pub(super) fn flat(tracers: &[Tracer], _: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn flat(backends: &[Backend], _: Size, figures: &mut Figures) -> Result<()> {
     let mut boxes = Vec::new();
     for axis in 0..3 {
         let mut upper = DVec3::new(1.0, 2.0, 3.0);
@@ -100,5 +101,5 @@ pub(super) fn flat(tracers: &[Tracer], _: Size, figures: &mut Figures) -> Result
         boxes.push([DVec3::splat(-1.0), segment]);
     }
     boxes.push([DVec3::splat(0.5); 2]);
-    wrong(tracers, &boxes, figures)
+    wrong(backends, &boxes, figures)
 }

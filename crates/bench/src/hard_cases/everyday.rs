@@ -6,10 +6,11 @@ use fastrand::Rng;
 use glam::DVec3;
 use rayfold_scene::{Camera, Cuboid, Material, Object, Pinhole, Scene, Screen, Sphere, Triangle};
 
+use super::figures::{Figures, Size};
 use super::nasty::{Kind, judge_kinds};
-use super::{Figures, Size, direction};
+use super::setup::direction;
+use crate::backends::Backend;
 use crate::scenes::{icosphere, light, looking_at};
-use crate::tracers::Tracer;
 
 pub(super) const KINDS: &[Kind] = &[
     ("things at rest on a floor", at_rest),
@@ -25,9 +26,9 @@ pub(super) const KINDS: &[Kind] = &[
 /// The share of pixels that may be wrong.
 const FEW: f64 = 1e-4;
 
-/// Every way on every kind of scene.
-pub(super) fn scenes(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
-    judge_kinds(KINDS, FEW, tracers, size, figures)
+/// Every backend on every kind of scene.
+pub(super) fn scenes(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
+    judge_kinds(KINDS, FEW, backends, size, figures)
 }
 
 /// A number with one decimal place.

@@ -4,31 +4,37 @@ use anyhow::Result;
 use glam::DVec3;
 use rayfold_scene::{Camera, DirectionalLight, Light, Limits, Material, Object, Scene, Screen, Sphere};
 
+use super::figures::{Figures, Size};
 use super::images::off_by_more_than;
-use super::{Figures, Size};
+use crate::backends::Backend;
 use crate::oracle;
 use crate::scenes::{light, looking_at, moved, table};
-use crate::tracers::Tracer;
 
 /// Infinite inputs are errors; scenes of any size and colours of any brightness are drawn as the oracle draws them.
-pub(super) fn inputs(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn inputs(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let accepted = infinite_inputs();
     let side = size.pick(48, 192);
     let scene = table(side, side)?;
-    for tracer in tracers {
-        figures.add(tracer, "infinite inputs accepted", accepted.1, accepted.0 as f64, 0.0);
-        let image = tracer.render(&scene)?;
+    for backend in backends {
+        figures.add(backend, "infinite inputs accepted", accepted.1, accepted.0 as f64, 0.0);
+        let image = backend.render(&scene)?;
         for exponent in [-1000, -500, -140, 140, 500, 1000] {
-            let other = tracer.render(&moved(&scene, 2f64.powi(exponent), DVec3::ZERO)?)?;
+            let other = backend.render(&moved(&scene, 2f64.powi(exponent), DVec3::ZERO)?)?;
             let off = off_by_more_than(2, &image, &other);
             let what = format!("pixels off by > 2 levels, scaled by 2^{exponent}");
-            figures.add(tracer, what, image.pixels().len(), off as f64, 0.0005 * image.pixels().len() as f64);
+            figures.add(
+                backend,
+                what,
+                image.pixels().len(),
+                off as f64,
+                0.0005 * image.pixels().len() as f64,
+            );
         }
         for (what, scene) in bright_and_dim()? {
             let truth = oracle::image(&scene);
-            let off = off_by_more_than(2, &truth, &tracer.render(&scene)?);
+            let off = off_by_more_than(2, &truth, &backend.render(&scene)?);
             figures.add(
-                tracer,
+                backend,
                 format!("pixels off by > 2 levels, {what}"),
                 truth.pixels().len(),
                 off as f64,

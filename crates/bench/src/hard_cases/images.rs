@@ -6,10 +6,10 @@ use image::RgbImage;
 use rayfold_scene::{Cuboid, Light, Material, Object, Scene, Screen, Sphere, Triangle, model::unit};
 use rayon::prelude::*;
 
-use super::{Figures, Size};
+use super::figures::{Figures, Size};
+use crate::backends::{Backend, reference};
 use crate::oracle;
 use crate::scenes::{icosphere, light, looking_at, moved, single, table};
-use crate::tracers::{Tracer, reference};
 
 /// How many pixels differ by more than `levels` in a channel.
 pub(super) fn off_by_more_than(levels: u8, a: &RgbImage, b: &RgbImage) -> usize {
@@ -24,50 +24,50 @@ fn few(image: &RgbImage) -> f64 {
 }
 
 /// The same image bit for bit.
-pub(super) fn scaled_by_two(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn scaled_by_two(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let side = size.pick(96, 384);
     let scene = table(side, side)?;
-    for tracer in tracers {
-        let image = tracer.render(&scene)?;
+    for backend in backends {
+        let image = backend.render(&scene)?;
         let mut different = 0;
         let exponents = size.pick(vec![-20, -7, -1, 3, 20], (-20..=20).collect());
         for &exponent in &exponents {
-            let other = tracer.render(&moved(&scene, 2f64.powi(exponent), DVec3::ZERO)?)?;
+            let other = backend.render(&moved(&scene, 2f64.powi(exponent), DVec3::ZERO)?)?;
             different += off_by_more_than(0, &image, &other);
         }
         let pixels = exponents.len() * image.pixels().len();
-        figures.add(tracer, "pixels that differ at all", pixels, different as f64, 0.0);
+        figures.add(backend, "pixels that differ at all", pixels, different as f64, 0.0);
     }
     Ok(())
 }
 
 /// The same image but for rounding.
-pub(super) fn scaled_by_ten(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn scaled_by_ten(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let side = size.pick(96, 384);
     let scene = table(side, side)?;
-    for tracer in tracers {
-        let image = tracer.render(&scene)?;
+    for backend in backends {
+        let image = backend.render(&scene)?;
         let mut worst = 0;
         for exponent in size.pick(vec![-6, -1, 3, 6], (-6..=6).collect()) {
-            let other = tracer.render(&moved(&scene, 10f64.powi(exponent), DVec3::ZERO)?)?;
+            let other = backend.render(&moved(&scene, 10f64.powi(exponent), DVec3::ZERO)?)?;
             worst = worst.max(off_by_more_than(2, &image, &other));
         }
-        figures.add(tracer, "pixels off by > 2 levels", image.pixels().len(), worst as f64, few(&image));
+        figures.add(backend, "pixels off by > 2 levels", image.pixels().len(), worst as f64, few(&image));
     }
     Ok(())
 }
 
 /// The same image but for the rounding of positions.
-pub(super) fn far_from_the_origin(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn far_from_the_origin(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let side = size.pick(96, 384);
     let scene = moved(&table(side, side)?, 0.1, DVec3::ZERO)?;
-    for tracer in tracers {
-        let image = tracer.render(&scene)?;
+    for backend in backends {
+        let image = backend.render(&scene)?;
         for offset in [DVec3::new(1e6, 0.0, 0.0), DVec3::new(-1e6, 1e6, 1e6)] {
-            let other = tracer.render(&moved(&scene, 1.0, offset)?)?;
+            let other = backend.render(&moved(&scene, 1.0, offset)?)?;
             let off = off_by_more_than(2, &image, &other);
             let what = format!("pixels off by > 2 levels, at {offset}");
-            figures.add(tracer, what, image.pixels().len(), off as f64, few(&image));
+            figures.add(backend, what, image.pixels().len(), off as f64, few(&image));
         }
     }
     Ok(())
@@ -77,7 +77,7 @@ fn matte() -> Result<Material> {
     Ok(Material::new(DVec3::splat(0.1), DVec3::splat(0.8), DVec3::ZERO)?)
 }
 
-/// Material and normal of what each pixel shows; `None` on the background and at outlines, where a way that rounds may
+/// Material and normal of what each pixel shows; `None` on the background and at outlines, where a backend that rounds may
 /// see a neighbour.
 fn visible(scene: &Scene) -> Vec<Option<(Material, DVec3)>> {
     let (width, height) = (scene.screen.width(), scene.screen.height());
@@ -118,7 +118,7 @@ fn speckles(image: &RgbImage, expected: &[Option<[u8; 3]>]) -> usize {
 }
 
 /// Convex bodies, lit from the side, small and large, near the origin and not.
-pub(super) fn acne(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn acne(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let surface = matte()?;
     let corners = [[1.0, 1.0, 1.0], [-1.0, -1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0]].map(DVec3::from);
     let tetrahedron = (0..4)
@@ -144,19 +144,19 @@ pub(super) fn acne(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Res
             }
         }
     }
-    for tracer in tracers {
+    for backend in backends {
         let mut spots = 0;
         for (scene, expected) in &scenes {
-            spots += speckles(&tracer.render(scene)?, expected);
+            spots += speckles(&backend.render(scene)?, expected);
         }
         let pixels = scenes.iter().map(|(_, expected)| expected.iter().flatten().count()).sum();
-        figures.add(tracer, "acne pixels", pixels, spots as f64, 0.0);
+        figures.add(backend, "acne pixels", pixels, spots as f64, 0.0);
     }
     Ok(())
 }
 
 /// A coarse mesh in light that almost runs along its facets.
-pub(super) fn grazing_light(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn grazing_light(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let surface = matte()?;
     let side = size.pick(48, 384);
     let screen = Screen::new(side, side)?;
@@ -173,20 +173,20 @@ pub(super) fn grazing_light(tracers: &[Tracer], size: Size, figures: &mut Figure
         scene.lights = vec![light(0.9, direction)?].into();
         scenes.push((scene.clone(), without_shadows(&visible, &scene.lights)));
     }
-    for tracer in tracers {
+    for backend in backends {
         let mut spots = 0;
         for (scene, expected) in &scenes {
-            spots += speckles(&tracer.render(scene)?, expected);
+            spots += speckles(&backend.render(scene)?, expected);
         }
         let pixels = scenes.iter().map(|(_, expected)| expected.iter().flatten().count()).sum();
-        figures.add(tracer, "pixels off flat shading by > 2 levels", pixels, spots as f64, 0.0);
+        figures.add(backend, "pixels off flat shading by > 2 levels", pixels, spots as f64, 0.0);
     }
     Ok(())
 }
 
 /// Bodies that hover over a floor by 1e-4 of their size: light that leaks in under them, more than a pixel from where
 /// the oracle says that the shadow ends.
-pub(super) fn contact_shadow(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn contact_shadow(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let surface = matte()?;
     let side = size.pick(64, 384);
     let screen = Screen::new(side, side)?;
@@ -198,8 +198,8 @@ pub(super) fn contact_shadow(tracers: &[Tracer], size: Size, figures: &mut Figur
     scene.lights = vec![light(0.9, [-0.5, -1.0, -0.7])?].into();
     let truth = oracle::image(&scene);
     anyhow::ensure!(off_by_more_than(2, &truth, &reference().render(&scene)?) <= truth.pixels().len() / 100);
-    for tracer in tracers {
-        let image = tracer.render(&scene)?;
+    for backend in backends {
+        let image = backend.render(&scene)?;
         let alike =
             |p: image::Rgb<u8>, q: image::Rgb<u8>| p.0.iter().zip(q.0).all(|(p, q)| p.abs_diff(q) <= 3);
         let leaks = image.enumerate_pixels().filter(|&(x, y, &pixel)| {
@@ -211,7 +211,7 @@ pub(super) fn contact_shadow(tracers: &[Tracer], size: Size, figures: &mut Figur
             !known
         });
         figures.add(
-            tracer,
+            backend,
             "pixels of no colour within a pixel of the oracle's",
             truth.pixels().len(),
             leaks.count() as f64,

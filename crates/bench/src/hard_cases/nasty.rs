@@ -1,4 +1,4 @@
-//! Scenes drawn at random from what breaks ray tracers, each way judged pixel by pixel by the oracle.
+//! Scenes drawn at random from what breaks ray tracers, each backend judged pixel by pixel by the oracle.
 //!
 //! A pixel is wrong when its colour is off by more than 2 levels from every colour that the oracle sees within a
 //! sixteenth of a pixel: what an outline, a shadow's edge or a chain of mirrors makes of a rounding error is not held
@@ -11,10 +11,11 @@ use image::RgbImage;
 use rayfold_scene::{Camera, Cuboid, Material, Object, Pinhole, Scene, Screen, Sphere, Triangle};
 use rayon::prelude::*;
 
-use super::{Figures, Size, direction, unless_single};
+use super::figures::{Figures, Size, unless_single};
+use super::setup::direction;
+use crate::backends::{Backend, reference};
 use crate::oracle;
 use crate::scenes::{light, moved};
-use crate::tracers::{Tracer, reference};
 
 /// How far from the pixel, in pixels, an error may show what is not there.
 const BESIDE: f64 = 1.0 / 16.0;
@@ -72,46 +73,46 @@ pub(super) fn first_seed() -> u64 {
     std::env::var("RAYFOLD_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(super::SEED)
 }
 
-/// Every way on every kind of scene.
-pub(super) fn scenes(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
-    judge_kinds(KINDS, FEW, tracers, size, figures)
+/// Every backend on every kind of scene.
+pub(super) fn scenes(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
+    judge_kinds(KINDS, FEW, backends, size, figures)
 }
 
-/// Every way on scenes of these kinds; `few` is the share of pixels that may be wrong.
+/// Every backend on scenes of these kinds; `few` is the share of pixels that may be wrong.
 pub(super) fn judge_kinds(
     kinds: &[Kind],
     few: f64,
-    tracers: &[Tracer],
+    backends: &[Backend],
     size: Size,
     figures: &mut Figures,
 ) -> Result<()> {
     let rounds = size.pick(2, 60);
     let first = first_seed() / kinds.len() as u64 * kinds.len() as u64;
     for (kind, (name, make)) in (0..).zip(kinds) {
-        let mut wrong = vec![Vec::new(); tracers.len()];
+        let mut wrong = vec![Vec::new(); backends.len()];
         let mut pixels = 0;
         for round in 0..rounds {
             let seed = first + round * kinds.len() as u64 + kind;
             let scene = make(&mut Rng::with_seed(seed))?;
             pixels += scene.screen.pixels() as usize;
-            let drawn = tracers.iter().map(|tracer| tracer.render(&scene)).collect::<Result<Vec<_>>>()?;
+            let drawn = backends.iter().map(|backend| backend.render(&scene)).collect::<Result<Vec<_>>>()?;
             for (wrong, count) in wrong.iter_mut().zip(judge(&scene, &drawn, size.pick(30, 100), seed)?) {
                 if count > 0 {
                     wrong.push((seed, count));
                 }
             }
         }
-        for (tracer, wrong) in tracers.iter().zip(wrong) {
+        for (backend, wrong) in backends.iter().zip(wrong) {
             let count: usize = wrong.iter().map(|(_, count)| count).sum();
             let bound = few * pixels as f64;
             let seeds: Vec<String> = wrong.iter().take(4).map(|(seed, _)| seed.to_string()).collect();
             let seeds = if seeds.is_empty() { String::new() } else { format!(", seeds {}", seeds.join(" ")) };
             figures.add(
-                tracer,
+                backend,
                 format!("{name}: wrong pixels{seeds}"),
                 pixels,
                 count as f64,
-                unless_single(tracer, bound),
+                unless_single(backend, bound),
             );
         }
     }

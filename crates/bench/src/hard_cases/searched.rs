@@ -5,9 +5,10 @@ use fastrand::Rng;
 use rayfold_tracer::{Precision, RenderOptions};
 use rayon::prelude::*;
 
+use super::figures::{Figures, Size};
 use super::nasty::{Kind, first_seed};
-use super::{Figures, Size, everyday, nasty};
-use crate::tracers::{Tracer, packets};
+use super::{everyday, nasty};
+use crate::backends::{Backend, packets};
 
 /// Seeds of scenes where a tile or a leaf once ended a triangle that is thin, or seen from the side.
 const ONCE_TOLD_APART: [&[u64]; 2] = [
@@ -16,7 +17,7 @@ const ONCE_TOLD_APART: [&[u64]; 2] = [
 ];
 
 /// Each scene searched in every way: the same picture bit for bit.
-pub(super) fn scenes(_: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn scenes(_: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let kinds = [nasty::KINDS, everyday::KINDS];
     let mut seeds: Vec<(&[Kind], u64)> = Vec::new();
     for (kinds, told_apart) in kinds.into_iter().zip(ONCE_TOLD_APART) {
@@ -26,7 +27,7 @@ pub(super) fn scenes(_: &[Tracer], size: Size, figures: &mut Figures) -> Result<
     for precision in [Precision::F32, Precision::F64] {
         let options = RenderOptions { precision, ..Default::default() };
         let expected = packets(format!("{precision:?}"), options);
-        let ways = [
+        let backends = [
             ("by a tree", RenderOptions { tree: Some(true), ..options }),
             ("without a tree", RenderOptions { tree: Some(false), ..options }),
             ("4 x 4 tiles", RenderOptions { tile: Some((4, 4)), ..options }),
@@ -39,14 +40,14 @@ pub(super) fn scenes(_: &[Tracer], size: Size, figures: &mut Figures) -> Result<
                 let (_, make) = kinds[(seed % kinds.len() as u64) as usize];
                 let scene = make(&mut Rng::with_seed(seed))?;
                 let expected = expected.render(&scene)?;
-                let differing = |way: &Tracer| -> Result<usize> {
-                    let image = way.render(&scene)?;
+                let differing = |backend: &Backend| -> Result<usize> {
+                    let image = backend.render(&scene)?;
                     Ok(image.pixels().zip(expected.pixels()).filter(|(a, b)| a != b).count())
                 };
-                ways.iter().map(differing).collect::<Result<Vec<_>>>()
+                backends.iter().map(differing).collect::<Result<Vec<_>>>()
             })
             .collect::<Result<Vec<_>>>()?;
-        for (k, way) in ways.iter().enumerate() {
+        for (k, backend) in backends.iter().enumerate() {
             let count: usize = counts.iter().map(|of| of[k]).sum();
             let told_apart: Vec<String> = counts
                 .iter()
@@ -58,7 +59,7 @@ pub(super) fn scenes(_: &[Tracer], size: Size, figures: &mut Figures) -> Result<
                 })
                 .collect();
             let what = format!("pixels that differ{}", told_apart.concat());
-            figures.add(way, what, seeds.len(), count as f64, 0.0);
+            figures.add(backend, what, seeds.len(), count as f64, 0.0);
         }
     }
     Ok(())

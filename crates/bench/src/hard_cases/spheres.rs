@@ -4,13 +4,11 @@ use anyhow::Result;
 use glam::DVec3;
 use rayfold_scene::{Cuboid, Material, Object, Sphere};
 
-use super::{
-    Figures, Size, aimed, direction, from_eyes, objects_only, objects_seen, random, truths, unless_single,
-    worse,
-};
+use super::figures::{Figures, Size, unless_single, worse};
+use super::setup::{aimed, direction, from_eyes, objects_only, objects_seen, random, truths};
+use crate::backends::{Arithmetic, Backend, Ray};
 use crate::oracle::{nearest, sphere_clearance};
 use crate::scenes::single;
-use crate::tracers::{Arithmetic, Ray, Tracer};
 
 fn sphere(radius: f64, center: DVec3) -> Result<Sphere> {
     Ok(Sphere::new(radius, center, Material::default())?)
@@ -18,11 +16,11 @@ fn sphere(radius: f64, center: DVec3) -> Result<Sphere> {
 
 /// Wrong only within 4 ulp (of the origin's distance, the largest number that takes part) of the limb; the error of the
 /// distance for rays through the inner 0.99 r.
-pub(super) fn distant(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn distant(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     for distance in [1e1, 1e2, 1e3, 1e4, 1e6] {
         let mut rng = random(1);
         let (spheres, each) = (size.pick(5, 100), size.pick(40, 200));
-        let mut worst = vec![(0f64, 0f64); tracers.len()];
+        let mut worst = vec![(0f64, 0f64); backends.len()];
         for _ in 0..spheres {
             let origin = single(direction(&mut rng));
             let ball = sphere(1.0, single(origin + distance * direction(&mut rng)))?;
@@ -37,8 +35,8 @@ pub(super) fn distant(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
                 .collect();
             let truths = truths(&objects, &rays);
             let scene = objects_seen(objects.to_vec(), origin, ball.center(), 2.5 / distance)?;
-            for (tracer, worst) in tracers.iter().zip(&mut worst) {
-                for ((ray, truth), hit) in rays.iter().zip(&truths).zip(tracer.nearest(&scene, &rays)?) {
+            for (backend, worst) in backends.iter().zip(&mut worst) {
+                for ((ray, truth), hit) in rays.iter().zip(&truths).zip(backend.nearest(&scene, &rays)?) {
                     let clearance = sphere_clearance(&ball, ray.origin, ray.direction);
                     match (truth, hit) {
                         (Some(truth), Some(hit)) if clearance < -0.01 => {
@@ -46,33 +44,33 @@ pub(super) fn distant(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
                             worst.1 = worse(worst.1, error);
                         }
                         (Some(_), Some(_)) | (None, None) => {}
-                        _ => worst.0 = worse(worst.0, clearance.abs() / tracer.ulp(distance)),
+                        _ => worst.0 = worse(worst.0, clearance.abs() / backend.ulp(distance)),
                     }
                 }
             }
         }
-        for (tracer, (limb, error)) in tracers.iter().zip(worst) {
+        for (backend, (limb, error)) in backends.iter().zip(worst) {
             let all = spheres * each;
             // Beyond 1e4 radii `f32` alone promises nothing: there the program chooses `f64`.
             let near = distance <= 1e4;
-            let double = tracer.arithmetic == Arithmetic::Double || !near;
+            let double = backend.arithmetic == Arithmetic::Double || !near;
             let bound = if double { 1e-8 } else { 1e-6 * distance };
-            let promised = |bound| if near { Some(bound) } else { unless_single(tracer, bound) };
+            let promised = |bound| if near { Some(bound) } else { unless_single(backend, bound) };
             figures.add(
-                tracer,
+                backend,
                 format!("at {distance:e} r, wrong hit or miss off the limb, ulp of the distance"),
                 all,
                 limb,
                 promised(4.0),
             );
-            figures.add(tracer, format!("at {distance:e} r, dt/r"), all, error, promised(bound));
+            figures.add(backend, format!("at {distance:e} r, dt/r"), all, error, promised(bound));
         }
     }
     Ok(())
 }
 
 /// The relative error of the distance to the ground.
-pub(super) fn horizon(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn horizon(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     const RADIUS: f64 = 1e7;
     let objects = [Object::Sphere(sphere(RADIUS, DVec3::new(0.0, -RADIUS, 0.0))?)];
     let scene = objects_seen(objects.to_vec(), DVec3::Y, DVec3::new(1.0, 0.5, 0.0), 1.0)?;
@@ -89,30 +87,30 @@ pub(super) fn horizon(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
             })
             .collect();
         let truths = truths(&objects, &rays);
-        for tracer in tracers {
+        for backend in backends {
             let worst =
-                truths.iter().zip(tracer.nearest(&scene, &rays)?).fold(0.0, |worst, pair| match pair {
+                truths.iter().zip(backend.nearest(&scene, &rays)?).fold(0.0, |worst, pair| match pair {
                     (Some(truth), Some(hit)) => worse(worst, (hit.t - truth.t).abs() / truth.t),
                     (None, None) => worst,
                     _ => f64::INFINITY,
                 });
-            let bound = if least < 0.1 { unless_single(tracer, 5e-6) } else { Some(5e-6) };
-            figures.add(tracer, format!("relative t, {what}"), rays.len(), worst, bound);
+            let bound = if least < 0.1 { unless_single(backend, 5e-6) } else { Some(5e-6) };
+            figures.add(backend, format!("relative t, {what}"), rays.len(), worst, bound);
         }
     }
     Ok(())
 }
 
 /// Rays whose line passes the centre at r + k ulp: along the axes, where the ray is exact, and askew.
-pub(super) fn tangent(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
-    for tracer in tracers {
+pub(super) fn tangent(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
+    for backend in backends {
         let (mut axial, mut askew, mut invalid, mut count) = (0f64, 0f64, 0, 0);
         let mut rng = random(4);
         for radius in [1.0, 3.0, single(DVec3::splat(0.1)).x, 1e3, 12_345.0] {
             let ball = sphere(radius, DVec3::ZERO)?;
             let objects = [Object::Sphere(ball)];
             let scene = objects_only(objects.to_vec())?;
-            let ulp = tracer.ulp(radius);
+            let ulp = backend.ulp(radius);
             let mut rays = Vec::new();
             for k in -16..=16 {
                 let aside = radius + f64::from(k) * ulp;
@@ -129,14 +127,14 @@ pub(super) fn tangent(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
                 let aside = direction(&mut rng).cross(towards).normalize_or_zero();
                 let graze = 1.0 + (rng.f64() - 0.5) * 64.0 * ulp / radius;
                 let (eye, goal) = (radius * (1.5 * towards), radius * (graze * aside - 0.2 * towards));
-                rays.push(match tracer.arithmetic {
+                rays.push(match backend.arithmetic {
                     Arithmetic::Double => Ray { origin: eye, direction: (goal - eye).normalize() },
                     Arithmetic::Single | Arithmetic::Chosen => aimed(eye, goal),
                 });
             }
             let truths = truths(&objects, &rays);
             for (k, ((ray, truth), hit)) in
-                rays.iter().zip(&truths).zip(tracer.nearest(&scene, &rays)?).enumerate()
+                rays.iter().zip(&truths).zip(backend.nearest(&scene, &rays)?).enumerate()
             {
                 count += 1;
                 if hit.is_some_and(|hit| !hit.t.is_finite() || !hit.normal.is_finite()) {
@@ -149,15 +147,15 @@ pub(super) fn tangent(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
                 }
             }
         }
-        figures.add(tracer, "along an axis, wrong at k ulp of r", count, axial, 4.0);
-        figures.add(tracer, "askew, wrong at k ulp of r", count, askew, 4.0);
-        figures.add(tracer, "NaN", count, f64::from(invalid), 0.0);
+        figures.add(backend, "along an axis, wrong at k ulp of r", count, axial, 4.0);
+        figures.add(backend, "askew, wrong at k ulp of r", count, askew, 4.0);
+        figures.add(backend, "NaN", count, f64::from(invalid), 0.0);
     }
     Ok(())
 }
 
 /// The right one of two roots, from points that are exactly on the surface and from the inside.
-pub(super) fn inside(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn inside(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let mut rng = random(5);
     let mut sets: Vec<(Object, Vec<Ray>)> = Vec::new();
     for (radius, center) in [(5.0, DVec3::ZERO), (5.0, DVec3::new(64.0, -3.0, 8.0)), (0.625, DVec3::Y)] {
@@ -204,10 +202,10 @@ pub(super) fn inside(tracers: &[Tracer], size: Size, figures: &mut Figures) -> R
         }
     }
     sets.push((Object::Cuboid(Cuboid::new(corners, Material::default())?), rays));
-    for tracer in tracers {
+    for backend in backends {
         let (mut wrong, mut count) = (0, 0);
         for (object, rays) in &sets {
-            for (ray, hit) in rays.iter().zip(from_eyes(tracer, *object, rays)?) {
+            for (ray, hit) in rays.iter().zip(from_eyes(backend, *object, rays)?) {
                 count += 1;
                 let truth = nearest(&[*object], ray.origin, ray.direction).map(|hit| hit.t.to_f64());
                 let right = match (truth, hit) {
@@ -218,13 +216,13 @@ pub(super) fn inside(tracers: &[Tracer], size: Size, figures: &mut Figures) -> R
                 wrong += usize::from(!right);
             }
         }
-        figures.add(tracer, "wrong roots", count, wrong as f64, 0.0);
+        figures.add(backend, "wrong roots", count, wrong as f64, 0.0);
     }
     Ok(())
 }
 
 /// Each pixel shows an object that the oracle sees within half a pixel of it.
-pub(super) fn giant_and_dwarf(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn giant_and_dwarf(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let objects = [
         Object::Sphere(sphere(1e7, DVec3::new(0.0, -1e7, 0.0))?),
         Object::Sphere(sphere(1.0, DVec3::new(0.5, 1.5, -6.0))?),
@@ -242,15 +240,15 @@ pub(super) fn giant_and_dwarf(tracers: &[Tracer], size: Size, figures: &mut Figu
         (0..side * side).map(|k| (f64::from(k % side), f64::from(k / side))).collect();
     let rays: Vec<Ray> = places.iter().map(|&(i, j)| ray(i, j)).collect();
     let truths: Vec<_> = rays.iter().map(|&ray| seen(ray)).collect();
-    for tracer in tracers {
-        let hits = tracer.nearest(&scene, &rays)?;
+    for backend in backends {
+        let hits = backend.nearest(&scene, &rays)?;
         let off = places.iter().zip(&truths).zip(&hits).filter(|((place, truth), hit)| {
             let shown = hit.map(|hit| hit.object);
             let near = |turn: f64| ray(place.0 + 0.5 * turn.cos(), place.1 + 0.5 * turn.sin());
             shown != **truth
                 && (0..32).all(|k| seen(near(f64::from(k) * std::f64::consts::TAU / 32.0)) != shown)
         });
-        figures.add(tracer, "pixels off by more than half a pixel", places.len(), off.count() as f64, 0.0);
+        figures.add(backend, "pixels off by more than half a pixel", places.len(), off.count() as f64, 0.0);
     }
     Ok(())
 }

@@ -4,11 +4,12 @@ use anyhow::Result;
 use glam::DVec3;
 use rayfold_scene::{Cuboid, Material, Object, Screen, Sphere, Triangle};
 
-use super::{Figures, Size, aimed, direction, objects_only, objects_seen, random};
-use crate::tracers::Tracer;
+use super::figures::{Figures, Size};
+use super::setup::{aimed, direction, objects_only, objects_seen, random};
+use crate::backends::Backend;
 
 /// Each object of a scene several times over, in mixed order: every hit is that of the first copy.
-pub(super) fn identical(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn identical(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let mut rng = random(24);
     for copies in [2, 30] {
         let mut kinds = Vec::new();
@@ -30,11 +31,11 @@ pub(super) fn identical(tracers: &[Tracer], size: Size, figures: &mut Figures) -
             .map(|_| aimed(7.0 * direction(&mut rng), 3.0 * direction(&mut rng)))
             .collect();
         let first = |object: usize| order.iter().position(|&kind| kind == order[object]);
-        for tracer in tracers {
-            let hits = tracer.nearest(&scene, &rays)?;
+        for backend in backends {
+            let hits = backend.nearest(&scene, &rays)?;
             let late = hits.iter().flatten().filter(|hit| first(hit.object) != Some(hit.object)).count();
             figures.add(
-                tracer,
+                backend,
                 format!("hits on a later copy, {} objects", order.len()),
                 rays.len(),
                 late as f64,
@@ -43,12 +44,12 @@ pub(super) fn identical(tracers: &[Tracer], size: Size, figures: &mut Figures) -
             anyhow::ensure!(4 * hits.iter().flatten().count() > rays.len(), "too few rays meet anything");
         }
     }
-    faces(tracers, size, figures)?;
-    pictures(tracers, size, figures)
+    faces(backends, size, figures)?;
+    pictures(backends, size, figures)
 }
 
 /// Later copies are bright and first ones are dark, whatever the number of threads.
-fn pictures(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+fn pictures(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let mut rng = random(241);
     let side = size.pick(70, 500);
     let mut scenes = Vec::new();
@@ -80,22 +81,28 @@ fn pictures(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()>
     }
     for threads in [1, 2, 5] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-        for tracer in tracers {
+        for backend in backends {
             let (mut late, mut seen) = (0, 0);
             for scene in &scenes {
-                let image = pool.install(|| tracer.render(scene))?;
+                let image = pool.install(|| backend.render(scene))?;
                 late += image.pixels().filter(|pixel| pixel.0[0] > 64).count();
                 seen += image.pixels().filter(|pixel| pixel.0[0] > 0).count();
             }
             anyhow::ensure!(seen > 0, "the pictures are empty");
-            figures.add(tracer, format!("pixels of a later copy, {threads} threads"), seen, late as f64, 0.0);
+            figures.add(
+                backend,
+                format!("pixels of a later copy, {threads} threads"),
+                seen,
+                late as f64,
+                0.0,
+            );
         }
     }
     Ok(())
 }
 
 /// Faces of two boxes and two triangles in one plane that is square to the rays: computed distances are equal.
-fn faces(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+fn faces(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let surface = Material::default();
     let cuboid = |u: [f64; 3], v: [f64; 3]| Cuboid::new([u.into(), v.into()], surface).map(Object::Cuboid);
     let big = cuboid([-4.0, -4.0, -2.0], [4.0, 4.0, 0.0])?;
@@ -109,17 +116,17 @@ fn faces(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
             aimed(from, from - DVec3::Z)
         })
         .collect();
-    for tracer in tracers {
+    for backend in backends {
         let mut late = 0;
         for objects in [vec![big, small, ball], vec![small, ball, big], vec![ball, small, big]] {
             let at = |object: Object| objects.iter().position(|&o| o == object);
             let scene = objects_only(objects.clone())?;
-            for (ray, hit) in rays.iter().zip(tracer.nearest(&scene, &rays)?) {
+            for (ray, hit) in rays.iter().zip(backend.nearest(&scene, &rays)?) {
                 let other = if ray.origin.x == 3.0 { ball } else { small };
                 late += usize::from(hit.map(|hit| hit.object) != at(big).min(at(other)));
             }
         }
-        figures.add(tracer, "not the first of those in one plane", 3 * rays.len(), late as f64, 0.0);
+        figures.add(backend, "not the first of those in one plane", 3 * rays.len(), late as f64, 0.0);
     }
     Ok(())
 }

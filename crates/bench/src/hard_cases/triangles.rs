@@ -5,12 +5,11 @@ use glam::DVec3;
 use rayfold_scene::{Limits, Material, Object, Triangle};
 use rayon::prelude::*;
 
-use super::{
-    Figures, Size, aimed, direction, objects_only, objects_seen, random, truths, unless_single, worse,
-};
+use super::figures::{Figures, Size, unless_single, worse};
+use super::setup::{aimed, direction, objects_only, objects_seen, random, truths};
+use crate::backends::{Arithmetic, Backend, Ray};
 use crate::oracle::edge_clearance;
 use crate::scenes::{icosphere, single};
-use crate::tracers::{Arithmetic, Ray, Tracer};
 
 fn triangle(vertices: [DVec3; 3]) -> Result<Object> {
     Ok(Object::Triangle(Triangle::new(vertices, Material::default())?))
@@ -30,7 +29,7 @@ fn shell(count: usize, rng: &mut fastrand::Rng) -> Result<(Vec<[DVec3; 3]>, Vec<
 
 /// Counts the rays that escape from a closed surface; `target` picks a point of a face.
 fn escapes(
-    tracers: &[Tracer],
+    backends: &[Backend],
     (count, rays): (usize, usize),
     seed: u64,
     what: &str,
@@ -40,43 +39,43 @@ fn escapes(
     let (faces, objects) = shell(count, &mut random(seed))?;
     let centre = faces.iter().flatten().sum::<DVec3>() / (3 * faces.len()) as f64;
     let scene = objects_seen(objects, single(centre), faces[0][0], 1.0)?;
-    let escaped = in_batches(tracers, rays, seed, |tracer, rng, rays| {
+    let escaped = in_batches(backends, rays, seed, |backend, rng, rays| {
         let batch: Vec<Ray> = (0..rays)
             .map(|_| aimed(centre + direction(rng), target(&faces[rng.usize(0..faces.len())], rng)))
             .collect();
-        Ok(tracer.nearest(&scene, &batch)?.iter().filter(|hit| hit.is_none()).count())
+        Ok(backend.nearest(&scene, &batch)?.iter().filter(|hit| hit.is_none()).count())
     })?;
-    for (tracer, (rays, escaped)) in tracers.iter().zip(escaped) {
-        figures.add(tracer, format!("cracks in {} faces, {what}", faces.len()), rays, escaped as f64, 0.0);
+    for (backend, (rays, escaped)) in backends.iter().zip(escaped) {
+        figures.add(backend, format!("cracks in {} faces, {what}", faces.len()), rays, escaped as f64, 0.0);
     }
     Ok(())
 }
 
-/// Rays that every way goes through.
+/// Rays that every backend goes through.
 const BY_ALL: usize = 1_000_000;
 
-/// How many rays each way went through, of `total`, and how many `wrong` counts; batch by batch on all cores. A batch
-/// has random numbers of its own, the same for every way.
+/// How many rays each backend went through, of `total`, and how many `wrong` counts; batch by batch on all cores. A batch
+/// has random numbers of its own, the same for every backend.
 ///
-/// The way that pictures are made goes through all rays; those that differ from it in numbers, width or tiles alone
+/// The backend that pictures are made with goes through all rays; those that differ from it in numbers, width or tiles alone
 /// stop after [`BY_ALL`].
 fn in_batches(
-    tracers: &[Tracer],
+    backends: &[Backend],
     total: usize,
     seed: u64,
-    wrong: impl Fn(&Tracer, &mut fastrand::Rng, usize) -> Result<usize> + Sync,
+    wrong: impl Fn(&Backend, &mut fastrand::Rng, usize) -> Result<usize> + Sync,
 ) -> Result<Vec<(usize, usize)>> {
-    let chosen = tracers.iter().position(|tracer| tracer.arithmetic == Arithmetic::Chosen);
-    tracers
+    let chosen = backends.iter().position(|backend| backend.arithmetic == Arithmetic::Chosen);
+    backends
         .iter()
         .enumerate()
-        .map(|(k, tracer)| {
+        .map(|(k, backend)| {
             let total = if Some(k) == chosen { total } else { total.min(BY_ALL) };
             let wrong = (0..total.div_ceil(BATCH))
                 .into_par_iter()
                 .map(|batch| {
                     let mut rng = random(seed * 1_000_000 + batch as u64);
-                    wrong(tracer, &mut rng, BATCH.min(total - batch * BATCH))
+                    wrong(backend, &mut rng, BATCH.min(total - batch * BATCH))
                 })
                 .sum::<Result<usize>>()?;
             Ok((total, wrong))
@@ -85,9 +84,9 @@ fn in_batches(
 }
 
 /// From inside a closed surface towards its edges.
-pub(super) fn shared_edges(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn shared_edges(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     for sizes in [(20, size.pick(40_000, 100_000_000)), (size.pick(320, 20_480), size.pick(8_000, 100_000))] {
-        escapes(tracers, sizes, 10, "towards edges", figures, |face, rng| {
+        escapes(backends, sizes, 10, "towards edges", figures, |face, rng| {
             let k = rng.usize(0..3);
             face[k].lerp(face[(k + 1) % 3], rng.f64())
         })?;
@@ -96,17 +95,17 @@ pub(super) fn shared_edges(tracers: &[Tracer], size: Size, figures: &mut Figures
 }
 
 /// From inside a closed surface towards its corners.
-pub(super) fn shared_vertices(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn shared_vertices(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     for sizes in [(20, size.pick(20_000, 10_000_000)), (size.pick(320, 20_480), size.pick(4_000, 20_000))] {
-        escapes(tracers, sizes, 11, "towards corners", figures, |face, rng| face[rng.usize(0..3)])?;
+        escapes(backends, sizes, 11, "towards corners", figures, |face, rng| face[rng.usize(0..3)])?;
     }
     Ok(())
 }
 
 /// Long thin triangles in any position: the oracle's hits but within 4 ulp of an edge, distances to 16 ulp.
-pub(super) fn needles(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn needles(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let mut rng = random(12);
-    let mut worst = vec![(0f64, 0f64, 0f64); tracers.len()];
+    let mut worst = vec![(0f64, 0f64, 0f64); backends.len()];
     let (needles, each) = (size.pick(40, 1000), size.pick(40, 200));
     for _ in 0..needles {
         let tip = direction(&mut rng);
@@ -124,12 +123,12 @@ pub(super) fn needles(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
             .map(|_| aimed(eye, tip + rng.f64() * along + (rng.f64() * 1.4 - 0.2) * across))
             .collect();
         let truths = truths(&objects, &rays);
-        for (tracer, worst) in tracers.iter().zip(&mut worst) {
-            for ((ray, truth), hit) in rays.iter().zip(&truths).zip(tracer.nearest(&scene, &rays)?) {
+        for (backend, worst) in backends.iter().zip(&mut worst) {
+            for ((ray, truth), hit) in rays.iter().zip(&truths).zip(backend.nearest(&scene, &rays)?) {
                 let largest = vertices.iter().fold(0.0, |m: f64, v| m.max((*v - ray.origin).length()));
                 match (truth, hit) {
                     (Some(truth), Some(hit)) => {
-                        let off = (hit.t - truth.t).abs() / tracer.ulp(truth.t);
+                        let off = (hit.t - truth.t).abs() / backend.ulp(truth.t);
                         let sine = truth.normal.dot(ray.direction).abs();
                         worst.1 = worse(worst.1, off);
                         worst.2 = worse(worst.2, off * sine);
@@ -137,31 +136,31 @@ pub(super) fn needles(tracers: &[Tracer], size: Size, figures: &mut Figures) -> 
                     (None, None) => {}
                     _ => {
                         let off = edge_clearance(&needle, ray.origin, ray.direction).unwrap_or(0.0);
-                        worst.0 = worse(worst.0, off / tracer.ulp(largest));
+                        worst.0 = worse(worst.0, off / backend.ulp(largest));
                     }
                 }
             }
         }
     }
-    for (tracer, (edge, t, plane)) in tracers.iter().zip(worst) {
+    for (backend, (edge, t, plane)) in backends.iter().zip(worst) {
         figures.add(
-            tracer,
+            backend,
             "wrong hit or miss off the edge, ulp",
             needles * each,
             edge,
-            unless_single(tracer, 4.0),
+            unless_single(backend, 4.0),
         );
-        figures.add(tracer, "t, ulp", needles * each, t, unless_single(tracer, 16.0));
+        figures.add(backend, "t, ulp", needles * each, t, unless_single(backend, 16.0));
         // How far off the true plane the hit lies. The distance is that, with the roundoff of a normal of unit length in
         // it, divided by the sine of the angle to the plane, which has no least value here.
         let off_plane = "t times the sine to the plane, ulp";
-        figures.add(tracer, off_plane, needles * each, plane, unless_single(tracer, 16.0));
+        figures.add(backend, off_plane, needles * each, plane, unless_single(backend, 16.0));
     }
     Ok(())
 }
 
 /// Triangles whose corners lie on a line: a warning when read, and no ray hits them.
-pub(super) fn degenerate(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn degenerate(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let mut rng = random(13);
     let mut flat: Vec<[DVec3; 3]> = vec![
         [DVec3::ZERO; 3],
@@ -193,20 +192,20 @@ pub(super) fn degenerate(tracers: &[Tracer], size: Size, figures: &mut Figures) 
             .collect();
         sets.push((objects_only(vec![triangle(*vertices)?])?, rays));
     }
-    for tracer in tracers {
+    for backend in backends {
         let mut hits = 0;
         for (scene, rays) in &sets {
-            hits += tracer.nearest(scene, rays)?.iter().flatten().count();
+            hits += backend.nearest(scene, rays)?.iter().flatten().count();
         }
         let rays = sets.iter().map(|(_, rays)| rays.len()).sum();
-        figures.add(tracer, "hits", rays, hits as f64, 0.0);
-        figures.add(tracer, "not reported when read", flat.len(), unreported as f64, 0.0);
+        figures.add(backend, "hits", rays, hits as f64, 0.0);
+        figures.add(backend, "not reported when read", flat.len(), unreported as f64, 0.0);
     }
     Ok(())
 }
 
 /// Rays that lie in the plane exactly, also after their direction is normalised: along axes and diagonals.
-pub(super) fn in_plane(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn in_plane(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let mut rng = random(14);
     let mut sets = Vec::new();
     for axis in 0..3 {
@@ -233,20 +232,20 @@ pub(super) fn in_plane(tracers: &[Tracer], size: Size, figures: &mut Figures) ->
             sets.push((objects_only(objects)?, rays));
         }
     }
-    for tracer in tracers {
+    for backend in backends {
         let mut hits = 0;
         for (scene, rays) in &sets {
-            hits += tracer.nearest(scene, rays)?.iter().flatten().count();
+            hits += backend.nearest(scene, rays)?.iter().flatten().count();
         }
         let rays = sets.iter().map(|(_, rays)| rays.len()).sum();
-        figures.add(tracer, "hits", rays, hits as f64, 0.0);
+        figures.add(backend, "hits", rays, hits as f64, 0.0);
     }
     Ok(())
 }
 
 /// The nearest of 1,000 triangles, found down a tree, against the nearest of the nearest of 20 times 50 triangles, where
 /// every triangle is looked at.
-pub(super) fn tree_or_not(tracers: &[Tracer], size: Size, figures: &mut Figures) -> Result<()> {
+pub(super) fn tree_or_not(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     const EACH: usize = 50;
     let mut rng = random(17);
     let objects: Vec<Object> = (0..1000)
@@ -258,11 +257,11 @@ pub(super) fn tree_or_not(tracers: &[Tracer], size: Size, figures: &mut Figures)
         .collect::<Result<_>>()?;
     let scene = objects_only(objects.clone())?;
     let parts = objects.chunks(EACH).map(|part| objects_only(part.to_vec())).collect::<Result<Vec<_>>>()?;
-    let different = in_batches(tracers, size.pick(4000, 100_000_000), 17, |tracer, rng, rays| {
+    let different = in_batches(backends, size.pick(4000, 100_000_000), 17, |backend, rng, rays| {
         let rays: Vec<Ray> = (0..rays).map(|_| aimed(8.0 * direction(rng), 4.0 * direction(rng))).collect();
         let mut nearest: Vec<Option<(usize, f64)>> = vec![None; rays.len()];
         for (k, part) in parts.iter().enumerate() {
-            for (best, hit) in nearest.iter_mut().zip(tracer.nearest(part, &rays)?) {
+            for (best, hit) in nearest.iter_mut().zip(backend.nearest(part, &rays)?) {
                 let hit = hit.map(|hit| (k * EACH + hit.object, hit.t));
                 *best = match (*best, hit) {
                     (Some(best), Some(hit)) => Some(if hit.1 < best.1 { hit } else { best }),
@@ -270,12 +269,12 @@ pub(super) fn tree_or_not(tracers: &[Tracer], size: Size, figures: &mut Figures)
                 };
             }
         }
-        let down_the_tree = tracer.nearest(&scene, &rays)?;
+        let down_the_tree = backend.nearest(&scene, &rays)?;
         let pairs = down_the_tree.iter().zip(&nearest);
         Ok(pairs.filter(|(a, b)| a.map(|a| a.object) != b.map(|b| b.0)).count())
     })?;
-    for (tracer, (rays, different)) in tracers.iter().zip(different) {
-        figures.add(tracer, "another object than without a tree", rays, different as f64, 0.0);
+    for (backend, (rays, different)) in backends.iter().zip(different) {
+        figures.add(backend, "another object than without a tree", rays, different as f64, 0.0);
     }
     Ok(())
 }

@@ -15,26 +15,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod line;
 mod real;
 mod shapes;
 
 use glam::DVec3;
 use image::RgbImage;
-use rayfold_scene::{Camera, Light, Object, Scene, Screen};
+use rayfold_scene::{Light, Object, Scene};
 use rayfold_tracer::MAX_BOUNCES;
 use rayon::prelude::*;
 
+pub use line::Line;
 pub use real::{Real, Vector};
 pub use shapes::{edge_clearance, sphere_clearance};
-
-/// A half-line; its direction has any length but zero.
-#[derive(Clone, Debug)]
-pub struct Line {
-    /// Where it starts.
-    pub origin: Vector,
-    /// Where it goes.
-    pub direction: Vector,
-}
 
 /// Where a ray meets an object first.
 #[derive(Clone, Debug)]
@@ -80,13 +73,13 @@ pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
 
 /// The colour beside a pixel, where the ray of a fractional index goes.
 pub fn color_at(scene: &Scene, x: f64, y: f64) -> DVec3 {
-    color_along(scene, &pixel(&scene.camera, scene.screen, x, y), &Real::zero(), 0)
+    color_along(scene, &Line::of_pixel(&scene.camera, scene.screen, x, y), &Real::zero(), 0)
         .map_or(scene.background(), |color| color.to_dvec3())
 }
 
 /// Which object a pixel shows, and its normal there.
 pub fn first_hit(scene: &Scene, i: u32, j: u32) -> Option<(usize, DVec3)> {
-    let line = pixel(&scene.camera, scene.screen, f64::from(i), f64::from(j));
+    let line = Line::of_pixel(&scene.camera, scene.screen, f64::from(i), f64::from(j));
     nearest_on(&scene.objects, &line, &Real::zero()).map(|hit| (hit.object, hit.normal.to_dvec3()))
 }
 
@@ -111,7 +104,7 @@ fn color_along(scene: &Scene, line: &Line, start: &Real, bounces: u32) -> Option
     let material = scene.objects[hit.object].material();
     let point = line.origin.plus(&hit.t, &line.direction);
     // A point on a surface is irrational: the ray that leaves it meets the surface again next to its start.
-    let start = Real::from(largest(scene)).shifted(-300);
+    let start = Real::from(shapes::extent(&scene.objects)).shifted(-300);
     let mut color = Vector::from(material.ambient());
     for Light::Directional(light) in scene.lights.iter() {
         let towards = Vector::from(light.direction()).opposite().unit();
@@ -145,39 +138,4 @@ fn color_along(scene: &Scene, line: &Line, start: &Real, bounces: u32) -> Option
 pub fn reflected(direction: &Vector, normal: &Vector) -> Vector {
     let twice = direction.dot(normal).shifted(1);
     direction.plus(&-&twice, normal)
-}
-
-fn largest(scene: &Scene) -> f64 {
-    scene
-        .objects
-        .iter()
-        .map(|object| match object {
-            Object::Sphere(s) => s.center().abs().max_element() + s.radius(),
-            Object::Triangle(t) => t.vertices().iter().map(|v| v.abs().max_element()).fold(0.0, f64::max),
-            Object::Cuboid(c) => c.corners().iter().map(|v| v.abs().max_element()).fold(0.0, f64::max),
-        })
-        .fold(0.0, f64::max)
-}
-
-/// The ray of a pixel, in the words of the language.
-fn pixel(camera: &Camera, screen: Screen, x: f64, y: f64) -> Line {
-    let Camera::Pinhole(pinhole) = camera else {
-        return Line { origin: DVec3::new(x, y, 0.0).into(), direction: DVec3::NEG_Z.into() };
-    };
-    let w = Vector::from(pinhole.gaze()).opposite().unit();
-    let u = Vector::from(pinhole.up()).cross(&w).unit();
-    let v = w.cross(&u);
-    let along = |from: f64, to: f64, index: f64, count: u32| {
-        let (from, to) = (Real::from(from), Real::from(to));
-        // A single sample is the middle; beside it is as near as in an image of a thousand.
-        let (index, last) = if count == 1 { (index + 500.0, 1000.0) } else { (index, f64::from(count - 1)) };
-        let part = Real::from(index).over(&Real::from(last));
-        &from + &(&(&to - &from) * &part)
-    };
-    let (a, b) = (pinhole.lower_left(), pinhole.upper_right());
-    let across = along(a.x, b.x, x, screen.width());
-    let upward = along(a.y, b.y, y, screen.height());
-    let nowhere = Vector::from(DVec3::ZERO);
-    let direction = nowhere.plus(&across, &u).plus(&upward, &v).plus(&-&Real::from(pinhole.distance()), &w);
-    Line { origin: pinhole.eye().into(), direction: direction.unit() }
 }

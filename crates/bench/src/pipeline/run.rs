@@ -14,7 +14,6 @@ use rayfold_pipeline::assemble::frame_key;
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::Manifest;
 use rayfold_pipeline::store::{PutOptions, S3Store, Store};
-use rayfold_pipeline::studio::decode;
 use rayfold_scene::{AnimationSettings, SETTINGS_FILE, natural_cmp, parse_settings};
 use serde_json::Value;
 use tokio::sync::mpsc::UnboundedReceiver;
@@ -179,7 +178,7 @@ async fn compile(store: &S3Store, animation: &Animation, folder: &Folder) -> Res
     let mut gif = Vec::new();
     let mut encoder = rayfold_gif::Encoder::new(&mut gif, settings)?;
     while let Some(image) = images.try_next().await? {
-        encoder.push(decode(&image.body)?)?;
+        encoder.push(image::load_from_memory(&image.body)?.into_rgb8())?;
     }
     encoder.finish()?;
     Ok(gif)

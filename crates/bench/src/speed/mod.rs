@@ -11,10 +11,10 @@ use image::RgbImage;
 use rayfold_scene::Scene;
 use rayfold_tracer::{Drawing, RenderOptions};
 
+use crate::backends::{Backend, levels, packets, reference};
 use crate::cpu_time::{self, median};
 use crate::plot::{Labels, Series, log_log};
 use crate::scenes::{EXAMPLES, cloud, example, rock, table};
-use crate::tracers::{Tracer, levels, packets, reference};
 
 /// What to measure.
 #[derive(Debug, clap::Args)]
@@ -100,16 +100,16 @@ struct Ratio {
 /// was measured on, the one of these reports. It is not part of this run.
 const ORIGINAL_HELLO: f64 = 0.057;
 
-fn best() -> Tracer {
+fn best() -> Backend {
     packets("rayfold", RenderOptions::default())
 }
 
-/// Median processor time of the images of several ways, drawn in turn.
-fn in_turn(scene: &Scene, tracers: &[&Tracer], rounds: usize) -> Result<Vec<f64>> {
-    let mut seconds = vec![Vec::new(); tracers.len()];
+/// Median processor time of the images of several backends, drawn in turn.
+fn in_turn(scene: &Scene, backends: &[&Backend], rounds: usize) -> Result<Vec<f64>> {
+    let mut seconds = vec![Vec::new(); backends.len()];
     for _ in 0..rounds {
-        for (tracer, seconds) in tracers.iter().zip(&mut seconds) {
-            let (time, image) = cpu_time::of(|| tracer.render(scene))?;
+        for (backend, seconds) in backends.iter().zip(&mut seconds) {
+            let (time, image) = cpu_time::of(|| backend.render(scene))?;
             image?;
             seconds.push(time);
         }
@@ -129,17 +129,17 @@ fn beside_povray(plan: &Plan, ratios: &mut Vec<Ratio>) -> Result<String> {
     eprintln!("POV-Ray");
     let folder = tempfile::tempdir()?;
     let scene = table(1024, 768)?;
-    let mut tracers: Vec<Tracer> = levels()
+    let mut backends: Vec<Backend> = levels()
         .into_iter()
         .map(|(name, level)| packets(name, RenderOptions { level: Some(level), ..Default::default() }))
         .collect();
-    tracers.push(reference());
-    let mut ours = vec![Vec::new(); tracers.len()];
+    backends.push(reference());
+    let mut ours = vec![Vec::new(); backends.len()];
     let (mut whole, mut start) = (Vec::new(), Vec::new());
     let mut theirs = RgbImage::new(0, 0);
     for _ in 0..plan.rounds {
-        for (tracer, ours) in tracers.iter().zip(&mut ours) {
-            let (time, image) = cpu_time::of(|| tracer.render(&scene))?;
+        for (backend, ours) in backends.iter().zip(&mut ours) {
+            let (time, image) = cpu_time::of(|| backend.render(&scene))?;
             image?;
             ours.push(time);
         }
@@ -150,7 +150,7 @@ fn beside_povray(plan: &Plan, ratios: &mut Vec<Ratio>) -> Result<String> {
     }
     let (whole, start) = (median(whole), median(start));
     let drawing = whole - start;
-    let image = tracers[0].render(&scene)?;
+    let image = backends[0].render(&scene)?;
     let off =
         image.pixels().zip(theirs.pixels()).filter(|(a, b)| (0..3).any(|c| a.0[c].abs_diff(b.0[c]) > 2));
     let off = 100.0 * off.count() as f64 / image.pixels().len() as f64;
@@ -165,9 +165,9 @@ fn beside_povray(plan: &Plan, ratios: &mut Vec<Ratio>) -> Result<String> {
         1e3 * whole,
         1e3 * drawing
     )?;
-    for (tracer, ours) in tracers.iter().zip(ours) {
+    for (backend, ours) in backends.iter().zip(ours) {
         let ours = median(ours);
-        let name = &tracer.name;
+        let name = &backend.name;
         if let Some((_, least)) = ASKED.iter().find(|(level, _)| level == name) {
             ratios.push(Ratio { what: format!("POV-Ray, {name}"), is: whole / ours, least });
         }
@@ -266,17 +266,17 @@ fn examples(plan: &Plan, one: &rayon::ThreadPool, ratios: &mut Vec<Ratio>) -> Re
          | --- | --- | --- | --- | --- | --- |\n",
         all.current_num_threads()
     );
-    let (tracer, plain) = (best(), reference());
+    let (backend, plain) = (best(), reference());
     for name in EXAMPLES {
         eprintln!("scene {name}");
         let scene = example(name)?;
         let mut together = Vec::new();
         let mut alone = [Vec::new(), Vec::new()];
         for _ in 0..plan.rounds {
-            let times = one.install(|| in_turn(&scene, &[&tracer, &plain], 1))?;
+            let times = one.install(|| in_turn(&scene, &[&backend, &plain], 1))?;
             alone[0].push(times[0]);
             alone[1].push(times[1]);
-            together.push(all.install(|| in_turn(&scene, &[&tracer], 1))?[0]);
+            together.push(all.install(|| in_turn(&scene, &[&backend], 1))?[0]);
         }
         let [ours, theirs] = alone.map(median);
         if name == "hello" {
@@ -299,9 +299,9 @@ fn examples(plan: &Plan, one: &rayon::ThreadPool, ratios: &mut Vec<Ratio>) -> Re
 
 /// Time over objects, triangles and pixels, with the exponent of the power that fits best.
 fn growth(plan: &Plan, folder: &Path) -> Result<String> {
-    let tracer = best();
+    let backend = best();
     let time = |scene: Result<Scene>, rounds: usize| -> Result<f64> {
-        let seconds = in_turn(&scene?, &[&tracer], rounds)?;
+        let seconds = in_turn(&scene?, &[&backend], rounds)?;
         Ok(seconds[0])
     };
     let mut courses = Vec::new();

@@ -1,7 +1,7 @@
 //! What a manifest says, for people.
 
-use rayfold_pipeline::manifest::{Fault, Frame, FrameState, Manifest, Reason, Status};
-use rayfold_scene::SETTINGS_FILE;
+use rayfold_client::{Obstacle, obstacles};
+use rayfold_pipeline::manifest::{Manifest, Status};
 
 use crate::console::Console;
 use crate::wording::number;
@@ -33,37 +33,12 @@ fn missing_scripts(manifest: &Manifest) -> u64 {
     manifest.head.missing() - manifest.head.pending
 }
 
-/// The script of a frame, and which of its frames it is.
-pub(crate) fn name(frame: &Frame) -> String {
-    match frame.part {
-        None => format!("{}.txt", frame.script),
-        Some(part) => format!("{}.txt, frame {part}", frame.script),
-    }
-}
-
-/// Everything that keeps the animation from being done, each with its reason.
-pub(crate) fn faults(manifest: &Manifest) -> Vec<(String, Option<&Reason>)> {
-    let mut faults = Vec::new();
-    if let Some(reason) = &manifest.head.settings.fault {
-        faults.push((SETTINGS_FILE.to_owned(), Some(reason)));
-    }
-    for frame in &manifest.frames {
-        if let FrameState::Failed(Fault { reason, .. }) = &frame.state {
-            faults.push((name(frame), reason.as_ref()));
-        }
-    }
-    if let Some(Fault { reason, .. }) = &manifest.head.refusal {
-        faults.push((format!("the GIF of {}", manifest.head.animation), reason.as_ref()));
-    }
-    faults
-}
-
 /// Shows everything that keeps the animation from being done.
 pub(crate) fn show_faults(manifest: &Manifest, console: &Console) {
     for rejected in &manifest.head.rejected {
         console.fault(&rejected.key, &rejected.problem);
     }
-    for (what, reason) in faults(manifest) {
+    for Obstacle { what, reason } in obstacles(manifest) {
         let Some(reason) = reason else {
             console.fault(&what, "no reason is known yet");
             continue;

@@ -1,10 +1,10 @@
 //! `rayfold retry`: drawing frames again.
 
+use rayfold_pipeline::Randomness;
 use rayfold_pipeline::keys::Animation;
-use rayfold_pipeline::retry::{Scope, retry};
-use rayfold_pipeline::{Invocation, Policy, Randomness, SystemClock};
+use rayfold_pipeline::retry::Scope;
 
-use super::{BucketArgs, must_exist, parse_animation, with_bucket};
+use super::{BucketArgs, parse_animation, with_bucket};
 use crate::console::Console;
 use crate::outcome::Outcome;
 use crate::wording::number;
@@ -30,23 +30,19 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let scope = if args.all { Scope::All } else { Scope::Failed };
-    with_bucket(&args.bucket, async |store| {
-        must_exist(store, &args.animation).await?;
-        let (seed, request) = (fastrand::u64(..), format!("retry-{:016x}", fastrand::u64(..)));
-        let (random, policy) = (Randomness::seeded(seed), Policy::default());
-        let invocation = Invocation::new(store, &SystemClock, &random, &policy, &request);
-        let retried = retry(&invocation, &args.animation, scope).await?;
+    let animation = &args.animation;
+    with_bucket(&args.bucket, async |client| {
+        let random = Randomness::seeded(fastrand::u64(..));
+        let retried = client.retry(animation, scope, rayfold_tracer::PIXEL_VERSION, &random).await?;
         if retried.woken == 0 && !retried.reassembled {
-            console.note(format_args!("{}: nothing failed and nothing is missing", args.animation));
+            console.note(format_args!("{animation}: nothing failed and nothing is missing"));
         } else if retried.woken == 0 {
-            console.note(format_args!("{} is assembled again", args.animation));
+            console.note(format_args!("{animation} is assembled again"));
         } else {
             console.note(format_args!(
-                "{}: {} rendered again; rayfold status {} --bucket {} --watch follows it",
-                args.animation,
+                "{animation}: {} rendered again; rayfold status {animation} --bucket {} --watch follows it",
                 number(retried.woken, "frame"),
-                args.animation,
-                store.bucket()
+                args.bucket.bucket
             ));
         }
         Ok(Outcome::Done)

@@ -2,14 +2,12 @@
 
 use std::fmt::Write;
 
-use futures_util::stream::{self, StreamExt, TryStreamExt};
-use rayfold_pipeline::keys::{Animation, Key, MANIFESTS, SCRIPTS};
+use rayfold_client::{Obstacle, obstacles};
+use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Head, Reason};
-use rayfold_pipeline::store::{ListRequest, S3Store};
 use serde::Serialize;
 
-use super::watch::Watch;
-use super::{BucketArgs, SIDE_BY_SIDE, list, must_exist, parse_animation, report, with_bucket};
+use super::{BucketArgs, Watch, parse_animation, report, with_bucket};
 use crate::console::{Console, Format};
 use crate::outcome::Outcome;
 use crate::wording::Size;
@@ -79,23 +77,23 @@ struct FaultEntry<'a> {
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
-    with_bucket(&args.bucket, async |store| {
+    with_bucket(&args.bucket, async |client| {
         let mut last = String::new();
         loop {
             let names = match &args.animation {
                 Some(animation) => vec![animation.clone()],
-                None => animations(store).await?,
+                None => client.animations().await?,
             };
-            let watches = look(store, &names).await?;
+            let watches = client.look(&names).await?;
             if let (Some(animation), [watch]) = (&args.animation, watches.as_slice())
-                && watch.manifest.is_none()
+                && watch.manifest().is_none()
                 && !args.watch
             {
-                must_exist(store, animation).await?;
+                client.must_exist(animation).await?;
             }
             let shown = match args.format {
-                Format::Text => table(&names, &watches),
-                Format::Json => document(&names, &watches, args.watch)?,
+                Format::Text => table(&watches),
+                Format::Json => document(&watches, args.watch)?,
             };
             if shown != last {
                 console.print(&shown)?;
@@ -105,7 +103,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
             if !args.watch || (settled && args.animation.is_some()) {
                 let failed = watches.iter().any(|watch| watch.is_settled() && !watch.is_current());
                 if args.animation.is_some() && args.format == Format::Text {
-                    for manifest in watches.iter().filter_map(|watch| watch.manifest.as_ref()) {
+                    for manifest in watches.iter().filter_map(Watch::manifest) {
                         report::show_faults(manifest, console);
                     }
                 }
@@ -119,51 +117,17 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     })
 }
 
-async fn look<'a>(store: &'a S3Store, names: &'a [Animation]) -> anyhow::Result<Vec<Watch<'a>>> {
-    let looks: Vec<_> = names
-        .iter()
-        .map(async |name| {
-            let mut watch = Watch::new(store, name);
-            watch.look().await?;
-            anyhow::Ok(watch)
-        })
-        .collect();
-    stream::iter(looks).buffered(SIDE_BY_SIDE).try_collect().await
-}
-
-/// Those that have a manifest, and folders of scripts that have none yet.
-async fn animations(store: &S3Store) -> anyhow::Result<Vec<Animation>> {
-    let (manifests, _) = list(store, ListRequest::all(MANIFESTS)).await?;
-    let mut names: Vec<Animation> = manifests
-        .iter()
-        .filter_map(|object| Some(object.key.parse::<Key>().ok()?.animation().clone()))
-        .collect();
-    let (_, folders) = list(store, ListRequest::level(SCRIPTS)).await?;
-    for folder in folders {
-        let name = folder.trim_start_matches(SCRIPTS).trim_end_matches('/');
-        let is_below =
-            |known: &Animation| known.as_str() == name || known.as_str().starts_with(&format!("{name}/"));
-        if !names.iter().any(is_below)
-            && let Ok(name) = Animation::new(name)
-        {
-            names.push(name);
-        }
-    }
-    names.sort();
-    Ok(names)
-}
-
-fn table(names: &[Animation], watches: &[Watch<'_>]) -> String {
-    let width = names.iter().map(|name| name.as_str().chars().count()).max().unwrap_or(0);
+fn table(watches: &[Watch<'_>]) -> String {
+    let names = || watches.iter().map(|watch| watch.animation().as_str());
+    let width = names().map(|name| name.chars().count()).max().unwrap_or(0);
     let mut text = String::new();
-    for (name, watch) in names.iter().zip(watches) {
-        let name = name.as_str();
-        let Some(manifest) = &watch.manifest else {
+    for (name, watch) in names().zip(watches) {
+        let Some(manifest) = watch.manifest() else {
             let _ = writeln!(text, "{name:width$}  new        no function has looked at it yet");
             continue;
         };
         let status = report::word(manifest.head.status);
-        let gif = match &watch.gif {
+        let gif = match watch.gif() {
             Some(gif) if watch.is_current() => format!("GIF of {}", Size(gif.size)),
             Some(_) => "an older GIF".to_owned(),
             None => "no GIF".to_owned(),
@@ -173,21 +137,21 @@ fn table(names: &[Animation], watches: &[Watch<'_>]) -> String {
     text
 }
 
-fn document(names: &[Animation], watches: &[Watch<'_>], one_line: bool) -> anyhow::Result<String> {
-    let entries = names.iter().zip(watches).map(|(animation, watch)| Entry {
-        known: match &watch.manifest {
+fn document(watches: &[Watch<'_>], one_line: bool) -> anyhow::Result<String> {
+    let entries = watches.iter().map(|watch| Entry {
+        known: match watch.manifest() {
             Some(manifest) => Known::Seen(&manifest.head),
-            None => Known::New { animation, status: "new" },
+            None => Known::New { animation: watch.animation(), status: "new" },
         },
-        gif: watch.gif.as_ref().map(|gif| Gif {
-            key: animation.gif(),
+        gif: watch.gif().map(|gif| Gif {
+            key: watch.animation().gif(),
             size: gif.size,
             version: gif.etag.as_str(),
             current: watch.is_current(),
         }),
-        faults: watch.manifest.as_ref().map_or_else(Vec::new, |manifest| {
-            let faults = report::faults(manifest).into_iter();
-            faults.map(|(what, reason)| FaultEntry { what, reason }).collect()
+        faults: watch.manifest().map_or_else(Vec::new, |manifest| {
+            let obstacles = obstacles(manifest).into_iter();
+            obstacles.map(|Obstacle { what, reason }| FaultEntry { what, reason }).collect()
         }),
     });
     let report = Report { animations: entries.collect() };

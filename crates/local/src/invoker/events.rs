@@ -1,6 +1,6 @@
-//! From MinIO's webhook to the functions' queues, by the shared routes.
+//! From the store's webhook to the functions' queues, by the shared routes.
 //!
-//! Events are forwarded as MinIO writes them; the functions read AWS's shape and MinIO's. Chaos lives here: an event may
+//! Events are forwarded as the store writes them; the functions read AWS's shape and MinIO's. Chaos lives here: an event may
 //! be lost, doubled, late, or one of a bunch that is delivered newest first.
 
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use tokio::task::JoinSet;
 use tokio::time::timeout;
 
 use super::chaos::Dice;
-use super::pool::{Job, Pending, Pool};
+use super::queue::{Job, Pending, Pool};
 use crate::http::{Body, Server, json};
 use crate::observation::{Observer, Seen};
 use crate::routes::{Function, Routes};
@@ -86,7 +86,7 @@ async fn take(
         return json(StatusCode::BAD_REQUEST, &json!({}));
     };
     let payload = body.to_bytes();
-    // MinIO writes one record an event; the first one names the function.
+    // The stores write one record an event; the first one names the function.
     if let Some((name, key)) = described(&payload) {
         let function = routes.function(&key, &name);
         observer.see(Seen::Event { function, name, key });

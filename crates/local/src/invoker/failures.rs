@@ -5,15 +5,12 @@
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use bytes::Bytes;
 use serde_json::{Value, json};
 use tokio::sync::{mpsc, oneshot};
 
-use super::pool::{Caller, Job, Pending, Pool};
-use super::random_id;
-use crate::minio::REGION;
+use super::queue::{Caller, Failure, Job, Pending, Pool, random_id};
 use crate::observation::{Observer, Outcome, Seen};
-use crate::routes::Function;
+use crate::region::REGION;
 
 /// SQS's largest batch for a function.
 const BATCH: usize = 10;
@@ -23,15 +20,6 @@ const MAX_RECEIVES: u32 = 5;
 
 /// Instead of the queue's visibility timeout.
 const PAUSE: Duration = Duration::from_millis(500);
-
-/// An event that failed in every try.
-pub(crate) struct Failure {
-    pub(crate) function: Function,
-    pub(crate) request_id: String,
-    pub(crate) payload: Bytes,
-    pub(crate) attempts: u32,
-    pub(crate) outcome: Outcome,
-}
 
 struct Message {
     id: String,
@@ -182,7 +170,10 @@ fn timestamp(at: SystemTime) -> String {
 
 #[cfg(test)]
 mod tests {
+    use bytes::Bytes;
+
     use super::*;
+    use crate::routes::Function;
 
     #[test]
     fn timestamps_are_of_the_gregorian_calendar() {

@@ -4,96 +4,25 @@
 //! next, an event that fails is tried twice more after pauses, and what fails then goes to the failure destination.
 
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use bytes::Bytes;
-use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio::task::JoinSet;
 
 use super::chaos::Dice;
-use super::failures::Failure;
+use super::queue::{Caller, Failure, Job, Pending, Pool};
+use super::ramp::Tokens;
 use super::runtime_api::Handout;
 use super::sandbox::Sandbox;
-use super::{Settings, random_id};
+use super::settings::Settings;
+use crate::error::Result;
 use crate::observation::{Observer, Outcome};
+use crate::region::REGION;
 use crate::routes::Function;
 
 /// After so long without work a process is let go.
 const IDLE_TIMEOUT: Duration = Duration::from_secs(120);
-
-/// An invocation on its way.
-pub(crate) struct Job {
-    pub(crate) request_id: String,
-    pub(crate) payload: Bytes,
-    pub(crate) attempt: u32,
-    pub(crate) caller: Caller,
-}
-
-/// Who hears of the end.
-pub(crate) enum Caller {
-    /// Nobody: failures are tried again, then delivered.
-    Event,
-    /// The one who waits; trying again is up to them.
-    Waiting(oneshot::Sender<Outcome>),
-}
-
-impl Job {
-    pub(crate) fn event(payload: impl Into<Bytes>) -> Self {
-        Self { request_id: random_id(), payload: payload.into(), attempt: 1, caller: Caller::Event }
-    }
-}
-
-/// Handle to a pool; its tasks end when the last handle is dropped and the invoker's tasks are aborted.
-#[derive(Clone)]
-pub(crate) struct Pool {
-    jobs: mpsc::UnboundedSender<Job>,
-    pending: Pending,
-}
-
-impl Pool {
-    pub(crate) fn submit(&self, job: Job) {
-        self.pending.add();
-        if self.jobs.send(job).is_err() {
-            self.pending.remove();
-        }
-    }
-}
-
-/// Invocations that are queued, running, or waiting for another try; shared by all pools.
-#[derive(Clone, Default)]
-pub(crate) struct Pending(Arc<(AtomicUsize, Notify)>);
-
-impl Pending {
-    pub(crate) fn add(&self) {
-        self.0.0.fetch_add(1, Ordering::SeqCst);
-    }
-
-    pub(crate) fn remove(&self) {
-        if self.0.0.fetch_sub(1, Ordering::SeqCst) == 1 {
-            self.0.1.notify_waiters();
-        }
-    }
-
-    pub(crate) fn count(&self) -> usize {
-        self.0.0.load(Ordering::SeqCst)
-    }
-
-    /// Returns when there are none.
-    pub(crate) async fn none(&self) {
-        loop {
-            let changed = self.0.1.notified();
-            if self.count() == 0 {
-                return;
-            }
-            tokio::select! {
-                () = changed => {}
-                () = tokio::time::sleep(Duration::from_millis(50)) => {}
-            }
-        }
-    }
-}
 
 /// The pool's own side, run as a task.
 pub(crate) struct Workers {
@@ -104,7 +33,7 @@ pub(crate) struct Workers {
     pending: Pending,
     failures: mpsc::UnboundedSender<Failure>,
     idle: Arc<Mutex<VecDeque<Sandbox>>>,
-    ramp: Mutex<Bucket>,
+    ramp: Mutex<Tokens>,
 }
 
 impl Workers {
@@ -118,7 +47,7 @@ impl Workers {
         tasks: &mut JoinSet<()>,
     ) -> Pool {
         let (jobs, queue) = mpsc::unbounded_channel();
-        let ramp = Mutex::new(Bucket::new(settings.ramp));
+        let ramp = Mutex::new(Tokens::new(settings.ramp));
         let idle = Arc::default();
         let workers = Arc::new(Self {
             function,
@@ -130,7 +59,7 @@ impl Workers {
             idle,
             ramp,
         });
-        let pool = Pool { jobs, pending };
+        let pool = Pool::new(jobs, pending);
         tasks.spawn(workers.dispatch(queue, pool.clone()));
         pool
     }
@@ -150,11 +79,7 @@ impl Workers {
             request_id: job.request_id.clone(),
             payload: job.payload.clone(),
             timeout: self.settings.timeout,
-            function_arn: format!(
-                "arn:aws:lambda:{}:000000000000:function:rayfold-{}",
-                crate::minio::REGION,
-                self.function
-            ),
+            function_arn: format!("arn:aws:lambda:{REGION}:000000000000:function:rayfold-{}", self.function),
             trace_id: trace_id(&job.request_id),
         };
         let outcome = match self.sandbox().await {
@@ -174,7 +99,7 @@ impl Workers {
     }
 
     /// The process used last, or a new one as soon as the ramp allows it.
-    async fn sandbox(&self) -> crate::Result<Sandbox> {
+    async fn sandbox(&self) -> Result<Sandbox> {
         loop {
             {
                 let mut idle = self.idle();
@@ -235,62 +160,9 @@ fn trace_id(request_id: &str) -> String {
     format!("Root=1-{}-{};Parent={};Sampled=0", &hex[..8], &hex[8..32], &hex[..16])
 }
 
-/// How fast new processes may start.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ramp {
-    /// At once.
-    pub burst: u32,
-    /// Afterwards.
-    pub per_second: f64,
-}
-
-/// Lambda's own: 1,000 every ten seconds.
-impl Default for Ramp {
-    fn default() -> Self {
-        Self { burst: 1000, per_second: 100.0 }
-    }
-}
-
-/// A token bucket.
-struct Bucket {
-    ramp: Ramp,
-    tokens: f64,
-    filled: Option<Instant>,
-}
-
-impl Bucket {
-    fn new(ramp: Ramp) -> Self {
-        Self { ramp, tokens: f64::from(ramp.burst), filled: None }
-    }
-
-    fn take(&mut self, now: Instant) -> bool {
-        let since = self.filled.map_or(0.0, |filled| now.saturating_duration_since(filled).as_secs_f64());
-        self.filled = Some(now);
-        self.tokens = (self.tokens + since * self.ramp.per_second).min(f64::from(self.ramp.burst));
-        let has_one = self.tokens >= 1.0;
-        if has_one {
-            self.tokens -= 1.0;
-        }
-        has_one
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_ramp_lets_a_burst_through_and_then_a_trickle() {
-        let mut bucket = Bucket::new(Ramp { burst: 3, per_second: 10.0 });
-        let start = Instant::now();
-        let taken = |bucket: &mut Bucket, ms| bucket.take(start + Duration::from_millis(ms));
-        assert!((0..3).all(|_| taken(&mut bucket, 0)));
-        assert!(!taken(&mut bucket, 50));
-        assert!(taken(&mut bucket, 101));
-        assert!(!taken(&mut bucket, 102));
-        assert!((0..3).all(|_| taken(&mut bucket, 10_000)));
-        assert!(!taken(&mut bucket, 10_000));
-    }
 
     #[test]
     fn trace_ids_have_the_shape_of_x_ray() {

@@ -14,9 +14,8 @@ use hyper::{Method, Request, Response, StatusCode};
 use serde_json::json;
 use tokio::sync::mpsc;
 
-use crate::Result;
-use crate::http::{Body, Server, full, json, listen};
-use crate::minio::any_port;
+use crate::error::Result;
+use crate::http::{Body, Server, any_port, full, json, listen};
 
 const BASE: &str = "/2018-06-01/runtime/";
 

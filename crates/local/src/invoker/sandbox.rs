@@ -9,12 +9,12 @@ use std::time::{Duration, Instant};
 use tokio::io::{AsyncBufReadExt, AsyncRead, BufReader};
 use tokio::process::{Child, Command};
 
-use super::Settings;
+use super::meter::Meter;
 use super::runtime_api::{Call, Handout, RuntimeApi};
-use crate::meter::Meter;
+use super::settings::Settings;
+use crate::error::{Error, Result};
 use crate::observation::{Attempt, Observer, Outcome, Requests, Seen};
 use crate::routes::Function;
-use crate::{Error, Result};
 
 /// What Lambda gives a process before its first call of `next`.
 const INIT_TIMEOUT: Duration = Duration::from_secs(10);

@@ -1,7 +1,8 @@
 //! Finding MinIO, or building it from source.
 //!
-//! The community edition is published as source alone. The version is its last commit; older ones mishandle `If-Match`
-//! on a missing key. It goes into the user's cache once; a file lock keeps processes from building it side by side.
+//! The community edition is archived, and was published as source alone; module proxies may refuse it. The version is its
+//! last commit; older ones mishandle `If-Match` on a missing key. It goes into the user's cache once; a file lock keeps
+//! processes from building it side by side.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
@@ -9,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::{env, mem};
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// What is built when there is none.
 pub const SOURCE: &str = "github.com/minio/minio@v0.0.0-20260212201848-7aac2a2c5b7c";
@@ -17,24 +18,37 @@ pub const SOURCE: &str = "github.com/minio/minio@v0.0.0-20260212201848-7aac2a2c5
 /// The oldest Go that builds [`SOURCE`].
 const GO: (u32, u32) = (1, 25);
 
-/// The binary that RAYFOLD_MINIO names, or `minio` on the PATH, or the one built earlier, or one built now.
-///
-/// `say` hears what takes time, a line at a time.
+/// The binary that RAYFOLD_MINIO names, or `minio` on the PATH, or the one built earlier.
 ///
 /// # Errors
-/// [`Error::NoMinio`] without MinIO and Go, [`Error::Install`] when the build fails, [`Error::File`] for the cache.
-pub fn minio(say: &mut dyn FnMut(&str)) -> Result<PathBuf> {
+/// [`Error::NoMinio`], [`Error::NamedMinioMissing`].
+pub fn find() -> Result<PathBuf> {
     if let Some(named) = env::var_os("RAYFOLD_MINIO").map(PathBuf::from) {
         return if named.is_file() { Ok(named) } else { Err(Error::NamedMinioMissing(named)) };
     }
     if let Some(found) = on_path("minio") {
         return Ok(found);
     }
-    let folder = cache()?.join("bin");
-    let binary = folder.join("minio");
+    let binary = cache()?.join("minio");
     if is_installed(&binary) {
         return Ok(binary);
     }
+    Err(Error::NoMinio(format!("it is neither on the PATH nor in {}", binary.display())))
+}
+
+/// The same, or one built now.
+///
+/// `say` hears what takes time, a line at a time.
+///
+/// # Errors
+/// [`Error::NoMinio`] without MinIO and Go, [`Error::Install`] when the build fails, [`Error::File`] for the cache.
+pub fn find_or_install(say: &mut dyn FnMut(&str)) -> Result<PathBuf> {
+    match find() {
+        Err(Error::NoMinio(_)) => {}
+        found => return found,
+    }
+    let folder = cache()?;
+    let binary = folder.join("minio");
     fs::create_dir_all(&folder).map_err(Error::file(&folder))?;
     let lock_path = folder.join("minio.lock");
     let lock = File::create(&lock_path).map_err(Error::file(&lock_path))?;
@@ -112,13 +126,14 @@ fn parse_go_version(text: &str) -> Option<(u32, u32)> {
     Some((numbers.next()?.parse().ok()?, numbers.next()?.parse().ok()?))
 }
 
+/// The folder that a MinIO built from source goes into.
 fn cache() -> Result<PathBuf> {
     let base = env::var_os("XDG_CACHE_HOME")
         .map(PathBuf::from)
         .filter(|path| path.is_absolute())
         .or_else(|| env::home_dir().map(|home| home.join(".cache")))
         .ok_or_else(|| Error::NoMinio("no home folder to install MinIO in".into()))?;
-    Ok(base.join("rayfold"))
+    Ok(base.join("rayfold/bin"))
 }
 
 fn on_path(program: &str) -> Option<PathBuf> {

@@ -30,6 +30,9 @@ mod story;
 
 pub use scale::{Scale, ScaleReport, measure};
 
+/// The pixel version of what is drawn here.
+const PIXELS: u32 = 1;
+
 /// A guarantee that did not hold.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("seed {seed}: {what}\nreplay it with RAYFOLD_SEED={seed}")]

@@ -9,11 +9,11 @@ use std::time::Duration;
 
 use bytes::Bytes;
 
-use super::Shared;
 use super::bucket::{Actor, Grounds};
 use super::engine::{Engine, WorldClock, lock};
 use super::expected::Expected;
 use super::platform::Platform;
+use super::{PIXELS, Shared};
 use crate::keys::{Animation, Key, Receipt};
 use crate::store::PutOptions;
 use crate::{Clock, Policy, Randomness};
@@ -81,7 +81,7 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
     let grounds = Grounds::new(engine.clone(), scale.seed, false);
     let platform = Platform::new(
         grounds.clone(),
-        Policy::default(),
+        Policy::new(PIXELS),
         None,
         scale.concurrency,
         TIMEOUT,

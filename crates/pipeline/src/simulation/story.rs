@@ -10,7 +10,7 @@ use super::bucket::{Actor, Faults, Grounds, Moment};
 use super::engine::{Engine, WorldClock, lock};
 use super::expected::Expected;
 use super::platform::{Chaos, Platform, Work};
-use super::{Run, Shared};
+use super::{PIXELS, Run, Shared};
 use crate::keys::{Animation, Key};
 use crate::manifest::Manifest;
 use crate::store::{Bucket, PutOptions};
@@ -22,6 +22,9 @@ const PATIENCE: Duration = Duration::from_secs(24 * 3600);
 
 /// How long an invocation may run.
 const TIMEOUT: Duration = Duration::from_secs(30);
+
+/// For how long things happen and go wrong.
+const TROUBLES: Duration = Duration::from_secs(45);
 
 /// How many sweeps a run may need.
 const MOST_SWEEPS: u32 = 24;
@@ -36,68 +39,9 @@ pub(super) fn run(
     log: Option<&mut Vec<String>>,
 ) -> Result<Run, String> {
     let random = Randomness::seeded(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x5eed);
-    let engine = Engine::default();
-    let grounds = Grounds::new(engine.clone(), random.bits(), log.is_some());
-    let policy = Policy {
-        quiet: Duration::from_millis([100, 1_000, 5_000][pick(&random, 3)]),
-        stuck_after: Duration::from_secs(60),
-        superseded_after: Duration::from_secs([1, 1_000, 7 * 24 * 3600][pick(&random, 3)]),
-        pause_cap: Duration::from_millis([1, 50, 500][pick(&random, 3)]),
-        pause_per_frame: Duration::from_millis([0, 1, 20][pick(&random, 3)]),
-        // Of most manifests here 800 bytes are the head and some of the frames.
-        glimpse: [64, 800, 32 * 1024][pick(&random, 3)],
-        ..Policy::default()
-    };
-    let concurrency = [1, 2, 4, 100][pick(&random, 4)];
-    let platform = Platform::new(
-        grounds.clone(),
-        policy,
-        mutation,
-        concurrency,
-        TIMEOUT,
-        (1, [20, 300, 3_000][pick(&random, 3)]),
-        Duration::from_millis([0, 0, 100, 400][pick(&random, 4)]),
-    );
-    let calm = random.one_in(4);
-    if !calm {
-        let rare = |random: &Randomness, rates: [u64; 4]| rates[pick(random, 4)];
-        *lock(&platform.chaos) = Chaos {
-            drop: rare(&random, [0, 0, 0, 8]),
-            duplicate: rare(&random, [0, 0, 3, 10]),
-            kill: rare(&random, [0, 3, 6, 2]),
-            too_old: rare(&random, [0, 0, 0, 30]),
-            delay_ms: rare(&random, [10, 100, 1_000, 5_000]),
-            skew_ms: rare(&random, [0, 0, 50, 2_000]),
-        };
-        *lock(&grounds.faults) = Faults {
-            busy: rare(&random, [0, 0, 20, 60]),
-            conflict: rare(&random, [0, 0, 5, 30]),
-            lost_answer: rare(&random, [0, 0, 10, 40]),
-            torn_listings: random.one_in(2),
-            slow: rare(&random, [0, 3, 6, 20]),
-        };
-    }
-    let animation = Animation::new("an/im").map_err(|error| error.to_string())?;
-    let watch: Shared<Watch> = Shared::default();
-    {
-        let (platform, watch) = (Arc::downgrade(&platform), watch.clone());
-        *lock(&grounds.notify) = Some(Arc::new(move |actor, key, there, bucket| {
-            lock(&watch).see(actor, key, there, bucket);
-            if let Some(platform) = platform.upgrade() {
-                let etag = bucket.head(key).ok().filter(|_| there).map(|info| info.etag);
-                platform.object_event(key, etag);
-            }
-        }));
-    }
-    write_story(&random, &grounds, &platform, &animation);
-    if random.one_in(2) {
-        *lock(&grounds.moments) = Some(awkward_user(&random, &grounds));
-    }
-
-    engine.run(Duration::from_secs(45));
-    *lock(&platform.chaos) = Chaos { delay_ms: 10, ..Chaos::default() };
-    *lock(&grounds.faults) = Faults::default();
-    let judge = Judge { engine, grounds, platform, animation, watch };
+    let judge = begin(&random, mutation, log.is_some())?;
+    judge.engine.run(TROUBLES);
+    judge.calm_down();
     let outcome = judge.judge();
     // The notification and the platform's tasks know each other.
     *lock(&judge.grounds.notify) = None;
@@ -107,6 +51,84 @@ pub(super) fn run(
         log.append(&mut lock(noted));
     }
     outcome
+}
+
+/// A world with its story, before anything has happened.
+fn begin(random: &Randomness, mutation: Option<Mutation>, is_logged: bool) -> Result<Judge, String> {
+    let engine = Engine::default();
+    let grounds = Grounds::new(engine.clone(), random.bits(), is_logged);
+    let policy = policy(random);
+    let concurrency = [1, 2, 4, 100][pick(random, 4)];
+    let draw_ms = (1, [20, 300, 3_000][pick(random, 3)]);
+    let push = Duration::from_millis([0, 0, 100, 400][pick(random, 4)]);
+    let platform = Platform::new(grounds.clone(), policy, mutation, concurrency, TIMEOUT, draw_ms, push);
+    if !random.one_in(4) {
+        *lock(&platform.chaos) = chaos(random);
+        *lock(&grounds.faults) = faults(random);
+    }
+    let animation = Animation::new("an/im").map_err(|error| error.to_string())?;
+    let watch = watch(&grounds, &platform);
+    write_story(random, &grounds, &platform, &animation);
+    if random.one_in(2) {
+        *lock(&grounds.moments) = Some(awkward_user(random, &grounds));
+    }
+    Ok(Judge { engine, grounds, platform, animation, watch })
+}
+
+/// The protocol's numbers: those that decide what a small world can show.
+fn policy(random: &Randomness) -> Policy {
+    Policy {
+        quiet: Duration::from_millis([100, 1_000, 5_000][pick(random, 3)]),
+        stuck_after: Duration::from_secs(60),
+        superseded_after: Duration::from_secs([1, 1_000, 7 * 24 * 3600][pick(random, 3)]),
+        pause_cap: Duration::from_millis([1, 50, 500][pick(random, 3)]),
+        pause_per_frame: Duration::from_millis([0, 1, 20][pick(random, 3)]),
+        // Of most manifests here 800 bytes are the head and some of the frames.
+        glimpse: [64, 800, 32 * 1024][pick(random, 3)],
+        ..Policy::new(PIXELS)
+    }
+}
+
+/// One of four rates.
+fn rate(random: &Randomness, rates: [u64; 4]) -> u64 {
+    rates[pick(random, 4)]
+}
+
+/// How the platform fails.
+fn chaos(random: &Randomness) -> Chaos {
+    Chaos {
+        drop: rate(random, [0, 0, 0, 8]),
+        duplicate: rate(random, [0, 0, 3, 10]),
+        kill: rate(random, [0, 3, 6, 2]),
+        too_old: rate(random, [0, 0, 0, 30]),
+        delay_ms: rate(random, [10, 100, 1_000, 5_000]),
+        skew_ms: rate(random, [0, 0, 50, 2_000]),
+    }
+}
+
+/// How the bucket fails.
+fn faults(random: &Randomness) -> Faults {
+    Faults {
+        busy: rate(random, [0, 0, 20, 60]),
+        conflict: rate(random, [0, 0, 5, 30]),
+        lost_answer: rate(random, [0, 0, 10, 40]),
+        torn_listings: random.one_in(2),
+        slow: rate(random, [0, 3, 6, 20]),
+    }
+}
+
+/// Has every change of the bucket watched, and told to the platform.
+fn watch(grounds: &Grounds, platform: &Arc<Platform>) -> Shared<Watch> {
+    let watch: Shared<Watch> = Shared::default();
+    let (platform, watched) = (Arc::downgrade(platform), watch.clone());
+    *lock(&grounds.notify) = Some(Arc::new(move |actor, key, there, bucket| {
+        lock(&watched).see(actor, key, there, bucket);
+        if let Some(platform) = platform.upgrade() {
+            let etag = bucket.head(key).ok().filter(|_| there).map(|info| info.etag);
+            platform.object_event(key, etag);
+        }
+    }));
+    watch
 }
 
 fn pick(random: &Randomness, of: usize) -> usize {
@@ -295,6 +317,12 @@ struct Judge {
 }
 
 impl Judge {
+    /// From now on nothing goes wrong.
+    fn calm_down(&self) {
+        *lock(&self.platform.chaos) = Chaos { delay_ms: 10, ..Chaos::default() };
+        *lock(&self.grounds.faults) = Faults::default();
+    }
+
     fn judge(&self) -> Result<Run, String> {
         self.rest()?;
         let needs_sweep = lock(&self.platform.diary).needs_sweep;

@@ -25,13 +25,11 @@ use std::time::Duration;
 
 use aws_config::{BehaviorVersion, Region};
 use aws_sdk_s3::Client;
-use aws_sdk_s3::config::http::HttpResponse;
 use aws_sdk_s3::config::retry::RetryConfig;
 use aws_sdk_s3::config::timeout::TimeoutConfig;
 use aws_sdk_s3::config::{
     Credentials, RequestChecksumCalculation, ResponseChecksumValidation, SharedHttpClient,
 };
-use aws_sdk_s3::error::SdkError;
 use aws_sdk_s3::primitives::{ByteStream, DateTime};
 use aws_sdk_s3::types::EncodingType;
 use aws_smithy_http_client::Builder as HttpBuilder;
@@ -46,7 +44,7 @@ use crate::{Error, Result};
 pub use admin::Notification;
 pub use upload::S3Upload;
 
-use answers::{decoded, error_of};
+use answers::{decoded, error_of, status};
 
 /// Of one request, the repetitions not counted in: longer than any object of the pipeline takes.
 const READ_TIMEOUT: Duration = Duration::from_secs(30);
@@ -272,8 +270,4 @@ fn length(bytes: Option<i64>) -> u64 {
 fn timestamp(at: Option<&DateTime>) -> Timestamp {
     let ms = at.and_then(|at| at.to_millis().ok()).and_then(|ms| u64::try_from(ms).ok());
     Timestamp(ms.unwrap_or_default())
-}
-
-fn status<E>(error: &SdkError<E, HttpResponse>) -> Option<u16> {
-    error.raw_response().map(|response| response.status().as_u16())
 }

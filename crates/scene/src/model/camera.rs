@@ -1,9 +1,15 @@
 //! Cameras: which ray a pixel is.
 
+use std::fmt::{self, Formatter};
+
 use glam::{DVec2, DVec3};
 
-use super::invalid::{InvalidValue, Parameter, direction, finite, positive};
-use super::{to_unit_scale, unit};
+use super::invalid::{Faults, InvalidValue, Parameter, direction, finite, positive};
+use super::vector::{to_unit_scale, unit};
+use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values, write_line};
+
+/// The command of the orthographic camera.
+pub(crate) const ORTHOCAMERA: Form = Form::new("Orthocamera", &[]);
 
 /// Where the ray of a pixel starts and where it goes.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -13,6 +19,16 @@ pub enum Camera {
     Orthographic,
     /// All rays start at the eye.
     Pinhole(Pinhole),
+}
+
+impl Camera {
+    /// As a line of a script.
+    pub(crate) fn write(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Orthographic => writeln!(f, "{}", ORTHOCAMERA.name),
+            Self::Pinhole(pinhole) => write_line(f, pinhole),
+        }
+    }
 }
 
 /// A pinhole camera: the window lies at a distance in front of the eye, square to the gaze.
@@ -46,7 +62,7 @@ impl Pinhole {
     }
 
     /// As [`Pinhole::new`], but says everything that is wrong.
-    pub(crate) fn checked(
+    fn checked(
         eye: DVec3,
         gaze: DVec3,
         up: DVec3,
@@ -115,6 +131,32 @@ impl Pinhole {
         // The same as up x w, but from the numbers of the script, which are exact.
         let u = unit(cross(level(self.gaze), level(self.up)));
         (u, w.cross(u), w)
+    }
+}
+
+impl Scripted for Pinhole {
+    const FORM: Form = Form::new(
+        "Camera",
+        &[
+            Field::new(Parameter::Eye, &["ex", "ey", "ez"], Kind::Position, Values::Any),
+            Field::new(Parameter::Gaze, &["gx", "gy", "gz"], Kind::Direction, Values::NotZero),
+            Field::new(Parameter::Up, &["upx", "upy", "upz"], Kind::Direction, Values::NotZero),
+            Field::new(Parameter::WindowDistance, &["s"], Kind::Length, Values::Positive),
+            Field::new(Parameter::WindowCorner, &["au", "av"], Kind::WindowPosition, Values::Any),
+            Field::new(Parameter::WindowCorner, &["bu", "bv"], Kind::WindowPosition, Values::Any),
+        ],
+    );
+
+    fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        let [eye, gaze, up] = [numbers.vector(), numbers.vector(), numbers.vector()];
+        Self::checked(eye, gaze, up, numbers.number(), numbers.pair(), numbers.pair()).map_err(Faults)
+    }
+
+    fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        [self.eye, self.gaze, self.up].iter().try_for_each(|v| line.vector(*v))?;
+        line.number(self.distance)?;
+        line.pair(self.lower_left)?;
+        line.pair(self.upper_right)
     }
 }
 

@@ -28,12 +28,59 @@ pub enum InvalidValue {
     /// A count is zero.
     #[error("{0} must be at least 1")]
     Zero(Parameter),
+    /// A number is not one of the whole numbers of a range.
+    #[error("{0} must be a whole number from {1} to {2}")]
+    NotWhole(Parameter, u32, u32),
     /// A number lies outside the range that makes sense for it.
     #[error("{0} must be from {1} to {2}")]
     OutOfRange(Parameter, f64, f64),
     /// A triangle or a box was given a mirror coefficient, which the language has for spheres only.
     #[error("only a sphere can have a mirror coefficient")]
     MirrorOnFlat,
+}
+
+impl InvalidValue {
+    /// Whether it is about the number `name` of a parameter.
+    pub(crate) fn is_about(self, parameter: Parameter, name: &str) -> bool {
+        match self {
+            Self::NotFinite(about)
+            | Self::NotPositive(about)
+            | Self::ZeroDirection(about)
+            | Self::Zero(about)
+            | Self::NotWhole(about, ..)
+            | Self::OutOfRange(about, ..) => about == parameter,
+            Self::GazeParallelToUp => matches!(parameter, Parameter::Gaze | Parameter::Up),
+            Self::EmptyWindowWidth => matches!(name, "au" | "bu"),
+            Self::EmptyWindowHeight => matches!(name, "av" | "bv"),
+            Self::MirrorOnFlat => parameter == Parameter::Mirror,
+        }
+    }
+}
+
+/// All that is wrong with the numbers of a line.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Faults(pub(crate) Vec<InvalidValue>);
+
+impl From<InvalidValue> for Faults {
+    fn from(fault: InvalidValue) -> Self {
+        Self(vec![fault])
+    }
+}
+
+/// What is allowed, but hardly meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Doubt {
+    /// A triangle without area is never hit.
+    DegenerateTriangle,
+}
+
+impl Doubt {
+    /// What it is about.
+    pub(crate) fn parameter(self) -> Parameter {
+        match self {
+            Self::DegenerateTriangle => Parameter::Vertex,
+        }
+    }
 }
 
 /// What an [`InvalidValue`] is about.

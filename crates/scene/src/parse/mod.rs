@@ -6,7 +6,6 @@
 //!
 //! Follows `docs/language.md`, where the forms of numbers, blanks and line ends are decided.
 
-mod command;
 mod number;
 mod text;
 mod wording;
@@ -14,17 +13,13 @@ mod wording;
 use std::ops::Range;
 use std::str::Utf8Error;
 
-use glam::{DVec2, DVec3};
-
+use crate::command::{Command, MAX_NUMBERS};
 use crate::diagnostic::Diagnostic;
+use crate::form::{Numbers, Scripted};
 use crate::limits::Limits;
-use crate::model::{
-    Camera, Cuboid, DirectionalLight, InvalidValue, Light, Material, Object, Pinhole, Screen, Sphere,
-    Triangle,
-};
+use crate::model::{Camera, Cuboid, DirectionalLight, InvalidValue, Light, Object, Screen, Sphere, Triangle};
 use crate::report::{Fault, Line, Report};
 use crate::script::{Recorder, Script};
-use command::{Command, MAX_PARAMETERS};
 use text::{Words, lines};
 
 /// What a text turned out to be.
@@ -83,22 +78,7 @@ struct Statement<'a> {
     command: Command,
     words: Words,
     /// Of the parameters; 0 for optional ones that are missing.
-    values: [f64; MAX_PARAMETERS],
-}
-
-impl Statement<'_> {
-    fn vector(&self, first: usize) -> DVec3 {
-        DVec3::from_slice(&self.values[first..])
-    }
-
-    fn corner(&self, first: usize) -> DVec2 {
-        DVec2::from_slice(&self.values[first..])
-    }
-
-    /// Ambient and diffuse coefficients from parameter `first`.
-    fn matte(&self, first: usize) -> Result<Material, InvalidValue> {
-        Material::new(self.vector(first), self.vector(first + 3), DVec3::ZERO)
-    }
+    values: [f64; MAX_NUMBERS],
 }
 
 impl<'a> Parser<'a> {
@@ -196,8 +176,19 @@ impl<'a> Parser<'a> {
                 self.trace_misspelt = true;
                 self.unused = None;
             }
-            Command::Screen if matches!(self.screen, ScreenState::Unset) => self.screen = ScreenState::Faulty,
-            _ => {}
+            Command::Screen => {
+                if matches!(self.screen, ScreenState::Unset) {
+                    self.screen = ScreenState::Faulty;
+                }
+            }
+            Command::Orthocamera
+            | Command::Camera
+            | Command::Background
+            | Command::Sphere
+            | Command::Triangle
+            | Command::Cuboid
+            | Command::Ilight
+            | Command::Clear => {}
         }
     }
 
@@ -208,20 +199,22 @@ impl<'a> Parser<'a> {
         text: &str,
         command: Command,
         words: &Words,
-    ) -> Option<[f64; MAX_PARAMETERS]> {
-        let mut values = [0.0; MAX_PARAMETERS];
+    ) -> Option<[f64; MAX_NUMBERS]> {
+        let mut values = [0.0; MAX_NUMBERS];
         let mut good = true;
-        for (i, (span, parameter)) in words.parameters().iter().zip(command.parameters()).enumerate() {
+        let (least, most) = command.form().arity().into_inner();
+        for (i, span) in words.parameters().iter().take(most).enumerate() {
             let word = &text[span.clone()];
             match number::parse(word) {
                 Ok(value) => values[i] = value,
                 Err(fault) => {
                     good = false;
-                    self.report.error(line, span.clone(), || wording::bad_number(fault, parameter, word));
+                    self.report.error(line, span.clone(), || {
+                        wording::bad_number(fault, command.form().number(i).0, word)
+                    });
                 }
             }
         }
-        let (least, most) = command.arity().into_inner();
         if words.count() < least {
             good = false;
             self.report.error(line, words.end(), || wording::too_few(command, words));
@@ -236,92 +229,92 @@ impl<'a> Parser<'a> {
     }
 
     fn run(&mut self, s: &Statement<'a>) {
-        if !matches!(s.command, Command::Trace | Command::Clear) && self.unused.is_none() {
-            self.unused = Some((s.line, s.words.command.clone()));
-        }
         match s.command {
-            Command::Screen => {
-                self.screen = self.screen(s).map_or(ScreenState::Faulty, ScreenState::Set);
+            Command::Screen => self.screen(s),
+            Command::Orthocamera => self.camera(s, Some(Camera::Orthographic)),
+            Command::Camera => {
+                let pinhole = self.read(s).map(Camera::Pinhole);
+                self.camera(s, pinhole);
             }
-            Command::Orthocamera => self.recorder.set_camera(Camera::Orthographic),
-            Command::Camera => self.camera(s),
-            Command::Background => self.recorder.set_background(s.vector(0)),
-            Command::Sphere => {
-                let material = Material::new(s.vector(4), s.vector(7), s.vector(10));
-                let sphere = material.and_then(|m| Sphere::new(s.values[0], s.vector(1), m));
-                self.object(s, sphere.map(Object::Sphere));
-            }
-            Command::Triangle => {
-                let vertices = [s.vector(0), s.vector(3), s.vector(6)];
-                let triangle = s.matte(9).and_then(|m| Triangle::new(vertices, m));
-                if triangle.is_ok_and(|t| t.is_degenerate()) {
-                    self.report.warning(s.line, s.words.span(0..9), wording::degenerate_triangle);
-                }
-                self.object(s, triangle.map(Object::Triangle));
-            }
-            Command::Cuboid => {
-                let cuboid = s.matte(6).and_then(|m| Cuboid::new([s.vector(0), s.vector(3)], m));
-                self.object(s, cuboid.map(Object::Cuboid));
-            }
-            Command::Ilight => self.light(s),
-            Command::Clear => {
-                (self.objects, self.lights) = (0, 0);
-                self.unused = None;
-                self.recorder.clear();
-            }
+            Command::Background => self.background(s),
+            Command::Sphere => self.object::<Sphere>(s),
+            Command::Triangle => self.object::<Triangle>(s),
+            Command::Cuboid => self.object::<Cuboid>(s),
+            Command::Ilight => self.light::<DirectionalLight>(s),
+            Command::Clear => self.clear(),
             Command::Trace => self.trace(s),
         }
     }
 
-    fn screen(&mut self, s: &Statement<'a>) -> Option<Screen> {
-        let [width, height] = [0, 1].map(|i| {
-            let value = s.values[i];
-            if value.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&value) {
-                return Some(value as u32);
+    /// What the line holds; `None` for what is no such thing, which is reported.
+    fn read<T: Scripted>(&mut self, s: &Statement<'a>) -> Option<T> {
+        match T::read(&mut Numbers::new(&s.values)) {
+            Ok(item) => Some(item),
+            Err(faults) => {
+                faults.0.into_iter().for_each(|fault| self.invalid(s, fault));
+                None
             }
-            let span = s.words.span(i..i + 1);
-            self.report.error(s.line, span.clone(), || {
-                let word = String::from_utf8_lossy(&s.line.bytes[span]);
-                wording::no_side(value, s.command.parameters()[i], &word)
-            });
-            None
-        });
-        let screen = Screen::new(width?, height?).ok()?;
-        let (pixels, limit) = (screen.pixels(), self.limits.max_pixels);
-        if pixels > limit {
-            self.report.error(s.line, s.words.span(0..2), || wording::too_many_pixels(pixels, limit));
-            return None;
-        }
-        Some(screen)
-    }
-
-    fn camera(&mut self, s: &Statement<'a>) {
-        let (eye, gaze, up) = (s.vector(0), s.vector(3), s.vector(6));
-        match Pinhole::checked(eye, gaze, up, s.values[9], s.corner(10), s.corner(12)) {
-            Ok(pinhole) => self.recorder.set_camera(Camera::Pinhole(pinhole)),
-            Err(faults) => faults.into_iter().for_each(|fault| self.invalid(s, fault)),
         }
     }
 
-    fn object(&mut self, s: &Statement<'a>, object: Result<Object, InvalidValue>) {
-        match object {
-            Ok(object) => {
-                self.objects += 1;
-                self.check_limit(s, self.objects, self.limits.max_objects, "objects in a scene");
-                self.record(|recorder| recorder.add_object(object));
+    fn screen(&mut self, s: &Statement<'a>) {
+        self.awaits_trace(s);
+        let limit = self.limits.max_pixels;
+        self.screen = match self.read::<Screen>(s) {
+            Some(screen) if screen.pixels() <= limit => ScreenState::Set(screen),
+            Some(screen) => {
+                let span = s.words.span(0..2);
+                self.report.error(s.line, span, || wording::too_many_pixels(screen.pixels(), limit));
+                ScreenState::Faulty
             }
-            Err(fault) => self.invalid(s, fault),
+            None => ScreenState::Faulty,
+        };
+    }
+
+    fn camera(&mut self, s: &Statement<'a>, camera: Option<Camera>) {
+        self.awaits_trace(s);
+        if let Some(camera) = camera {
+            self.recorder.set_camera(camera);
         }
     }
 
-    fn light(&mut self, s: &Statement<'a>) {
-        match DirectionalLight::new(s.vector(0), s.vector(3)) {
-            Ok(light) => {
-                self.lights += 1;
-                self.check_limit(s, self.lights, self.limits.max_lights, "lights in a scene");
-                self.record(|recorder| recorder.add_light(Light::Directional(light)));
-            }
-            Err(fault) => self.invalid(s, fault),
+    fn background(&mut self, s: &Statement<'a>) {
+        self.awaits_trace(s);
+        if let Some(background) = self.read(s) {
+            self.recorder.set_background(background);
+        }
+    }
+
+    fn object<T: Scripted + Into<Object>>(&mut self, s: &Statement<'a>) {
+        self.awaits_trace(s);
+        let Some(object) = self.read::<T>(s).map(Into::into) else { return };
+        if let Some(doubt) = object.doubt() {
+            let place = s.command.form().place(|_, parameter| parameter == doubt.parameter());
+            self.report.warning(s.line, s.words.span(place), || wording::doubtful(doubt));
+        }
+        self.objects += 1;
+        self.check_limit(s, self.objects, self.limits.max_objects, "objects in a scene");
+        self.record(|recorder| recorder.add_object(object));
+    }
+
+    fn light<T: Scripted + Into<Light>>(&mut self, s: &Statement<'a>) {
+        self.awaits_trace(s);
+        let Some(light) = self.read::<T>(s).map(Into::into) else { return };
+        self.lights += 1;
+        self.check_limit(s, self.lights, self.limits.max_lights, "lights in a scene");
+        self.record(|recorder| recorder.add_light(light));
+    }
+
+    fn clear(&mut self) {
+        (self.objects, self.lights) = (0, 0);
+        self.unused = None;
+        self.recorder.clear();
+    }
+
+    /// A command that has no effect unless a `Trace` follows.
+    fn awaits_trace(&mut self, s: &Statement<'a>) {
+        if self.unused.is_none() {
+            self.unused = Some((s.line, s.words.command.clone()));
         }
     }
 
@@ -340,8 +333,13 @@ impl<'a> Parser<'a> {
     }
 
     fn invalid(&mut self, s: &Statement<'a>, fault: InvalidValue) {
-        let span = s.words.span(s.command.place_of(fault));
-        self.report.error(s.line, span, || wording::invalid(fault));
+        let form = s.command.form();
+        let place = form.place(|name, parameter| fault.is_about(parameter, name));
+        let (name, _) = form.number(place.start);
+        let span = s.words.span(place);
+        self.report.error(s.line, span.clone(), || {
+            wording::invalid(fault, name, &String::from_utf8_lossy(&s.line.bytes[span]))
+        });
     }
 
     /// Reports the first command beyond a limit.

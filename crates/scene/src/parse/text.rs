@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::command::MAX_PARAMETERS;
+use crate::command::MAX_NUMBERS;
 use crate::report::{BYTE_ORDER_MARK, Line};
 
 /// The lines of a text without their ends and without the byte-order mark. The last one is empty when the text ends
@@ -21,7 +21,7 @@ pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
 #[derive(Debug, PartialEq)]
 pub(super) struct Words {
     pub(super) command: Range<usize>,
-    parameters: [Range<usize>; MAX_PARAMETERS],
+    parameters: [Range<usize>; MAX_NUMBERS],
     count: usize,
     /// End of the last word.
     end: usize,
@@ -43,7 +43,7 @@ impl Words {
             (at > start).then_some(start..at)
         };
         let command = next()?;
-        let mut words = Self { end: command.end, command, parameters: [NOWHERE; MAX_PARAMETERS], count: 0 };
+        let mut words = Self { end: command.end, command, parameters: [NOWHERE; MAX_NUMBERS], count: 0 };
         while let Some(word) = next() {
             words.end = word.end;
             if let Some(slot) = words.parameters.get_mut(words.count) {
@@ -61,7 +61,7 @@ impl Words {
 
     /// The parameters, without those that no command has.
     pub(super) fn parameters(&self) -> &[Range<usize>] {
-        &self.parameters[..self.count.min(MAX_PARAMETERS)]
+        &self.parameters[..self.count.min(MAX_NUMBERS)]
     }
 
     /// From the first to the last of some parameters.
@@ -126,7 +126,7 @@ mod tests {
     fn surplus_words_are_counted() {
         let line = format!("Clear{}", " 1".repeat(100));
         let words = Words::of(line.as_bytes()).unwrap();
-        assert_eq!((words.count(), words.parameters().len()), (100, MAX_PARAMETERS));
+        assert_eq!((words.count(), words.parameters().len()), (100, MAX_NUMBERS));
         assert_eq!((words.rest(0), words.end()), (6..line.len(), line.len()..line.len()));
     }
 }

@@ -1,11 +1,12 @@
 //! What a person is told about a fault in a script: what is wrong, what was expected, what to do.
 
-use super::command::Command;
 use super::number::{self, NumberFault};
 use super::text::Words;
+use crate::command::Command;
 use crate::diagnostic::Code;
-use crate::model::InvalidValue;
-use crate::report::{Fault, grouped, quoted};
+use crate::model::{Doubt, InvalidValue};
+use crate::report::Fault;
+use crate::shown::{grouped, quoted};
 
 /// What `Trace` is for.
 const TRACE_HELP: &str = "`Trace` renders a frame of everything that stands before it";
@@ -83,7 +84,7 @@ fn hint(word: &str) -> Option<String> {
 }
 
 pub(super) fn too_few(command: Command, words: &Words) -> Fault {
-    let missing = command.parameters()[words.count()];
+    let (missing, _) = command.form().number(words.count());
     miscounted(Code::TooFewParameters, command, words).expected(format!("expected `{missing}` here"))
 }
 
@@ -98,7 +99,7 @@ pub(super) fn too_many(command: Command, words: &Words, first: &str) -> Fault {
 }
 
 fn miscounted(code: Code, command: Command, words: &Words) -> Fault {
-    let (least, most) = command.arity().into_inner();
+    let (least, most) = command.form().arity().into_inner();
     let takes = match (least, most) {
         (0, 0) => "no parameters".to_string(),
         (a, b) if a == b => format!("{a} numbers"),
@@ -109,31 +110,33 @@ fn miscounted(code: Code, command: Command, words: &Words) -> Fault {
         count => grouped(count as u64),
     };
     Fault::new(code, format!("`{}` takes {takes}, found {found}", command.name()))
-        .help(format!("write `{}`", command.usage()))
+        .help(format!("write `{}`", command.form()))
 }
 
-pub(super) fn invalid(fault: InvalidValue) -> Fault {
-    let expected = match fault {
-        InvalidValue::NotPositive(_) => "expected a number greater than 0",
-        InvalidValue::ZeroDirection(_) => "expected three numbers that are not all 0",
-        InvalidValue::GazeParallelToUp => "expected two directions that span a plane",
-        InvalidValue::EmptyWindowWidth => "expected `au` and `bu` to differ",
-        InvalidValue::EmptyWindowHeight => "expected `av` and `bv` to differ",
-        _ => "expected other values",
-    };
-    Fault::new(Code::InvalidValue, fault.to_string()).expected(expected)
+/// `word` is the first of the numbers that it is about, in the place of `name`.
+pub(super) fn invalid(fault: InvalidValue, name: &str, word: &str) -> Fault {
+    let told = |expected: &str| Fault::new(Code::InvalidValue, fault.to_string()).expected(expected);
+    match fault {
+        InvalidValue::NotFinite(_) => told("expected finite numbers"),
+        InvalidValue::NotPositive(_) => told("expected a number greater than 0"),
+        InvalidValue::ZeroDirection(_) => told("expected three numbers that are not all 0"),
+        InvalidValue::GazeParallelToUp => told("expected two directions that span a plane"),
+        InvalidValue::EmptyWindowWidth => told("expected `au` and `bu` to differ"),
+        InvalidValue::EmptyWindowHeight => told("expected `av` and `bv` to differ"),
+        InvalidValue::Zero(_) => told("expected a number from 1"),
+        InvalidValue::NotWhole(_, least, most) => not_whole(least, most, name, word),
+        InvalidValue::OutOfRange(_, least, most) => {
+            told(&format!("expected a number from {least} to {most}"))
+        }
+        InvalidValue::MirrorOnFlat => told("expected no mirror coefficients"),
+    }
 }
 
-/// About a side of the screen, `word` in the place of `parameter`.
-pub(super) fn no_side(value: f64, parameter: &str, word: &str) -> Fault {
-    let largest = u32::MAX;
-    let range = if value > largest.into() {
-        format!("up to {}", grouped(largest.into()))
-    } else {
-        "from 1".to_string()
-    };
+fn not_whole(least: u32, most: u32, name: &str, word: &str) -> Fault {
+    let too_large = number::parse(word).is_ok_and(|value| value > most.into());
+    let range = if too_large { format!("up to {}", grouped(most.into())) } else { format!("from {least}") };
     Fault::new(Code::InvalidValue, format!("{} is not a number of pixels", quoted(word)))
-        .expected(format!("expected `{parameter}`, a whole number {range}"))
+        .expected(format!("expected `{name}`, a whole number {range}"))
 }
 
 pub(super) fn too_many_pixels(pixels: u64, limit: u64) -> Fault {
@@ -161,9 +164,13 @@ pub(super) fn no_trace() -> Fault {
         .help(TRACE_HELP)
 }
 
-pub(super) fn degenerate_triangle() -> Fault {
-    Fault::new(Code::DegenerateTriangle, "a triangle of no area is never hit")
-        .expected("expected three points that are not on a line")
+pub(super) fn doubtful(doubt: Doubt) -> Fault {
+    match doubt {
+        Doubt::DegenerateTriangle => {
+            Fault::new(Code::DegenerateTriangle, "a triangle of no area is never hit")
+                .expected("expected three points that are not on a line")
+        }
+    }
 }
 
 pub(super) fn unused() -> Fault {

@@ -15,16 +15,16 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod intersect;
+mod shapes;
 
 use std::borrow::Cow;
 
 use glam::DVec3;
 use image::RgbImage;
-use rayfold_scene::{Camera, Cuboid, Light, Object, Pinhole, Scene, Sphere, Triangle, model::unit};
+use rayfold_scene::{Camera, Light, Object, Pinhole, Scene, model::unit};
 
-pub use intersect::Surface;
-pub(crate) use intersect::{normal_and_width, power, triangle_normal};
+pub use shapes::Surface;
+pub(crate) use shapes::{normal_and_width, power, triangle_normal};
 
 use crate::camera::{Ray, Rays};
 use crate::parallel::{CHANNELS, bands};
@@ -75,14 +75,14 @@ pub fn nearest(objects: &[Object], origin: DVec3, direction: DVec3) -> Option<Hi
     let ray = Ray { origin, direction };
     let mut best: Option<(usize, f64)> = None;
     for (index, object) in objects.iter().enumerate() {
-        if let Some(distance) = intersect::distance(object, ray)
+        if let Some(distance) = shapes::distance(object, ray)
             && best.is_none_or(|(_, least)| distance < least)
         {
             best = Some((index, distance));
         }
     }
     let (object, distance) = best?;
-    Some(Hit { object, distance, surface: intersect::surface(&objects[object], ray, distance) })
+    Some(Hit { object, distance, surface: shapes::surface(&objects[object], ray, distance) })
 }
 
 /// The scene with the eye at the origin: what is seen then has coordinates as small as it is near, wherever all of it
@@ -93,21 +93,8 @@ fn recentred(scene: &Scene) -> Cow<'_, Scene> {
 
 fn moved_to_eye(scene: &Scene) -> Option<Scene> {
     let Camera::Pinhole(p) = scene.camera else { return None };
-    let place = |point: DVec3| point - p.eye();
     let mut moved = scene.clone();
-    let objects = scene.objects.iter().map(|object| match object {
-        Object::Sphere(s) => {
-            let placed = Sphere::new(s.radius(), place(s.center()), *s.material()).ok()?;
-            let side = |eye, sphere| power(eye, sphere, 1.0).partial_cmp(&0.0);
-            (side(p.eye(), s) == side(DVec3::ZERO, &placed)).then_some(Object::Sphere(placed))
-        }
-        Object::Cuboid(c) => Cuboid::new(c.corners().map(place), *c.material()).ok().map(Object::Cuboid),
-        // Rounding would give it an area.
-        Object::Triangle(t) if t.is_degenerate() => Some(*object),
-        Object::Triangle(t) => {
-            Triangle::new(t.vertices().map(place), *t.material()).ok().map(Object::Triangle)
-        }
-    });
+    let objects = scene.objects.iter().map(|object| shapes::seen_from(object, p.eye()));
     moved.objects = objects.collect::<Option<Vec<_>>>()?.into();
     let eye = Pinhole::new(DVec3::ZERO, p.gaze(), p.up(), p.distance(), p.lower_left(), p.upper_right());
     moved.camera = Camera::Pinhole(eye.ok()?);
@@ -127,9 +114,10 @@ fn color_along(scene: &Scene, ray: Ray, bounces: u32) -> DVec3 {
         let towards = -unit(light.direction());
         let cosine = normal.dot(towards);
         let lit = cosine > 0.0
-            && !scene.objects.iter().any(|object| {
-                intersect::distance(object, Ray { origin: start, direction: towards }).is_some()
-            });
+            && !scene
+                .objects
+                .iter()
+                .any(|object| shapes::distance(object, Ray { origin: start, direction: towards }).is_some());
         if lit {
             color = held(color + light.color() * material.diffuse() * cosine);
         }
@@ -161,7 +149,7 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use glam::DVec2;
-    use rayfold_scene::{DirectionalLight, Material, Screen};
+    use rayfold_scene::{DirectionalLight, Material, Screen, Sphere};
 
     use super::*;
 

@@ -1,4 +1,4 @@
-# A stack as a team would run it: a key of its own, an access log, alarms that reach somebody, bounded concurrency.
+# A stack as a team would run it: a key from examples/key, an access log, alarms and a budget that reach somebody, rights for people.
 # Build the packages first: cargo xtask package --architecture arm64
 
 provider "aws" {
@@ -15,6 +15,7 @@ data "aws_partition" "current" {}
 
 locals {
   account_id = data.aws_caller_identity.current.account_id
+  partition  = data.aws_partition.current.partition
 }
 
 module "rayfold" {
@@ -25,7 +26,7 @@ module "rayfold" {
 
   # Objects
   noncurrent_version_days = 14
-  customer_managed_key    = true
+  kms_key_arn             = var.kms_key_arn
   access_log_bucket       = aws_s3_bucket.access_log.bucket
   access_log_prefix       = "${var.name}/"
 
@@ -35,19 +36,37 @@ module "rayfold" {
   render = {
     memory_mb            = 3538
     timeout_s            = 600
-    reserved_concurrency = 500
+    reserved_concurrency = var.render_concurrency
   }
   assemble = {
-    memory_mb            = 5307
-    reserved_concurrency = 10
+    memory_mb = 5307
+  }
+  limits = {
+    max_frames = 1000
+    max_pixels = 8294400 # 3840 x 2160
   }
 
   # Events and watching
   sweep_minutes      = 10
   log_retention_days = 90
   alarm_actions      = [aws_sns_topic.alarms.arn]
+  alarm_thresholds   = { event_age_s = 900 }
+  budget = {
+    monthly_usd = 50
+    topic_arns  = [aws_sns_topic.alarms.arn]
+  }
 
   depends_on = [aws_s3_bucket_policy.access_log]
+}
+
+# What people may do. Attach them to groups, or to permission sets.
+
+resource "aws_iam_policy" "user" {
+  for_each = toset(["viewer", "uploader", "operator"])
+
+  name        = "${var.name}-${var.region}-${each.key}"
+  description = "What ${each.key}s of ${var.name} may do with its bucket"
+  policy      = module.rayfold.user_policies[each.key]
 }
 
 # Who is told. Subscribe by `aws sns subscribe --protocol email --topic-arn ... --notification-endpoint you@example.com`.
@@ -68,14 +87,14 @@ resource "aws_kms_key" "alarms" {
       {
         Sid       = "AccountAdministersByIam"
         Effect    = "Allow"
-        Principal = { AWS = "arn:${data.aws_partition.current.partition}:iam::${local.account_id}:root" }
+        Principal = { AWS = "arn:${local.partition}:iam::${local.account_id}:root" }
         Action    = "kms:*"
         Resource  = "*"
       },
       {
-        Sid       = "AlarmsOfThisAccount"
+        Sid       = "AlarmsAndBudgetsOfThisAccount"
         Effect    = "Allow"
-        Principal = { Service = "cloudwatch.amazonaws.com" }
+        Principal = { Service = ["budgets.amazonaws.com", "cloudwatch.amazonaws.com"] }
         Action    = ["kms:Decrypt", "kms:GenerateDataKey*"]
         Resource  = "*"
         Condition = { StringEquals = { "aws:SourceAccount" = local.account_id } }
@@ -90,9 +109,9 @@ resource "aws_sns_topic_policy" "alarms" {
   policy = jsonencode({
     Version = "2012-10-17"
     Statement = [{
-      Sid       = "AlarmsOfThisAccount"
+      Sid       = "AlarmsAndBudgetsOfThisAccount"
       Effect    = "Allow"
-      Principal = { Service = "cloudwatch.amazonaws.com" }
+      Principal = { Service = ["budgets.amazonaws.com", "cloudwatch.amazonaws.com"] }
       Action    = "sns:Publish"
       Resource  = aws_sns_topic.alarms.arn
       Condition = { StringEquals = { "aws:SourceAccount" = local.account_id } }

@@ -22,3 +22,8 @@ output "alarm_topic_arn" {
   description = "ARN of the topic that tells of alarms"
   value       = aws_sns_topic.alarms.arn
 }
+
+output "user_policy_arns" {
+  description = "ARNs of the policies for people, by `viewer`, `uploader` and `operator`"
+  value       = { for user, policy in aws_iam_policy.user : user => policy.arn }
+}

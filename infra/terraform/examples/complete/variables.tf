@@ -15,3 +15,15 @@ variable "packages" {
   type        = object({ render = string, assemble = string })
   default     = null
 }
+
+variable "render_concurrency" {
+  description = "Invocations set aside for the render function, and its bound; null takes what the account has free. A new account has 10 in all, of which none can be set aside"
+  type        = number
+  default     = null
+}
+
+variable "kms_key_arn" {
+  description = "ARN of the key that examples/key makes; null takes the keys that AWS manages"
+  type        = string
+  default     = null
+}

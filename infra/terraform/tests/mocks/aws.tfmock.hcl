@@ -5,7 +5,7 @@ mock_data "aws_caller_identity" {
 }
 
 mock_data "aws_partition" {
-  defaults = { partition = "aws" }
+  defaults = { partition = "aws", dns_suffix = "amazonaws.com" }
 }
 
 mock_data "aws_region" {
@@ -28,18 +28,40 @@ override_resource {
 }
 
 override_resource {
+  target = aws_lambda_function.this["record"]
+  values = { arn = "arn:aws:lambda:eu-central-1:123456789012:function:demo-record" }
+}
+
+override_resource {
   target = aws_iam_role.function["render"]
-  values = { id = "demo-render", arn = "arn:aws:iam::123456789012:role/demo-render" }
+  values = {
+    id  = "demo-eu-central-1-render"
+    arn = "arn:aws:iam::123456789012:role/demo-eu-central-1-render"
+  }
 }
 
 override_resource {
   target = aws_iam_role.function["assemble"]
-  values = { id = "demo-assemble", arn = "arn:aws:iam::123456789012:role/demo-assemble" }
+  values = {
+    id  = "demo-eu-central-1-assemble"
+    arn = "arn:aws:iam::123456789012:role/demo-eu-central-1-assemble"
+  }
+}
+
+override_resource {
+  target = aws_iam_role.function["record"]
+  values = {
+    id  = "demo-eu-central-1-record"
+    arn = "arn:aws:iam::123456789012:role/demo-eu-central-1-record"
+  }
 }
 
 override_resource {
   target = aws_iam_role.scheduler
-  values = { id = "demo-sweep-schedule", arn = "arn:aws:iam::123456789012:role/demo-sweep-schedule" }
+  values = {
+    id  = "demo-eu-central-1-sweep-schedule"
+    arn = "arn:aws:iam::123456789012:role/demo-eu-central-1-sweep-schedule"
+  }
 }
 
 override_resource {
@@ -61,12 +83,4 @@ override_resource {
 override_resource {
   target = aws_scheduler_schedule_group.this
   values = { arn = "arn:aws:scheduler:eu-central-1:123456789012:schedule-group/demo" }
-}
-
-override_resource {
-  target = aws_kms_key.this[0]
-  values = {
-    key_id = "11111111-2222-3333-4444-555555555555"
-    arn    = "arn:aws:kms:eu-central-1:123456789012:key/11111111-2222-3333-4444-555555555555"
-  }
 }

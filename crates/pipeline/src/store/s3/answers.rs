@@ -4,8 +4,12 @@ use aws_sdk_s3::config::http::HttpResponse;
 use aws_sdk_s3::error::{ProvideErrorMetadata, SdkError};
 use percent_encoding::percent_decode_str;
 
-use super::status;
 use crate::Error;
+
+/// The status of the answer, where there was one.
+pub(super) fn status<E>(error: &SdkError<E, HttpResponse>) -> Option<u16> {
+    error.raw_response().map(|response| response.status().as_u16())
+}
 
 /// Sorts a failed request by what the caller may do about it.
 pub(super) fn error_of<E>(key: &str, error: SdkError<E, HttpResponse>) -> Error

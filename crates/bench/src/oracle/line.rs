@@ -1,0 +1,42 @@
+//! Rays without rounding, and which of them is a pixel.
+
+use glam::DVec3;
+use rayfold_scene::{Camera, Screen};
+
+use super::real::{Real, Vector};
+
+/// A half-line; its direction has any length but zero.
+#[derive(Clone, Debug)]
+pub struct Line {
+    /// Where it starts.
+    pub origin: Vector,
+    /// Where it goes.
+    pub direction: Vector,
+}
+
+impl Line {
+    /// The ray of a pixel, in the words of the language; indices may be fractions.
+    pub(super) fn of_pixel(camera: &Camera, screen: Screen, x: f64, y: f64) -> Self {
+        let Camera::Pinhole(pinhole) = camera else {
+            return Self { origin: DVec3::new(x, y, 0.0).into(), direction: DVec3::NEG_Z.into() };
+        };
+        let w = Vector::from(pinhole.gaze()).opposite().unit();
+        let u = Vector::from(pinhole.up()).cross(&w).unit();
+        let v = w.cross(&u);
+        let along = |from: f64, to: f64, index: f64, count: u32| {
+            let (from, to) = (Real::from(from), Real::from(to));
+            // A single sample is the middle; beside it is as near as in an image of a thousand.
+            let (index, last) =
+                if count == 1 { (index + 500.0, 1000.0) } else { (index, f64::from(count - 1)) };
+            let part = Real::from(index).over(&Real::from(last));
+            &from + &(&(&to - &from) * &part)
+        };
+        let (a, b) = (pinhole.lower_left(), pinhole.upper_right());
+        let across = along(a.x, b.x, x, screen.width());
+        let upward = along(a.y, b.y, y, screen.height());
+        let nowhere = Vector::from(DVec3::ZERO);
+        let direction =
+            nowhere.plus(&across, &u).plus(&upward, &v).plus(&-&Real::from(pinhole.distance()), &w);
+        Self { origin: pinhole.eye().into(), direction: direction.unit() }
+    }
+}

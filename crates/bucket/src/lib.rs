@@ -1,0 +1,36 @@
+//! An S3-compatible object store in a folder, which runs in the process that starts it.
+//!
+//! [`Server::start`] opens the folder and answers S3's protocol on an address; whoever starts it says who may do
+//! everything ([`Options::root`]) and where events go ([`Options::webhook`]). What was acknowledged is on the disk;
+//! the event of a change is written with the change.
+//!
+//! Knows nothing of what the objects are for: neither keys nor bodies mean anything here.
+//!
+//! ```no_run
+//! use rayfold_bucket::{Credentials, Options, Server};
+//! # async fn example() -> rayfold_bucket::Result<()> {
+//! let server = Server::start(Options {
+//!     data: "data".into(),
+//!     address: ([127, 0, 0, 1], 0).into(),
+//!     root: Credentials { access_key: "key".into(), secret_key: "secret".into() },
+//!     region: "us-east-1".into(),
+//!     webhook: None,
+//! })
+//! .await?;
+//! println!("http://{}", server.address());
+//! server.stop().await;
+//! # Ok(()) }
+//! ```
+
+mod error;
+mod host;
+mod identity;
+mod options;
+pub mod policy;
+mod server;
+mod service;
+mod storage;
+
+pub use error::{Error, Result};
+pub use options::{Credentials, Options, QUEUE_ARN, Webhook};
+pub use server::Server;

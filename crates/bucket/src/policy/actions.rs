@@ -1,0 +1,60 @@
+//! Which actions an operation of S3 asks for, after the table of the Service Authorization Reference.
+//!
+//! <https://docs.aws.amazon.com/service-authorization/latest/reference/list_amazons3.html>
+
+/// What an action is asked on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scope {
+    /// No bucket: `*`.
+    Account,
+    /// `arn:aws:s3:::bucket`
+    Bucket,
+    /// `arn:aws:s3:::bucket/key`
+    Object,
+}
+
+/// The actions that an operation, by its name in the API, asks for, and on what. All of them are needed.
+///
+/// Reading a copy's source and deleting many objects at once are asked for object by object beside this. Nothing is
+/// returned for operations that no policy can allow here.
+pub fn needed(operation: &str) -> Option<(Scope, &'static [&'static str])> {
+    let (scope, actions): (_, &[&str]) = match operation {
+        "ListBuckets" => (Scope::Account, &["s3:ListAllMyBuckets"]),
+
+        "CreateBucket" => (Scope::Bucket, &["s3:CreateBucket"]),
+        "DeleteBucket" => (Scope::Bucket, &["s3:DeleteBucket"]),
+        "HeadBucket" | "ListObjects" | "ListObjectsV2" => (Scope::Bucket, &["s3:ListBucket"]),
+        "ListObjectVersions" => (Scope::Bucket, &["s3:ListBucketVersions"]),
+        "ListMultipartUploads" => (Scope::Bucket, &["s3:ListBucketMultipartUploads"]),
+        "GetBucketAcl" => (Scope::Bucket, &["s3:GetBucketAcl"]),
+        "GetBucketCors" => (Scope::Bucket, &["s3:GetBucketCORS"]),
+        "GetBucketEncryption" => (Scope::Bucket, &["s3:GetEncryptionConfiguration"]),
+        "GetBucketLifecycleConfiguration" => (Scope::Bucket, &["s3:GetLifecycleConfiguration"]),
+        "GetBucketLocation" => (Scope::Bucket, &["s3:GetBucketLocation"]),
+        "GetBucketNotificationConfiguration" => (Scope::Bucket, &["s3:GetBucketNotification"]),
+        "GetBucketPolicy" => (Scope::Bucket, &["s3:GetBucketPolicy"]),
+        "GetBucketTagging" => (Scope::Bucket, &["s3:GetBucketTagging"]),
+        "GetBucketVersioning" => (Scope::Bucket, &["s3:GetBucketVersioning"]),
+        "GetObjectLockConfiguration" => (Scope::Bucket, &["s3:GetBucketObjectLockConfiguration"]),
+        "PutBucketNotificationConfiguration" => (Scope::Bucket, &["s3:PutBucketNotification"]),
+
+        "GetObject" | "HeadObject" => (Scope::Object, &["s3:GetObject"]),
+        "GetObjectAttributes" => (Scope::Object, &["s3:GetObject", "s3:GetObjectAttributes"]),
+        "GetObjectAcl" => (Scope::Object, &["s3:GetObjectAcl"]),
+        "GetObjectTagging" => (Scope::Object, &["s3:GetObjectTagging"]),
+        "PutObject"
+        | "CopyObject"
+        | "CreateMultipartUpload"
+        | "UploadPart"
+        | "UploadPartCopy"
+        | "CompleteMultipartUpload" => (Scope::Object, &["s3:PutObject"]),
+        "PutObjectAcl" => (Scope::Object, &["s3:PutObjectAcl"]),
+        "PutObjectTagging" => (Scope::Object, &["s3:PutObjectTagging"]),
+        "DeleteObject" => (Scope::Object, &["s3:DeleteObject"]),
+        "DeleteObjectTagging" => (Scope::Object, &["s3:DeleteObjectTagging"]),
+        "AbortMultipartUpload" => (Scope::Object, &["s3:AbortMultipartUpload"]),
+        "ListParts" => (Scope::Object, &["s3:ListMultipartUploadParts"]),
+        _ => return None,
+    };
+    Some((scope, actions))
+}

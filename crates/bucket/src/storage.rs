@@ -1,0 +1,247 @@
+//! The folder's content: rows in one transactional database, large bodies as files beside it.
+//!
+//! Reads see one moment ([`Storage::snapshot`]). Changes are functions ([`Storage::change`]) that run one after the other;
+//! what they give is handed on when the change is on the disk. Knows no protocol and no record.
+//!
+//!     marker, lock    whose the folder is, and that one process uses it
+//!     database        rows: their durable state of some moment
+//!     journal         what changed since then
+//!     bodies/         bodies that are too large for a row, a file each
+
+mod bodies;
+mod database;
+mod folder;
+mod journal;
+mod table;
+mod writer;
+
+use std::path::Path;
+use std::sync::mpsc::{self, Sender};
+use std::sync::{Arc, RwLock};
+use std::thread::JoinHandle;
+
+use redb::StorageError;
+use tokio::sync::{Notify, oneshot};
+
+use crate::{Error, Result};
+
+pub(crate) use bodies::{Bodies, BodyId, NewBody};
+pub(crate) use table::{Batch, Snapshot, Table, View};
+pub(crate) use writer::{Kind, Unavailable};
+
+use folder::Folder;
+use writer::{Change, Current, Message, Writer, open, read};
+
+/// The row that counts the starts.
+const RUN: &[u8] = b"run";
+
+/// See the module. Clones are the same folder.
+#[derive(Clone)]
+pub(crate) struct Storage {
+    current: Current,
+    bodies: Arc<Bodies>,
+    messages: Sender<Message>,
+    committed: Arc<Notify>,
+}
+
+/// The thread that writes.
+pub(crate) struct Writing {
+    thread: JoinHandle<()>,
+    messages: Sender<Message>,
+}
+
+impl Storage {
+    /// Opens the folder, made when missing.
+    ///
+    /// # Errors
+    /// [`Error::DataInUse`], [`Error::NotOurs`], [`Error::Newer`], [`Error::File`], [`Error::Storage`].
+    pub(crate) fn open(path: &Path) -> Result<(Self, Writing)> {
+        let folder = Folder::take(path)?;
+        let failed = |source: redb::Error| Error::Storage { path: path.to_owned(), source: source.into() };
+        let (opened, mut journal) = open(&folder).map_err(failed)?;
+        let run = next_run(&opened, &mut journal).map_err(failed)?;
+        let bodies = Arc::new(Bodies::new(folder.bodies(), run));
+        let current: Current = Arc::new(RwLock::new(Ok(Arc::new(opened))));
+        let committed = Arc::new(Notify::new());
+        let (messages, waiting) = mpsc::channel();
+        let ending = messages.clone();
+        let writer = Writer {
+            folder,
+            bodies: bodies.clone(),
+            current: current.clone(),
+            journal,
+            on_commit: Box::new({
+                let committed = committed.clone();
+                move || committed.notify_one()
+            }),
+        };
+        let thread = std::thread::Builder::new()
+            .name("bucket-writer".to_owned())
+            .spawn(move || writer.work(&waiting))
+            .map_err(Error::file(path))?;
+        Ok((Self { current, bodies, messages, committed }, Writing { thread, messages: ending }))
+    }
+
+    /// The rows as they are now.
+    ///
+    /// # Errors
+    /// [`Unavailable::Failed`].
+    pub(crate) fn snapshot(&self) -> Result<Snapshot, Unavailable> {
+        let open = read(&self.current).clone()?;
+        open.snapshot().map_err(|error| Unavailable::Failed(error.to_string().into()))
+    }
+
+    /// Runs a function on the tables, alone; on return its changes are on the disk. What it gives may say that it changed
+    /// nothing: a condition that did not hold, for one. Where it fails, everything in its batch is undone.
+    ///
+    /// # Errors
+    /// [`Unavailable`]: nothing was changed, but for a disk that failed in the middle, where that is not known.
+    pub(crate) async fn change<T, F>(&self, kind: Kind, function: F) -> Result<T, Unavailable>
+    where
+        T: Send + 'static,
+        F: FnOnce(&mut Batch<'_>) -> Result<T, StorageError> + Send + 'static,
+    {
+        let (answer, answered) = oneshot::channel();
+        let change = Change { kind, function: Some(function), value: None, answer };
+        self.messages.send(Message::Change(Box::new(change))).map_err(|_| Unavailable::Ending)?;
+        answered.await.unwrap_or(Err(Unavailable::Ending))
+    }
+
+    /// Large bodies.
+    pub(crate) fn bodies(&self) -> &Arc<Bodies> {
+        &self.bodies
+    }
+
+    /// Returns when something was changed since the last call.
+    pub(crate) async fn changed(&self) {
+        self.committed.notified().await;
+    }
+
+    /// Removes the bodies that a killed run left, and that belong to nobody; says how many.
+    ///
+    /// # Errors
+    /// [`Unavailable`].
+    pub(crate) fn collect_orphans(&self) -> Result<u64, Unavailable> {
+        let snapshot = self.snapshot()?;
+        let collected = self.bodies.collect(|id| {
+            snapshot.get(Table::Files, &id.key()).map(|row| row.is_some()).map_err(std::io::Error::other)
+        });
+        collected.map_err(|error| Unavailable::Failed(error.to_string().into()))
+    }
+}
+
+impl Writing {
+    /// Ends the changes; returns when those before are on the disk and the folder is free.
+    pub(crate) fn end(self) {
+        let _ = self.messages.send(Message::End);
+        let _ = self.thread.join();
+    }
+}
+
+/// Counts this start, durably: ids of its bodies begin with the number.
+fn next_run(open: &database::Open, journal: &mut journal::Journal) -> Result<u64, redb::Error> {
+    let last = open.snapshot()?.get(Table::Settings, RUN)?;
+    let run = last.and_then(|bytes| bytes.try_into().ok()).map_or(0, u64::from_be_bytes) + 1;
+    let transaction = open.begin()?;
+    let mut batch = Batch::of(&transaction)?;
+    batch.put(Table::Settings, RUN, &run.to_be_bytes())?;
+    let applied = batch.end();
+    journal.append(&applied.changes, true)?;
+    open.commit(transaction)?;
+    Ok(run)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(batch: &mut Batch<'_>, key: &str, value: &str) -> Result<(), StorageError> {
+        batch.put(Table::Objects, key.as_bytes(), value.as_bytes())
+    }
+
+    fn value(storage: &Storage, key: &str) -> Option<String> {
+        let value = storage.snapshot().unwrap().get(Table::Objects, key.as_bytes()).unwrap();
+        value.map(|bytes| String::from_utf8(bytes).unwrap())
+    }
+
+    #[tokio::test]
+    async fn what_was_changed_is_there_after_a_stop_and_after_a_kill() {
+        let folder = tempfile::tempdir().unwrap();
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
+        storage.change(Kind::Grows, |batch| set(batch, "stopped", "1")).await.unwrap();
+        writing.end();
+        assert!(matches!(storage.change(Kind::Grows, |_| Ok(())).await, Err(Unavailable::Ending)));
+
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
+        storage.change(Kind::Grows, |batch| set(batch, "killed", "2")).await.unwrap();
+        // A copy of the folder is what a kill leaves: the thread has not caught up.
+        let copy = tempfile::tempdir().unwrap();
+        for name in ["rayfold-bucket", "database", "journal"] {
+            std::fs::copy(folder.path().join(name), copy.path().join(name)).unwrap();
+        }
+        let (killed, ending) = Storage::open(copy.path()).unwrap();
+        assert_eq!(value(&killed, "stopped").as_deref(), Some("1"));
+        assert_eq!(value(&killed, "killed").as_deref(), Some("2"));
+        ending.end();
+        writing.end();
+    }
+
+    #[tokio::test]
+    async fn a_change_sees_those_before_it_and_a_panic_undoes_only_its_batch() {
+        let folder = tempfile::tempdir().unwrap();
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
+        let changes = (0..200).map(|_| {
+            storage.change(Kind::Grows, |batch| {
+                let last = batch.get(Table::Objects, b"count")?.map_or(0, |b| u64::from(b[0]));
+                batch.put(Table::Objects, b"count", &[u8::try_from(last + 1).unwrap_or(0)])?;
+                Ok(last)
+            })
+        });
+        let seen = futures_util::future::join_all(changes).await;
+        let mut seen: Vec<u64> = seen.into_iter().map(Result::unwrap).collect();
+        seen.sort_unstable();
+        assert_eq!(seen, (0..200).collect::<Vec<_>>());
+        let panicked = storage.change(Kind::Grows, |batch| {
+            set(batch, "half", "done")?;
+            panic!("as meant by the test")
+        });
+        let panicked: Result<(), _> = panicked.await;
+        assert!(matches!(panicked, Err(Unavailable::Failed(_))));
+        storage.change(Kind::Grows, |batch| set(batch, "after", "1")).await.unwrap();
+        assert_eq!((value(&storage, "half"), value(&storage, "after").as_deref()), (None, Some("1")));
+        writing.end();
+    }
+
+    #[tokio::test]
+    async fn a_database_that_failed_is_opened_anew_with_all_that_was_acknowledged() {
+        let folder = tempfile::tempdir().unwrap();
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
+        for round in 0..3 {
+            let key = format!("kept-{round}");
+            storage.change(Kind::Grows, move |batch| set(batch, &key, "1")).await.unwrap();
+            // As after a failed write: nothing goes through this handle any more.
+            read(&storage.current).as_ref().unwrap().kill();
+            // What reaches the journal may be acknowledged or not; what is acknowledged must be there.
+            let key = format!("doubtful-{round}");
+            let big = "x".repeat(100_000);
+            let answer = storage
+                .change(Kind::Grows, move |batch| {
+                    for number in 0..600 {
+                        set(batch, &format!("{key}-{number}"), &big)?;
+                    }
+                    Ok(())
+                })
+                .await;
+            let doubtful = value(&storage, &format!("doubtful-{round}-599"));
+            assert!(answer.is_err() || doubtful.is_some());
+            storage.change(Kind::Grows, |batch| set(batch, "after", "1")).await.unwrap();
+            for earlier in 0..=round {
+                assert_eq!(value(&storage, &format!("kept-{earlier}")).as_deref(), Some("1"));
+            }
+        }
+        writing.end();
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
+        assert_eq!(value(&storage, "kept-2").as_deref(), Some("1"));
+        writing.end();
+    }
+}

@@ -1,0 +1,219 @@
+//! Bodies that are files: too large for the database, each under an id that is never used again.
+//!
+//! A body is written and synced before any row refers to it, and its file goes after the last row that did. A kill in
+//! between leaves files that belong to nobody; [`Bodies::collect`] removes those of earlier runs.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use serde::{Deserialize, Serialize};
+
+/// Ids of one run: its number above, a counter below.
+const COUNTER_BITS: u32 = 40;
+
+/// Files of one folder: few enough to be listed at once, enough that a batch seldom spans several folders.
+const FOLDER_BITS: u32 = 12;
+
+/// A body's name: no two of a folder are the same, ever.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(transparent)]
+pub(crate) struct BodyId(u64);
+
+impl BodyId {
+    /// The key of its row.
+    pub(crate) fn key(self) -> [u8; 8] {
+        self.0.to_be_bytes()
+    }
+}
+
+/// The folder of the files, and the source of ids.
+#[derive(Debug)]
+pub(crate) struct Bodies {
+    folder: PathBuf,
+    run: u64,
+    next: AtomicU64,
+}
+
+/// A body's file until a row refers to it: it goes when dropped.
+#[derive(Debug)]
+pub(crate) struct NewBody {
+    id: BodyId,
+    path: PathBuf,
+    file: Option<File>,
+    kept: bool,
+}
+
+impl Bodies {
+    pub(super) fn new(folder: PathBuf, run: u64) -> Self {
+        Self { folder, run, next: AtomicU64::new(0) }
+    }
+
+    /// A fresh id.
+    pub(crate) fn id(&self) -> BodyId {
+        BodyId(self.run << COUNTER_BITS | self.next.fetch_add(1, Ordering::Relaxed))
+    }
+
+    /// Where a body's file is.
+    pub(crate) fn path(&self, id: BodyId) -> PathBuf {
+        self.folder.join(format!("{:013x}", id.0 >> FOLDER_BITS)).join(format!("{:016x}", id.0))
+    }
+
+    /// A fresh, empty file.
+    ///
+    /// # Errors
+    /// The system's.
+    pub(crate) fn create(&self) -> io::Result<NewBody> {
+        let id = self.id();
+        let path = self.path(id);
+        let create = || File::options().write(true).create_new(true).open(&path);
+        let file = match create() {
+            Err(missing) if missing.kind() == io::ErrorKind::NotFound => {
+                match fs::create_dir(parent(&path)) {
+                    Err(failed) if failed.kind() != io::ErrorKind::AlreadyExists => return Err(failed),
+                    _ => sync_folder(&self.folder)?,
+                }
+                create()?
+            }
+            other => other?,
+        };
+        Ok(NewBody { id, path, file: Some(file), kept: false })
+    }
+
+    /// Removes a file that no row refers to. One that cannot be removed now is found at the next start.
+    pub(super) fn remove(&self, id: BodyId) {
+        let _ = fs::remove_file(self.path(id));
+    }
+
+    /// Removes the files of earlier runs that belong to nobody; says how many.
+    ///
+    /// # Errors
+    /// The system's, or `belongs`'s.
+    pub(super) fn collect<E: From<io::Error>>(
+        &self,
+        mut belongs: impl FnMut(BodyId) -> Result<bool, E>,
+    ) -> Result<u64, E> {
+        let mut removed = 0;
+        for folder in fs::read_dir(&self.folder)? {
+            let folder = folder?.path();
+            let mut left = false;
+            for file in fs::read_dir(&folder)? {
+                let file = file?;
+                let name = file.file_name();
+                let id = name.to_str().and_then(|name| u64::from_str_radix(name, 16).ok());
+                match id.map(BodyId) {
+                    Some(id) if id.0 >> COUNTER_BITS < self.run && !belongs(id)? => {
+                        fs::remove_file(file.path())?;
+                        removed += 1;
+                    }
+                    _ => left = true,
+                }
+            }
+            let of_earlier_run = folder
+                .file_name()
+                .and_then(|name| u64::from_str_radix(name.to_str()?, 16).ok())
+                .is_some_and(|number| number >> (COUNTER_BITS - FOLDER_BITS) < self.run);
+            if !left && of_earlier_run {
+                // Not empty after all is no harm.
+                let _ = fs::remove_dir(&folder);
+            }
+        }
+        Ok(removed)
+    }
+}
+
+impl NewBody {
+    pub(crate) fn id(&self) -> BodyId {
+        self.id
+    }
+
+    /// Appends bytes.
+    ///
+    /// # Errors
+    /// The system's; a full disk among them.
+    pub(crate) fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        match &mut self.file {
+            Some(file) => file.write_all(bytes),
+            None => Err(io::Error::other("the body is finished")),
+        }
+    }
+
+    /// Brings the content to the disk. Its name follows with the batch that adopts it.
+    ///
+    /// # Errors
+    /// The system's.
+    pub(crate) fn finish(&mut self) -> io::Result<()> {
+        self.file.take().map_or(Ok(()), |file| file.sync_all())
+    }
+
+    pub(super) fn keep(&mut self) {
+        self.kept = true;
+    }
+}
+
+impl Drop for NewBody {
+    fn drop(&mut self) {
+        if !self.kept {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Brings the names of these bodies to the disk.
+///
+/// # Errors
+/// The system's.
+pub(super) fn sync_names(bodies: &[NewBody]) -> io::Result<()> {
+    let folders: BTreeSet<&Path> = bodies.iter().map(|body| parent(&body.path)).collect();
+    folders.into_iter().try_for_each(sync_folder)
+}
+
+fn parent(path: &Path) -> &Path {
+    path.parent().unwrap_or(path)
+}
+
+pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
+    File::open(folder)?.sync_all()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn written(bodies: &Bodies) -> BodyId {
+        let mut body = bodies.create().unwrap();
+        body.write(b"content").unwrap();
+        body.finish().unwrap();
+        body.keep();
+        body.id()
+    }
+
+    #[test]
+    fn a_body_that_nobody_adopts_goes() {
+        let folder = tempfile::tempdir().unwrap();
+        let bodies = Bodies::new(folder.path().to_owned(), 1);
+        let body = bodies.create().unwrap();
+        let path = bodies.path(body.id());
+        assert!(path.exists());
+        drop(body);
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn orphans_of_earlier_runs_are_collected_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = Bodies::new(folder.path().to_owned(), 1);
+        let (orphan, owned) = (written(&first), written(&first));
+        let second = Bodies::new(folder.path().to_owned(), 2);
+        let fresh = written(&second);
+        let removed = second.collect(|id| Ok::<_, io::Error>(id == owned)).unwrap();
+        assert_eq!(removed, 1);
+        assert!(!first.path(orphan).exists() && first.path(owned).exists() && second.path(fresh).exists());
+        let removed = second.collect(|_| Ok::<_, io::Error>(false)).unwrap();
+        assert_eq!(removed, 1);
+        assert!(!first.path(owned).parent().unwrap().exists(), "the empty folder of an earlier run");
+        assert!(second.path(fresh).exists());
+    }
+}

@@ -1,0 +1,178 @@
+//! The folder: whose it is, which format it has, and that one process at a time uses it.
+
+use std::fs::{self, File, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::bodies::sync_folder;
+use crate::{Error, Result};
+
+/// The newest format that is read and written here.
+const FORMAT: u32 = 1;
+
+/// The file that says that a folder is a bucket's data, and its format.
+const MARKER: &str = "rayfold-bucket";
+
+const LOCK: &str = "lock";
+
+/// What may lie in a fresh folder: its lock, and what the store's owner or the file system keeps beside it.
+const HARMLESS: [&str; 3] = [LOCK, "credentials.json", "lost+found"];
+
+/// Where MinIO keeps its own data, in the folder that it was given.
+const MINIO: [&str; 2] = [".minio.sys", "objects/.minio.sys"];
+
+/// A folder that is ours, until dropped.
+#[derive(Debug)]
+pub(super) struct Folder {
+    path: PathBuf,
+    _lock: File,
+}
+
+impl Folder {
+    /// Takes the folder; makes it when missing.
+    ///
+    /// # Errors
+    /// [`Error::DataInUse`], [`Error::NotOurs`], [`Error::Newer`], [`Error::File`].
+    pub(super) fn take(path: &Path) -> Result<Self> {
+        let found = recognise(path)?;
+        fs::create_dir_all(path).map_err(Error::file(path))?;
+        let lock_path = path.join(LOCK);
+        let lock = File::options()
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&lock_path)
+            .map_err(Error::file(&lock_path))?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(Error::DataInUse(path.to_owned())),
+            Err(TryLockError::Error(source)) => return Err(Error::File { path: lock_path, source }),
+        }
+        let folder = Self { path: path.to_owned(), _lock: lock };
+        let bodies = folder.bodies();
+        fs::create_dir_all(&bodies).map_err(Error::file(&bodies))?;
+        if found == Found::Nothing {
+            let marker = path.join(MARKER);
+            fs::write(&marker, format!("format {FORMAT}\n"))
+                .and_then(|()| File::open(&marker)?.sync_all())
+                .and_then(|()| sync_folder(path))
+                .map_err(Error::file(&marker))?;
+        }
+        Ok(folder)
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(super) fn database(&self) -> PathBuf {
+        self.path.join("database")
+    }
+
+    pub(super) fn journal(&self) -> PathBuf {
+        self.path.join("journal")
+    }
+
+    pub(super) fn bodies(&self) -> PathBuf {
+        self.path.join("bodies")
+    }
+}
+
+#[derive(PartialEq, Eq)]
+enum Found {
+    Nothing,
+    Ours,
+}
+
+/// Looks without touching anything.
+fn recognise(path: &Path) -> Result<Found> {
+    let not_ours = |what: &str| Err(Error::NotOurs { path: path.to_owned(), what: what.to_owned() });
+    let marker = path.join(MARKER);
+    match fs::read_to_string(&marker) {
+        Ok(text) => {
+            return match text.strip_prefix("format ").and_then(|number| number.trim_end().parse().ok()) {
+                Some(found) if found > FORMAT => {
+                    Err(Error::Newer { path: path.to_owned(), found, known: FORMAT })
+                }
+                Some(_) => Ok(Found::Ours),
+                // A kill on the very first start leaves the file empty.
+                None if text.is_empty() => Ok(Found::Nothing),
+                None => not_ours(&format!("a file {MARKER} of another kind")),
+            };
+        }
+        Err(missing) if missing.kind() == io::ErrorKind::NotFound => {}
+        Err(source) if source.kind() == io::ErrorKind::InvalidData => {
+            return not_ours(&format!("a file {MARKER} of another kind"));
+        }
+        Err(source) => return Err(Error::File { path: marker, source }),
+    }
+    if MINIO.iter().any(|folder| path.join(folder).exists()) {
+        return not_ours("MinIO's data");
+    }
+    let entries = match fs::read_dir(path) {
+        Ok(entries) => entries,
+        Err(missing) if missing.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
+        Err(source) => return Err(Error::File { path: path.to_owned(), source }),
+    };
+    for entry in entries {
+        let name = entry.map_err(Error::file(path))?.file_name();
+        let shown = name.to_string_lossy();
+        // What a start that was killed before it wrote the marker leaves.
+        let ours =
+            shown == "bodies" && fs::read_dir(path.join("bodies")).is_ok_and(|mut all| all.next().is_none());
+        if !ours && !HARMLESS.contains(&shown.as_ref()) {
+            return not_ours(&format!("`{shown}`"));
+        }
+    }
+    Ok(Found::Nothing)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_taken_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let data = folder.path().join("new/data");
+        let taken = Folder::take(&data).unwrap();
+        assert!(matches!(Folder::take(&data), Err(Error::DataInUse(path)) if path == data));
+        drop(taken);
+        Folder::take(&data).unwrap();
+    }
+
+    #[test]
+    fn what_is_not_ours_is_named_and_left_alone() {
+        for (entry, named) in
+            [("objects/.minio.sys", "MinIO's data"), (".minio.sys", "MinIO's data"), ("letters", "`letters`")]
+        {
+            let folder = tempfile::tempdir().unwrap();
+            fs::create_dir_all(folder.path().join(entry)).unwrap();
+            let Err(Error::NotOurs { what, .. }) = Folder::take(folder.path()) else {
+                panic!("{entry} was taken")
+            };
+            assert_eq!(what, named);
+            assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "something was written");
+        }
+    }
+
+    #[test]
+    fn a_later_format_is_not_touched() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join(MARKER), "format 2\n").unwrap();
+        assert!(matches!(Folder::take(folder.path()), Err(Error::Newer { found: 2, known: 1, .. })));
+        fs::write(folder.path().join(MARKER), "a letter\n").unwrap();
+        assert!(matches!(Folder::take(folder.path()), Err(Error::NotOurs { .. })));
+    }
+
+    #[test]
+    fn a_start_that_was_killed_is_begun_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join(LOCK), "").unwrap();
+        fs::create_dir(folder.path().join("bodies")).unwrap();
+        drop(Folder::take(folder.path()).unwrap());
+        fs::write(folder.path().join(MARKER), "").unwrap();
+        drop(Folder::take(folder.path()).unwrap());
+        assert_eq!(fs::read_to_string(folder.path().join(MARKER)).unwrap(), "format 1\n");
+    }
+}

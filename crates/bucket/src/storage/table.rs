@@ -1,0 +1,280 @@
+//! The database's tables, as bytes under bytes, and the two views of them: a snapshot, and a batch that is being written.
+//!
+//! Knows no record: what a row means is `records`' business. A batch remembers every row that it changes, so that the
+//! journal can be written before the database.
+
+use redb::{ReadOnlyTable, ReadTransaction, ReadableTable, StorageError, TableDefinition, WriteTransaction};
+
+use super::bodies::{BodyId, NewBody};
+
+/// A row's key and value.
+pub(crate) type Row = (Vec<u8>, Vec<u8>);
+
+type Definition = TableDefinition<'static, &'static [u8], &'static [u8]>;
+type Written<'t> = redb::Table<'t, &'static [u8], &'static [u8]>;
+type Read = ReadOnlyTable<&'static [u8], &'static [u8]>;
+
+/// A table. The discriminants stand in the journal: they never change their meaning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Table {
+    /// What there is one of, by name.
+    Settings = 0,
+    /// Buckets by name.
+    Buckets = 1,
+    /// Objects by bucket and key, in the order of listings.
+    Objects = 2,
+    /// Small bodies by id.
+    Bodies = 3,
+    /// The bodies that are files, by id: a file without a row belongs to nobody.
+    Files = 4,
+    /// The parts of objects that were uploaded in parts, by id.
+    Layouts = 5,
+    /// Unfinished uploads by bucket, key and upload id.
+    Uploads = 6,
+    /// Their parts by upload id and number.
+    Parts = 7,
+    /// Events that are not delivered yet, in their order.
+    Outbox = 8,
+    /// Temporary identities by access key.
+    Sessions = 9,
+}
+
+impl Table {
+    pub(crate) const ALL: [Self; 10] = [
+        Self::Settings,
+        Self::Buckets,
+        Self::Objects,
+        Self::Bodies,
+        Self::Files,
+        Self::Layouts,
+        Self::Uploads,
+        Self::Parts,
+        Self::Outbox,
+        Self::Sessions,
+    ];
+
+    fn definition(self) -> Definition {
+        TableDefinition::new(match self {
+            Self::Settings => "settings",
+            Self::Buckets => "buckets",
+            Self::Objects => "objects",
+            Self::Bodies => "bodies",
+            Self::Files => "files",
+            Self::Layouts => "layouts",
+            Self::Uploads => "uploads",
+            Self::Parts => "parts",
+            Self::Outbox => "outbox",
+            Self::Sessions => "sessions",
+        })
+    }
+
+    pub(super) fn of(number: u8) -> Option<Self> {
+        Self::ALL.get(usize::from(number)).copied()
+    }
+}
+
+/// Rows, wherever they are read.
+pub(crate) trait View {
+    #[doc(hidden)]
+    type Opened: ReadableTable<&'static [u8], &'static [u8]>;
+
+    #[doc(hidden)]
+    fn opened(&self, table: Table) -> &Self::Opened;
+
+    /// The value at a key.
+    fn get(&self, table: Table, key: &[u8]) -> Result<Option<Vec<u8>>, StorageError> {
+        Ok(self.opened(table).get(key)?.map(|value| value.value().to_vec()))
+    }
+
+    /// The rows from a key on, in the order of their keys' bytes.
+    fn from(
+        &self,
+        table: Table,
+        key: &[u8],
+    ) -> Result<impl Iterator<Item = Result<Row, StorageError>>, StorageError> {
+        let rows = self.opened(table).range::<&[u8]>(key..)?;
+        Ok(rows.map(|row| row.map(|(key, value)| (key.value().to_vec(), value.value().to_vec()))))
+    }
+
+    /// The rows whose keys begin with these bytes.
+    fn beginning_with(
+        &self,
+        table: Table,
+        prefix: &[u8],
+    ) -> Result<impl Iterator<Item = Result<Row, StorageError>>, StorageError> {
+        let rows = self.from(table, prefix)?;
+        Ok(rows.take_while(move |row| row.as_ref().map_or(true, |(key, _)| key.starts_with(prefix))))
+    }
+
+    /// The row with the last key.
+    fn last(&self, table: Table) -> Result<Option<Row>, StorageError> {
+        let last = self.opened(table).last()?;
+        Ok(last.map(|(key, value)| (key.value().to_vec(), value.value().to_vec())))
+    }
+}
+
+/// The rows as they were at one moment.
+pub(crate) struct Snapshot {
+    tables: [Read; Table::ALL.len()],
+}
+
+impl Snapshot {
+    pub(super) fn of(transaction: &ReadTransaction) -> Result<Self, redb::Error> {
+        let opened: Result<Vec<_>, _> =
+            Table::ALL.iter().map(|table| transaction.open_table(table.definition())).collect();
+        let tables = opened?.try_into().map_err(|_| missing_table())?;
+        Ok(Self { tables })
+    }
+}
+
+impl View for Snapshot {
+    type Opened = Read;
+
+    fn opened(&self, table: Table) -> &Read {
+        &self.tables[table as usize]
+    }
+}
+
+/// A batch that is being written: its reads see its own changes.
+pub(crate) struct Batch<'t> {
+    tables: [Written<'t>; Table::ALL.len()],
+    changes: Vec<u8>,
+    adopted: Vec<NewBody>,
+    discarded: Vec<BodyId>,
+}
+
+/// What is left of a batch when all was applied.
+pub(super) struct Applied {
+    /// The changed rows, as the journal keeps them.
+    pub(super) changes: Vec<u8>,
+    /// Bodies in files that rows now refer to.
+    pub(super) adopted: Vec<NewBody>,
+    /// Bodies in files that no row refers to any more.
+    pub(super) discarded: Vec<BodyId>,
+}
+
+impl<'t> Batch<'t> {
+    pub(super) fn of(transaction: &'t WriteTransaction) -> Result<Self, redb::Error> {
+        let opened: Result<Vec<_>, _> =
+            Table::ALL.iter().map(|table| transaction.open_table(table.definition())).collect();
+        let tables = opened?.try_into().map_err(|_| missing_table())?;
+        Ok(Self { tables, changes: Vec::new(), adopted: Vec::new(), discarded: Vec::new() })
+    }
+
+    /// Sets a row.
+    pub(crate) fn put(&mut self, table: Table, key: &[u8], value: &[u8]) -> Result<(), StorageError> {
+        self.tables[table as usize].insert(key, value)?;
+        note(&mut self.changes, table, key, Some(value));
+        Ok(())
+    }
+
+    /// Removes a row; says whether it was there.
+    pub(crate) fn remove(&mut self, table: Table, key: &[u8]) -> Result<bool, StorageError> {
+        let was_there = self.tables[table as usize].remove(key)?.is_some();
+        if was_there {
+            note(&mut self.changes, table, key, None);
+        }
+        Ok(was_there)
+    }
+
+    /// A body's file now belongs to a row of this batch. Were the batch to fail, the file goes.
+    pub(crate) fn adopt(&mut self, body: NewBody) {
+        self.adopted.push(body);
+    }
+
+    /// A body's file belongs to no row any more. It goes when the batch is on the disk.
+    pub(crate) fn discard(&mut self, body: BodyId) {
+        self.discarded.push(body);
+    }
+
+    pub(super) fn changed_bytes(&self) -> usize {
+        self.changes.len()
+    }
+
+    pub(super) fn end(self) -> Applied {
+        let Self { tables, changes, adopted, discarded } = self;
+        drop(tables);
+        Applied { changes, adopted, discarded }
+    }
+
+    /// Applies rows that a journal kept.
+    pub(super) fn replay(&mut self, mut changes: &[u8]) -> Result<(), StorageError> {
+        while !changes.is_empty() {
+            let (table, key, value) = noted(&mut changes)
+                .ok_or_else(|| StorageError::Corrupted("a row of the journal is cut off".to_owned()))?;
+            match value {
+                Some(value) => drop(self.tables[table as usize].insert(key, value)?),
+                None => drop(self.tables[table as usize].remove(key)?),
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<'t> View for Batch<'t> {
+    type Opened = Written<'t>;
+
+    fn opened(&self, table: Table) -> &Written<'t> {
+        &self.tables[table as usize]
+    }
+}
+
+/// What stands for the length of the value of a row that was removed.
+const REMOVED: u32 = u32::MAX;
+
+/// Table, key's length, value's length, key, value.
+fn note(changes: &mut Vec<u8>, table: Table, key: &[u8], value: Option<&[u8]>) {
+    let length = |bytes: &[u8]| u32::try_from(bytes.len()).unwrap_or(REMOVED - 1);
+    changes.push(table as u8);
+    changes.extend(length(key).to_le_bytes());
+    changes.extend(value.map_or(REMOVED, length).to_le_bytes());
+    changes.extend(key);
+    changes.extend(value.unwrap_or_default());
+}
+
+fn noted<'a>(changes: &mut &'a [u8]) -> Option<(Table, &'a [u8], Option<&'a [u8]>)> {
+    let table = Table::of(*changes.split_off_first()?)?;
+    let key_length = u32::from_le_bytes(*changes.split_off(..4)?.as_array()?);
+    let value_length = u32::from_le_bytes(*changes.split_off(..4)?.as_array()?);
+    let key = changes.split_off(..usize::try_from(key_length).ok()?)?;
+    if value_length == REMOVED {
+        return Some((table, key, None));
+    }
+    let value = changes.split_off(..usize::try_from(value_length).ok()?)?;
+    Some((table, key, Some(value)))
+}
+
+fn missing_table() -> redb::Error {
+    redb::Error::Corrupted("a table is missing".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_noted_and_read_back() {
+        let mut changes = Vec::new();
+        note(&mut changes, Table::Objects, b"films\0a", Some(b"value"));
+        note(&mut changes, Table::Files, b"", Some(b""));
+        note(&mut changes, Table::Sessions, b"key", None);
+        let mut rest = changes.as_slice();
+        assert_eq!(noted(&mut rest), Some((Table::Objects, &b"films\0a"[..], Some(&b"value"[..]))));
+        assert_eq!(noted(&mut rest), Some((Table::Files, &b""[..], Some(&b""[..]))));
+        assert_eq!(noted(&mut rest), Some((Table::Sessions, &b"key"[..], None)));
+        assert!(rest.is_empty());
+        for cut in 1..changes.len() {
+            let mut rest = &changes[..cut];
+            while !rest.is_empty() && noted(&mut rest).is_some() {}
+        }
+    }
+
+    #[test]
+    fn every_table_is_found_by_its_number() {
+        for table in Table::ALL {
+            assert_eq!(Table::of(table as u8), Some(table));
+        }
+        assert_eq!(Table::of(10), None);
+    }
+}

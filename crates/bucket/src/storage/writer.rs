@@ -1,0 +1,306 @@
+//! The one thread that changes rows: what is waiting becomes one batch, and a batch costs one sync.
+//!
+//! Changes are functions on the tables, run one after the other, each seeing what those before it did: a condition that
+//! is checked in one holds when its change is made. A batch reaches the journal as a whole or not at all, and nothing is
+//! acknowledged before. When the disk fails, the batch is gone and the database is opened anew from disk and journal.
+
+use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
+use std::sync::{Arc, RwLock};
+use std::time::{Duration, Instant};
+
+use nix::sys::statvfs::statvfs;
+use redb::StorageError;
+use tokio::sync::oneshot;
+
+use super::bodies::{Bodies, sync_names};
+use super::database::Open;
+use super::folder::Folder;
+use super::journal::{Journal, OpenError};
+use super::table::{Applied, Batch};
+
+/// Changes of one batch: enough that a sync is shared by all who wait, few enough that none waits long.
+const BATCH_JOBS: usize = 1000;
+
+/// Changed bytes of one batch.
+const BATCH_BYTES: usize = 8 * 1024 * 1024;
+
+/// So long without work the database catches up with the journal.
+const IDLE: Duration = Duration::from_millis(500);
+
+/// So long a disk that failed is left alone.
+const RECOVERY_PAUSE: Duration = Duration::from_millis(200);
+
+/// Free bytes that are left to changes that make room, and to the journal and the database while they catch up.
+const RESERVE: u64 = 64 * 1024 * 1024;
+
+/// Why nothing was changed, or why that is not known.
+#[derive(Clone, Debug, thiserror::Error)]
+pub(crate) enum Unavailable {
+    /// The disk is full.
+    #[error("the disk is full")]
+    Full,
+    /// The disk failed, or the database is damaged.
+    #[error("the storage failed: {0}")]
+    Failed(Arc<str>),
+    /// The store is ending.
+    #[error("the store is ending")]
+    Ending,
+}
+
+/// What a change does to the room on the disk, and who waits for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// It takes room.
+    Grows,
+    /// It makes room: done also when the disk is nearly full.
+    Shrinks,
+    /// Nobody waits for it, and a kill may undo it.
+    Lazy,
+}
+
+/// A change that waits for its batch.
+pub(super) trait Job: Send {
+    fn kind(&self) -> Kind;
+    fn run(&mut self, batch: &mut Batch<'_>) -> Result<(), StorageError>;
+    fn answer(self: Box<Self>, outcome: Result<(), Unavailable>);
+}
+
+/// What the thread is told.
+pub(super) enum Message {
+    /// Do this.
+    Change(Box<dyn Job>),
+    /// Do what came before this, and no more.
+    End,
+}
+
+/// A function on the tables, and who waits for what it gives.
+pub(super) struct Change<F, T> {
+    pub(super) kind: Kind,
+    pub(super) function: Option<F>,
+    pub(super) value: Option<T>,
+    pub(super) answer: oneshot::Sender<Result<T, Unavailable>>,
+}
+
+impl<F, T> Job for Change<F, T>
+where
+    F: FnOnce(&mut Batch<'_>) -> Result<T, StorageError> + Send,
+    T: Send,
+{
+    fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    fn run(&mut self, batch: &mut Batch<'_>) -> Result<(), StorageError> {
+        if let Some(function) = self.function.take() {
+            self.value = Some(function(batch)?);
+        }
+        Ok(())
+    }
+
+    fn answer(self: Box<Self>, outcome: Result<(), Unavailable>) {
+        let Self { value, answer, .. } = *self;
+        // Whoever asked may be gone.
+        let _ = answer.send(outcome.and_then(|()| value.ok_or(Unavailable::Ending)));
+    }
+}
+
+/// The database that readers find.
+pub(super) type Current = Arc<RwLock<Result<Arc<Open>, Unavailable>>>;
+
+/// See the module.
+pub(super) struct Writer {
+    pub(super) folder: Folder,
+    pub(super) bodies: Arc<Bodies>,
+    pub(super) current: Current,
+    pub(super) journal: Journal,
+    pub(super) on_commit: Box<dyn Fn() + Send>,
+}
+
+impl Writer {
+    /// Works until it is told to end; then leaves a database that has caught up.
+    pub(super) fn work(mut self, messages: &Receiver<Message>) {
+        let mut ending = false;
+        while !ending {
+            let first = match messages.recv_timeout(IDLE) {
+                Ok(Message::Change(first)) => first,
+                Err(RecvTimeoutError::Timeout) => {
+                    self.catch_up_when(!self.journal.is_empty());
+                    continue;
+                }
+                Ok(Message::End) | Err(RecvTimeoutError::Disconnected) => break,
+            };
+            let more = std::iter::from_fn(|| match messages.try_recv() {
+                Ok(Message::Change(job)) => Some(job),
+                Ok(Message::End) => {
+                    ending = true;
+                    None
+                }
+                Err(TryRecvError::Empty | TryRecvError::Disconnected) => None,
+            });
+            self.batch(std::iter::once(first).chain(more).take(BATCH_JOBS));
+            self.catch_up_when(self.journal.is_long());
+        }
+        self.catch_up_when(!self.journal.is_empty());
+    }
+
+    fn batch(&mut self, jobs: impl Iterator<Item = Box<dyn Job>>) {
+        let full = self.is_nearly_full();
+        let mut run = Vec::new();
+        let outcome = self.try_batch(jobs, full, &mut run);
+        let outcome = outcome.map_err(|failed| match failed {
+            Failure::Refused(reason) => reason,
+            Failure::Database(error) => {
+                let reason = reason(&error);
+                self.open_anew();
+                reason
+            }
+        });
+        if outcome.is_ok() {
+            (self.on_commit)();
+        }
+        for job in run {
+            job.answer(outcome.clone());
+        }
+    }
+
+    fn try_batch(
+        &mut self,
+        jobs: impl Iterator<Item = Box<dyn Job>>,
+        full: bool,
+        run: &mut Vec<Box<dyn Job>>,
+    ) -> Result<(), Failure> {
+        let opened = self.opened();
+        let prepared = opened.and_then(|open| Ok((open.begin().map_err(Failure::Database)?, open)));
+        let (transaction, open) = match prepared {
+            Ok(prepared) => prepared,
+            Err(failed) => {
+                run.extend(jobs);
+                return Err(failed);
+            }
+        };
+        let mut batch = Batch::of(&transaction).map_err(Failure::Database)?;
+        let mut lazy = true;
+        for mut job in jobs {
+            if full && job.kind() == Kind::Grows {
+                job.answer(Err(Unavailable::Full));
+                continue;
+            }
+            lazy &= job.kind() == Kind::Lazy;
+            let done = catch_unwind(AssertUnwindSafe(|| job.run(&mut batch)));
+            run.push(job);
+            match done {
+                Ok(done) => done.map_err(|error| Failure::Database(error.into()))?,
+                Err(_) => return Err(Failure::Refused(Unavailable::Failed("a change panicked".into()))),
+            }
+            if batch.changed_bytes() >= BATCH_BYTES {
+                break;
+            }
+        }
+        let Applied { changes, mut adopted, discarded } = batch.end();
+        if changes.is_empty() {
+            return transaction.abort().map_err(|error| Failure::Database(error.into()));
+        }
+        let written = sync_names(&adopted).and_then(|()| self.journal.append(&changes, !lazy));
+        if let Err(failed) = written {
+            transaction.abort().map_err(|error| Failure::Database(error.into()))?;
+            return Err(Failure::Refused(reason(&failed.into())));
+        }
+        adopted.iter_mut().for_each(super::bodies::NewBody::keep);
+        open.commit(transaction).map_err(Failure::Database)?;
+        for id in discarded {
+            self.bodies.remove(id);
+        }
+        Ok(())
+    }
+
+    /// The open database; when the last try failed, one more.
+    fn opened(&mut self) -> Result<Arc<Open>, Failure> {
+        let current = read(&self.current).clone();
+        match current {
+            Ok(open) => Ok(open),
+            Err(_) => {
+                std::thread::sleep(RECOVERY_PAUSE);
+                self.open_anew();
+                read(&self.current).clone().map_err(Failure::Refused)
+            }
+        }
+    }
+
+    /// Opens the database from what is on the disk: its durable state and the journal.
+    fn open_anew(&mut self) {
+        if let Ok(open) = read(&self.current).as_ref() {
+            open.kill();
+        }
+        let opened = open(&self.folder).map(|(open, journal)| {
+            self.journal = journal;
+            Arc::new(open)
+        });
+        let mut current = self.current.write().unwrap_or_else(std::sync::PoisonError::into_inner);
+        *current = opened.map_err(|error| reason(&error));
+    }
+
+    fn catch_up_when(&mut self, due: bool) {
+        if !due {
+            return;
+        }
+        let Ok(open) = self.opened() else { return };
+        let started = Instant::now();
+        let done = open.begin().and_then(|transaction| open.commit_durably(transaction, self.journal.last()));
+        match done {
+            // What cannot be cleared is skipped at the next start.
+            Ok(()) => drop(self.journal.clear()),
+            Err(_) => {
+                self.open_anew();
+                std::thread::sleep(RECOVERY_PAUSE.saturating_sub(started.elapsed()));
+            }
+        }
+    }
+
+    fn is_nearly_full(&self) -> bool {
+        statvfs(self.folder.path()).is_ok_and(|disk| {
+            let free = u64::from(disk.blocks_available()).saturating_mul(disk.fragment_size());
+            free < RESERVE
+        })
+    }
+}
+
+enum Failure {
+    /// Nothing was changed.
+    Refused(Unavailable),
+    /// The database has to be opened anew.
+    Database(redb::Error),
+}
+
+/// Opens database and journal as they are on the disk.
+pub(super) fn open(folder: &Folder) -> Result<(Open, Journal), redb::Error> {
+    let (open, applied) = Open::at(&folder.database())?;
+    let transaction = open.begin()?;
+    let mut batch = Batch::of(&transaction)?;
+    let journal = Journal::open(&folder.journal(), applied, |changes| batch.replay(changes));
+    let journal = journal.map_err(|failed| match failed {
+        OpenError::File(error) => redb::Error::Io(error),
+        OpenError::Replay(error) => error.into(),
+        OpenError::Gap { after, found } => {
+            redb::Error::Corrupted(format!("the journal goes on with entry {found} after entry {after}"))
+        }
+    })?;
+    drop(batch.end());
+    open.commit(transaction)?;
+    Ok((open, journal))
+}
+
+fn reason(error: &redb::Error) -> Unavailable {
+    if let redb::Error::Io(failed) = error {
+        use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+        if matches!(failed.kind(), StorageFull | QuotaExceeded | FileTooLarge) {
+            return Unavailable::Full;
+        }
+    }
+    Unavailable::Failed(error.to_string().into())
+}
+
+pub(super) fn read(current: &Current) -> std::sync::RwLockReadGuard<'_, Result<Arc<Open>, Unavailable>> {
+    current.read().unwrap_or_else(std::sync::PoisonError::into_inner)
+}

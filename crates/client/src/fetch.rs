@@ -1,0 +1,203 @@
+//! What the bucket has of an animation: its GIF, piece by piece, and its frames.
+
+use std::io;
+
+use bytes::Bytes;
+use futures_util::stream::{self, StreamExt, TryStreamExt};
+use rayfold_pipeline::Clock;
+use rayfold_pipeline::assemble::frame_key;
+use rayfold_pipeline::found;
+use rayfold_pipeline::keys::Animation;
+use rayfold_pipeline::manifest::{Frame, Manifest};
+use rayfold_pipeline::store::{ObjectInfo, Store};
+
+use crate::client::{Client, SIDE_BY_SIDE};
+use crate::error::{Error, Result};
+
+/// Bytes of a GIF that are asked for in one request.
+const PIECE: u64 = 8 << 20;
+
+/// Pieces that are under way at once.
+const PIECES: usize = 4;
+
+/// How often a GIF that is replaced while it is being read is begun anew.
+const ATTEMPTS: u32 = 5;
+
+/// Where a file goes.
+pub trait Output {
+    /// Begins the file, which will have `size` bytes. What was written before is void.
+    ///
+    /// # Errors
+    /// The system's.
+    fn begin(&mut self, size: u64) -> io::Result<()>;
+
+    /// Takes the next bytes.
+    ///
+    /// # Errors
+    /// The system's.
+    fn write(&mut self, piece: &[u8]) -> io::Result<()>;
+}
+
+/// A frame that was fetched.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FetchedFrame<'a> {
+    /// Its place in the animation, from 1.
+    pub number: u64,
+    /// Its key.
+    pub key: &'a str,
+    /// The file.
+    pub png: Bytes,
+}
+
+/// The keys of an animation's frames in their order.
+///
+/// # Errors
+/// The first frame that is not drawn.
+pub fn frame_keys(manifest: &Manifest) -> Result<Vec<String>, &Frame> {
+    let key = |frame| frame_key(&manifest.head.animation, frame).ok_or(frame);
+    manifest.frames.iter().map(key).collect()
+}
+
+impl<S: Store, C: Clock> Client<'_, S, C> {
+    /// Reads the GIF as it is now.
+    ///
+    /// # Errors
+    /// When there is none, the output fails, or it is replaced all the time ([`Error::Restless`]).
+    pub async fn fetch_gif(&self, animation: &Animation, output: &mut impl Output) -> Result<ObjectInfo> {
+        let key = animation.gif();
+        for _ in 0..ATTEMPTS {
+            let info = self.store.head(&key).await?;
+            output.begin(info.size).map_err(Error::Output)?;
+            if self.copy(&key, &info, output).await? {
+                return Ok(info);
+            }
+        }
+        Err(Error::Restless { key })
+    }
+
+    /// `false` when the object is replaced on the way.
+    async fn copy(&self, key: &str, info: &ObjectInfo, output: &mut impl Output) -> Result<bool> {
+        let pieces = (0..info.size.div_ceil(PIECE)).map(|n| n * PIECE..((n + 1) * PIECE).min(info.size));
+        let pieces: Vec<_> = pieces.map(|range| self.store.get_range(key, range)).collect();
+        let mut pieces = stream::iter(pieces).buffered(PIECES);
+        while let Some(piece) = pieces.next().await {
+            match found(piece)? {
+                Some(piece) if piece.info.etag == info.etag => {
+                    output.write(&piece.body).map_err(Error::Output)?;
+                }
+                _ => return Ok(false),
+            }
+        }
+        Ok(true)
+    }
+
+    /// Reads frames, many at once, and gives each to `take` as it comes.
+    ///
+    /// # Errors
+    /// Those of the store and of `take`, and [`Error::FrameGone`].
+    pub async fn fetch_frames(
+        &self,
+        keys: &[String],
+        mut take: impl FnMut(FetchedFrame<'_>) -> io::Result<()>,
+    ) -> Result<()> {
+        let reads = keys.iter().zip(1..).map(|(key, number)| async move {
+            let object = found(self.store.get(key).await)?;
+            let png = object.ok_or_else(|| Error::FrameGone { key: key.clone() })?.body;
+            Ok::<_, Error>(FetchedFrame { number, key, png })
+        });
+        let reads: Vec<_> = reads.collect();
+        let mut reads = stream::iter(reads).buffer_unordered(SIDE_BY_SIDE);
+        while let Some(frame) = reads.try_next().await? {
+            take(frame).map_err(Error::Output)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::World;
+    use rayfold_pipeline::store::PutOptions;
+
+    #[derive(Default)]
+    struct Memory {
+        begun: u32,
+        bytes: Vec<u8>,
+        size: u64,
+    }
+
+    impl Output for Memory {
+        fn begin(&mut self, size: u64) -> io::Result<()> {
+            *self = Memory { begun: self.begun + 1, bytes: Vec::new(), size };
+            Ok(())
+        }
+
+        fn write(&mut self, piece: &[u8]) -> io::Result<()> {
+            self.bytes.extend_from_slice(piece);
+            Ok(())
+        }
+    }
+
+    fn gif(size: usize, salt: u8) -> Vec<u8> {
+        (0..size).map(|n| (n % 251) as u8 ^ salt).collect()
+    }
+
+    #[tokio::test]
+    async fn a_gif_of_several_pieces_comes_whole() {
+        let world = World::new();
+        for size in [0, 1, PIECE as usize, 2 * PIECE as usize + 5] {
+            let body = gif(size, 1);
+            world.store.put("animations/film.gif", body.clone().into(), PutOptions::always()).await.unwrap();
+            let mut out = Memory::default();
+            let info = world.client().fetch_gif(&world.film(), &mut out).await.unwrap();
+            assert_eq!((info.size, out.size, out.begun), (size as u64, size as u64, 1));
+            assert!(out.bytes == body, "{size} bytes");
+        }
+    }
+
+    #[tokio::test]
+    async fn a_gif_that_is_replaced_on_the_way_is_begun_anew() {
+        let world = World::new();
+        let size = PIECES * PIECE as usize + 1;
+        world.store.put("animations/film.gif", gif(size, 1).into(), PutOptions::always()).await.unwrap();
+        // Once, before the last piece is read.
+        world.replace_before("get animations/film.gif", PIECES as u32, gif(9, 2), 1);
+        let mut out = Memory::default();
+        world.client().fetch_gif(&world.film(), &mut out).await.unwrap();
+        assert_eq!((out.begun, out.bytes), (2, [gif(9, 2), vec![0]].concat()));
+        // Always.
+        world.replace_before("get animations/film.gif", 0, gif(9, 3), u8::MAX);
+        let error = world.client().fetch_gif(&world.film(), &mut Memory::default()).await.unwrap_err();
+        assert!(matches!(error, Error::Restless { key } if key == "animations/film.gif"));
+    }
+
+    #[tokio::test]
+    async fn frames_come_with_their_numbers_and_those_not_drawn_are_named() {
+        let world = World::new();
+        for name in ["2", "10", "1"] {
+            world.put(&format!("scripts/film/{name}.txt"), &format!("frame {name}")).await;
+        }
+        world.functions().await;
+        let watch = world.client().look(&[world.film()]).await.unwrap().remove(0);
+        let keys = frame_keys(watch.manifest().unwrap()).unwrap();
+        let mut frames = Vec::new();
+        let take = |frame: FetchedFrame<'_>| {
+            frames.push((frame.number, String::from_utf8(frame.png.to_vec()).unwrap()));
+            Ok(())
+        };
+        world.client().fetch_frames(&keys, take).await.unwrap();
+        frames.sort();
+        let expected = [(1, "1: frame 1"), (2, "2: frame 2"), (3, "10: frame 10")];
+        assert_eq!(frames, expected.map(|(number, text)| (number, text.to_owned())));
+
+        world.store.delete(&keys[1]).await.unwrap();
+        let error = world.client().fetch_frames(&keys, |_| Ok(())).await.unwrap_err();
+        assert!(matches!(error, Error::FrameGone { key } if key == keys[1]));
+
+        world.put("scripts/film/2.txt", "bad").await;
+        world.functions().await;
+        let watch = world.client().look(&[world.film()]).await.unwrap().remove(0);
+        assert_eq!(frame_keys(watch.manifest().unwrap()).unwrap_err().script.as_str(), "2");
+    }
+}

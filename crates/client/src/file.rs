@@ -1,0 +1,118 @@
+//! A file as it should be in the bucket, and whether it is there already.
+//!
+//! That is told by its size and its MD5, which is an object's entity tag; where it is not (encrypted with a key of
+//! one's own, uploaded in parts) the digest tells that is left in the object's metadata.
+
+use std::path::PathBuf;
+
+use bytes::Bytes;
+use md5::{Digest, Md5};
+use rayfold_pipeline::store::PutOptions;
+
+use crate::error::{Error, Result};
+
+/// The name of the metadata that holds a script's digest.
+pub(crate) const DIGEST: &str = "rayfold-md5";
+
+/// A file as it should be in the bucket.
+#[derive(Debug, Clone)]
+pub struct File {
+    content: Content,
+    size: u64,
+    digest: String,
+}
+
+/// Where its bytes are.
+#[derive(Debug, Clone)]
+pub enum Content {
+    /// On the disk, to be read again when it is sent.
+    Path(PathBuf),
+    /// Here.
+    Bytes(Bytes),
+}
+
+impl File {
+    /// Reads it once, for its size and digest.
+    ///
+    /// # Errors
+    /// [`Error::Read`].
+    pub fn new(content: Content) -> Result<Self> {
+        let bytes = content.read()?;
+        Ok(Self { size: bytes.len() as u64, digest: digest(&bytes), content })
+    }
+
+    /// A file of this text.
+    pub fn of_text(text: impl Into<String>) -> Self {
+        let bytes = Bytes::from(text.into());
+        Self { size: bytes.len() as u64, digest: digest(&bytes), content: Content::Bytes(bytes) }
+    }
+
+    /// Its size in bytes.
+    pub fn size(&self) -> u64 {
+        self.size
+    }
+
+    /// Its MD5 as hexadecimal digits.
+    pub(crate) fn digest(&self) -> &str {
+        &self.digest
+    }
+
+    /// Its bytes, for the object `key`.
+    ///
+    /// # Errors
+    /// [`Error::Read`], and [`Error::FileChanged`] when it is no longer what it was.
+    pub(crate) fn read(&self, key: &str) -> Result<Bytes> {
+        let bytes = self.content.read()?;
+        if digest(&bytes) != self.digest {
+            return Err(Error::FileChanged { key: key.to_owned() });
+        }
+        Ok(bytes)
+    }
+
+    /// How to put it.
+    pub(crate) fn options(&self, key: &str) -> PutOptions {
+        let is_json = key.ends_with(".json");
+        let media_type = if is_json { "application/json" } else { "text/plain; charset=utf-8" };
+        PutOptions::always().content_type(media_type).metadata(DIGEST, &self.digest)
+    }
+}
+
+impl Content {
+    fn read(&self) -> Result<Bytes> {
+        match self {
+            Self::Bytes(bytes) => Ok(bytes.clone()),
+            Self::Path(path) => match std::fs::read(path) {
+                Ok(bytes) => Ok(bytes.into()),
+                Err(source) => Err(Error::Read { path: path.clone(), source }),
+            },
+        }
+    }
+}
+
+fn digest(bytes: &[u8]) -> String {
+    Md5::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_digest_is_what_s3_calls_an_entity_tag() {
+        // RFC 1321, A.5
+        assert_eq!(digest(b"message digest"), "f96b697d7cb7938d525a2f31aaf161d0");
+    }
+
+    #[test]
+    fn a_file_that_changes_before_it_is_sent_is_not_sent() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("1.txt");
+        std::fs::write(&path, "first").unwrap();
+        let file = File::new(Content::Path(path.clone())).unwrap();
+        assert_eq!((file.size(), file.read("k").unwrap()), (5, "first".into()));
+        std::fs::write(&path, "other").unwrap();
+        assert!(matches!(file.read("k"), Err(Error::FileChanged { key }) if key == "k"));
+        std::fs::remove_file(&path).unwrap();
+        assert!(matches!(file.read("k"), Err(Error::Read { path: of, .. }) if of == path));
+    }
+}

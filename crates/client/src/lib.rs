@@ -1,0 +1,82 @@
+//! Animations in a bucket from outside: scripts in, progress, frames and GIFs out.
+//!
+//! A command line and a web page are two faces of this crate. What it knows it reads off the bucket, as the functions
+//! do, and it remembers nothing: whatever is interrupted is picked up from what the bucket shows. It knows no terminal,
+//! no flags and no S3: the bucket is a [`Store`](rayfold_pipeline::store::Store), time
+//! a [`Clock`](rayfold_pipeline::Clock), and progress comes as values ([`Sending`],
+//! [`Waiting`], [`Removing`]) to a closure that the caller brings.
+//!
+//! ```
+//! use rayfold_client::{Client, File, Submission, Submitted};
+//! use rayfold_pipeline::{SystemClock, keys::{Animation, ScriptName}, store::MemoryStore};
+//! # #[tokio::main(flavor = "current_thread")] async fn main() -> rayfold_client::Result<()> {
+//! let store = MemoryStore::new(SystemClock);
+//! let client = Client::new(&store, &SystemClock);
+//! let script = (ScriptName::new("1")?, File::of_text("Screen 4 3\nTrace\n"));
+//! let submission = Submission::new(Animation::new("film")?, [script], File::of_text("{\"frames\": 1}\n"))?;
+//! let Submitted { versions } = client.submit(&submission, |progress| eprintln!("{progress:?}")).await?;
+//! assert!(versions.contains_key("scripts/film/1.txt"));
+//! # Ok(()) }
+//! ```
+
+mod client;
+mod error;
+mod fetch;
+mod file;
+mod remove;
+mod retry;
+mod status;
+mod submit;
+mod watch;
+
+#[cfg(test)]
+mod world;
+
+pub use client::Client;
+pub use error::{Error, Result};
+pub use fetch::{FetchedFrame, Output, frame_keys};
+pub use file::{Content, File};
+pub use remove::Removing;
+pub use status::{Obstacle, frame_name, obstacles};
+pub use submit::{Sending, Submission, Submitted, settings_with_frames};
+pub use watch::{Ended, Waiting, Watch};
+
+#[cfg(test)]
+mod tests {
+    use rayfold_pipeline::Randomness;
+    use rayfold_pipeline::retry::Scope;
+
+    use super::*;
+    use crate::world::World;
+
+    fn is_send<F: Future + Send>(_: F) {}
+
+    struct Nowhere;
+
+    impl Output for Nowhere {
+        fn begin(&mut self, _: u64) -> std::io::Result<()> {
+            Ok(())
+        }
+
+        fn write(&mut self, _: &[u8]) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// A web page's server moves futures between threads.
+    #[test]
+    fn what_the_client_does_can_move_between_threads() {
+        let world = World::new();
+        let (client, film, random) = (world.client(), world.film(), Randomness::seeded(1));
+        let submission = Submission::new(film.clone(), [], File::of_text("{}")).unwrap();
+        let submitted = Submitted { versions: Default::default() };
+        is_send(client.submit(&submission, |_| {}));
+        is_send(client.wait(&film, &submitted, |_| {}));
+        is_send(client.fetch_gif(&film, &mut Nowhere));
+        is_send(client.fetch_frames(&[], |_| Ok(())));
+        is_send(client.retry(&film, Scope::All, 1, &random));
+        is_send(client.remove(&film, |_| {}));
+        is_send(client.animations());
+        is_send(client.look(&[]));
+    }
+}

@@ -1,0 +1,130 @@
+//! An animation out of the bucket, with all that was made of it.
+
+use std::time::Duration;
+
+use rayfold_pipeline::Clock;
+use rayfold_pipeline::keys::{Animation, Key};
+use rayfold_pipeline::manifest::Status;
+use rayfold_pipeline::store::{ListRequest, Store};
+
+use crate::client::Client;
+use crate::error::{Error, Result};
+use crate::watch::Watch;
+
+/// How long the functions have to notice that the scripts are gone. They write an empty manifest then, which would come
+/// back if it were removed before.
+const NOTICE: Duration = Duration::from_secs(15);
+
+/// How far a removal is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Removing {
+    /// So many objects are gone.
+    Deleted(u64),
+    /// The functions must notice that there are no scripts any more.
+    WaitingForFunctions,
+}
+
+impl<S: Store, C: Clock> Client<'_, S, C> {
+    /// Removes an animation; says how many objects there were.
+    ///
+    /// # Errors
+    /// [`Error::NoAnimation`], and those of the store.
+    pub async fn remove(&self, animation: &Animation, mut told: impl FnMut(Removing)) -> Result<u64> {
+        let scripts = self.keys_of(animation, &[animation.scripts()]).await?;
+        if scripts.is_empty() && self.made_of(animation).await?.is_empty() {
+            return Err(Error::NoAnimation(animation.clone()));
+        }
+        self.delete(&scripts, |done| told(Removing::Deleted(done))).await?;
+        let mut removed = scripts.len() as u64;
+        let mut watch = Watch::new(*self, animation.clone());
+        watch.look().await?;
+        while !scripts.is_empty() && is_pending(&watch) && watch.elapsed() < NOTICE {
+            told(Removing::WaitingForFunctions);
+            watch.pause().await;
+            watch.look_patiently().await?;
+        }
+        // Whatever was under way may have left something since.
+        loop {
+            let rest = self.made_of(animation).await?;
+            if rest.is_empty() {
+                return Ok(removed);
+            }
+            self.delete(&rest, |done| told(Removing::Deleted(removed + done))).await?;
+            removed += rest.len() as u64;
+        }
+    }
+
+    /// Everything but the scripts.
+    async fn made_of(&self, animation: &Animation) -> Result<Vec<String>> {
+        let prefixes = [
+            animation.retries(),
+            animation.parts(),
+            format!("assemblies/{animation}/"),
+            animation.frames(),
+            animation.gif(),
+            animation.manifest(),
+        ];
+        self.keys_of(animation, &prefixes).await
+    }
+
+    /// Keys below the prefixes that belong to this animation, and not to one whose name starts with it.
+    async fn keys_of(&self, animation: &Animation, prefixes: &[String]) -> Result<Vec<String>> {
+        let mut keys = Vec::new();
+        for prefix in prefixes {
+            let listed = self.list(ListRequest::all(prefix.clone())).await?.objects;
+            let is_ours = |key: &String| key.parse::<Key>().is_ok_and(|key| key.animation() == animation);
+            keys.extend(listed.into_iter().map(|object| object.key).filter(is_ours));
+        }
+        Ok(keys)
+    }
+}
+
+fn is_pending<S: Store, C: Clock>(watch: &Watch<'_, S, C>) -> bool {
+    watch.manifest().is_some_and(|manifest| manifest.head.status != Status::Empty)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::World;
+
+    async fn filled() -> World {
+        let world = World::new();
+        for key in ["film/1", "film/two/1", "films/1"] {
+            world.put(&format!("scripts/{key}.txt"), "frame").await;
+        }
+        world.put("scripts/film/2.txt", "bad").await;
+        world.functions().await;
+        world
+    }
+
+    #[tokio::test]
+    async fn nothing_of_an_animation_is_left_and_everything_of_others() {
+        let world = filled().await;
+        let (client, film) = (world.client(), world.film());
+        let of_others = |keys: Vec<String>| {
+            keys.into_iter().filter(|key| key.contains("film/two") || key.contains("films"))
+        };
+        let others: Vec<String> = of_others(world.keys("").await).collect();
+        let before = world.keys("").await.len();
+        let mut told = Vec::new();
+        // The functions notice while the client waits for them.
+        let removing = client.remove(&film, |removing| told.push(removing));
+        let (removed, ()) =
+            futures_util::future::join(removing, world.deletions(&["scripts/film/1.txt"])).await;
+        assert_eq!(world.keys("").await, others);
+        let (first, last) = (told.first().cloned(), told.last().cloned());
+        assert_eq!(first, Some(Removing::Deleted(1)));
+        let removed = removed.unwrap();
+        assert_eq!(last, Some(Removing::Deleted(removed)));
+        assert!(removed as usize >= before - others.len() && told.contains(&Removing::WaitingForFunctions));
+        assert!(matches!(client.remove(&film, |_| {}).await, Err(Error::NoAnimation(name)) if name == film));
+    }
+
+    #[tokio::test]
+    async fn a_removal_ends_without_functions() {
+        let world = filled().await;
+        world.client().remove(&world.film(), |_| {}).await.unwrap();
+        assert!(world.keys("").await.iter().all(|key| !key.starts_with("manifests/film.")));
+    }
+}

@@ -1,0 +1,126 @@
+//! Where the animations of a bucket stand.
+
+use futures_util::stream::{self, StreamExt, TryStreamExt};
+use rayfold_pipeline::Clock;
+use rayfold_pipeline::keys::{Animation, Key, MANIFESTS, SCRIPTS};
+use rayfold_pipeline::manifest::{Frame, FrameState, Manifest, Reason};
+use rayfold_pipeline::store::{ListRequest, Store};
+use rayfold_scene::SETTINGS_FILE;
+
+use crate::client::{Client, SIDE_BY_SIDE};
+use crate::error::{Error, Result};
+use crate::watch::Watch;
+
+/// Something that keeps an animation from being done.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Obstacle<'a> {
+    /// What is faulty, for people: a script, `animation.json`, the GIF.
+    pub what: String,
+    /// Why, once that is known.
+    pub reason: Option<&'a Reason>,
+}
+
+/// Everything that a manifest says keeps its animation from being done, besides the keys that it rejects.
+pub fn obstacles(manifest: &Manifest) -> Vec<Obstacle<'_>> {
+    let head = &manifest.head;
+    let settings = head.settings.fault.as_ref();
+    let settings = settings.map(|reason| Obstacle { what: SETTINGS_FILE.to_owned(), reason: Some(reason) });
+    let frames = manifest.frames.iter().filter_map(|frame| match &frame.state {
+        FrameState::Failed(fault) => {
+            Some(Obstacle { what: frame_name(frame), reason: fault.reason.as_ref() })
+        }
+        FrameState::Pending | FrameState::Done { .. } => None,
+    });
+    let refusal = head.refusal.as_ref();
+    let refusal = refusal.map(|fault| Obstacle {
+        what: format!("the GIF of {}", head.animation),
+        reason: fault.reason.as_ref(),
+    });
+    settings.into_iter().chain(frames).chain(refusal).collect()
+}
+
+/// The script of a frame, and which of its frames it is, for people.
+pub fn frame_name(frame: &Frame) -> String {
+    match frame.part {
+        None => format!("{}.txt", frame.script),
+        Some(part) => format!("{}.txt, frame {part}", frame.script),
+    }
+}
+
+impl<'a, S: Store, C: Clock> Client<'a, S, C> {
+    /// The animations of the bucket by name: those that have a manifest, and folders of scripts that have none yet.
+    ///
+    /// # Errors
+    /// Those of the store.
+    pub async fn animations(&self) -> Result<Vec<Animation>> {
+        let manifests = self.list(ListRequest::all(MANIFESTS)).await?.objects;
+        let mut names: Vec<Animation> = manifests
+            .iter()
+            .filter_map(|object| Some(object.key.parse::<Key>().ok()?.animation().clone()))
+            .collect();
+        for folder in self.list(ListRequest::level(SCRIPTS)).await?.prefixes {
+            let name = folder.trim_start_matches(SCRIPTS).trim_end_matches('/');
+            let is_below =
+                |known: &Animation| known.as_str() == name || known.as_str().starts_with(&format!("{name}/"));
+            if !names.iter().any(is_below)
+                && let Ok(name) = Animation::new(name)
+            {
+                names.push(name);
+            }
+        }
+        names.sort();
+        Ok(names)
+    }
+
+    /// A first look at each of these animations, in their order.
+    ///
+    /// # Errors
+    /// Those of the store.
+    pub async fn look(&self, animations: &[Animation]) -> Result<Vec<Watch<'a, S, C>>> {
+        let looks = animations.iter().map(|animation| {
+            let mut watch = Watch::new(*self, animation.clone());
+            async move {
+                watch.look().await?;
+                Ok::<_, Error>(watch)
+            }
+        });
+        let looks: Vec<_> = looks.collect();
+        stream::iter(looks).buffered(SIDE_BY_SIDE).try_collect().await
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::World;
+
+    #[tokio::test]
+    async fn animations_are_those_with_a_manifest_and_new_folders() {
+        let world = World::new();
+        world.put("scripts/film/1.txt", "frame").await;
+        world.put("scripts/films/one/1.txt", "frame").await;
+        world.functions().await;
+        world.put("scripts/new/1.txt", "frame").await;
+        let names = world.client().animations().await.unwrap();
+        let texts: Vec<&str> = names.iter().map(Animation::as_str).collect();
+        assert_eq!(texts, ["film", "films/one", "new"]);
+        let looks = world.client().look(&names).await.unwrap();
+        let seen: Vec<_> = looks.iter().map(|watch| (watch.is_settled(), watch.is_current())).collect();
+        assert_eq!(seen, [(true, true), (true, true), (false, false)]);
+    }
+
+    #[tokio::test]
+    async fn what_keeps_an_animation_from_being_done_is_named() {
+        let world = World::new();
+        world.put("scripts/film/1.txt", "bad").await;
+        world.put("scripts/film/2.txt", "frame").await;
+        world.put("scripts/film/animation.json", "[]").await;
+        world.functions().await;
+        let looks = world.client().look(&[world.film()]).await.unwrap();
+        let obstacles = obstacles(looks[0].manifest().unwrap());
+        let what: Vec<&str> = obstacles.iter().map(|obstacle| obstacle.what.as_str()).collect();
+        assert_eq!(what, ["animation.json", "1.txt"]);
+        assert!(obstacles.iter().all(|obstacle| obstacle.reason.is_some()));
+        assert!(looks[0].is_settled() && !looks[0].is_current());
+    }
+}

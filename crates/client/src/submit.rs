@@ -1,0 +1,294 @@
+//! Making an animation's folder of the bucket equal to a local one, with as little as possible uploaded.
+//!
+//! What goes first matters: with scripts deleted, then the new number of frames, then new scripts, the animation is
+//! never complete before it is what it should be.
+
+use std::collections::BTreeMap;
+
+use bytes::Bytes;
+use futures_util::stream::{self, StreamExt, TryStreamExt};
+use rayfold_pipeline::Clock;
+use rayfold_pipeline::keys::{Animation, Key, ScriptName};
+use rayfold_pipeline::store::{ETag, ListRequest, Listed, Store};
+use rayfold_scene::AnimationSettings;
+
+use crate::client::{Client, SIDE_BY_SIDE};
+use crate::error::{Error, Result};
+use crate::file::{DIGEST, File};
+
+/// Memory that files under way may take.
+const UNDER_WAY: u64 = 256 << 20;
+
+/// What an animation's folder of the bucket should hold.
+#[derive(Debug)]
+pub struct Submission {
+    animation: Animation,
+    /// By key.
+    files: BTreeMap<String, File>,
+}
+
+/// How far a submission is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Sending {
+    /// Scripts that are no longer wanted have been deleted.
+    Deleted {
+        /// How many.
+        scripts: u64,
+    },
+    /// Scripts are being uploaded.
+    Uploading {
+        /// So many are there.
+        done: u64,
+        /// Of so many.
+        total: u64,
+    },
+    /// Everything is as it should be.
+    Finished {
+        /// Scripts that were uploaded.
+        uploaded: u64,
+        /// Files, with the settings, that were there already.
+        unchanged: u64,
+    },
+}
+
+/// What a submission has come to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Submitted {
+    /// The version of each file by key.
+    pub versions: BTreeMap<String, ETag>,
+}
+
+/// The bucket's folder compared with the wanted one.
+#[derive(Debug, Default, PartialEq)]
+struct Difference {
+    /// Keys to put, in order.
+    changed: Vec<String>,
+    /// Keys to delete.
+    surplus: Vec<String>,
+    /// The versions of what is as it should be.
+    same: BTreeMap<String, ETag>,
+}
+
+/// Settings that say how many frames there are, so that the functions need not wait for a quiet period to know that the
+/// upload has ended.
+///
+/// # Errors
+/// [`Error::Settings`] for no frames.
+pub fn settings_with_frames(settings: &AnimationSettings, frames: u64) -> Result<File> {
+    let counted = AnimationSettings::new(Some(frames), settings.fps(), settings.loops());
+    let counted = counted.map_err(|source| Error::Settings(source.into()))?;
+    let text = serde_json::to_string_pretty(&counted).map_err(|source| Error::Settings(source.into()))?;
+    Ok(File::of_text(text + "\n"))
+}
+
+impl Submission {
+    /// These scripts, and this `animation.json`.
+    ///
+    /// # Errors
+    /// The pipeline's [`Key`](rayfold_pipeline::Error::Key) for a name that it refuses.
+    pub fn new(
+        animation: Animation,
+        scripts: impl IntoIterator<Item = (ScriptName, File)>,
+        settings: File,
+    ) -> Result<Self> {
+        let mut files = BTreeMap::from([(animation.settings(), settings)]);
+        for (name, file) in scripts {
+            let key = animation.script(&name);
+            key.parse::<Key>()?;
+            files.insert(key, file);
+        }
+        Ok(Self { animation, files })
+    }
+
+    /// The animation.
+    pub fn animation(&self) -> &Animation {
+        &self.animation
+    }
+}
+
+impl<S: Store, C: Clock> Client<'_, S, C> {
+    /// Makes the bucket's folder as wanted.
+    ///
+    /// # Errors
+    /// Those of the store, and when a file can no longer be read or is no longer what it was.
+    pub async fn submit(&self, submission: &Submission, mut told: impl FnMut(Sending)) -> Result<Submitted> {
+        let Submission { animation, files } = submission;
+        let Difference { mut changed, surplus, same: mut versions } = self.compare(animation, files).await?;
+        if !surplus.is_empty() {
+            self.delete(&surplus, |_| {}).await?;
+            told(Sending::Deleted { scripts: surplus.len() as u64 });
+        }
+        let unchanged = versions.len() as u64;
+        let settings = animation.settings();
+        if let Some(place) = changed.iter().position(|key| *key == settings) {
+            changed.remove(place);
+            versions.extend(self.send(std::slice::from_ref(&settings), files, |_| {}).await?);
+        }
+        let total = changed.len() as u64;
+        if total > 0 {
+            told(Sending::Uploading { done: 0, total });
+            versions
+                .extend(self.send(&changed, files, |done| told(Sending::Uploading { done, total })).await?);
+        }
+        told(Sending::Finished { uploaded: total, unchanged });
+        Ok(Submitted { versions })
+    }
+
+    /// Compares what lies right below the animation's scripts with what should.
+    async fn compare(&self, animation: &Animation, files: &BTreeMap<String, File>) -> Result<Difference> {
+        let listing = self.list(ListRequest::level(animation.scripts())).await?;
+        let there: BTreeMap<String, Listed> =
+            listing.objects.into_iter().map(|object| (object.key.clone(), object)).collect();
+        let is_ours = |key: &&String| key.ends_with(".txt") || **key == animation.settings();
+        let surplus = there.keys().filter(is_ours).filter(|key| !files.contains_key(*key)).cloned();
+        let mut difference = Difference { surplus: surplus.collect(), ..Difference::default() };
+        let looks = files.iter().map(|(key, file)| {
+            let there = there.get(key);
+            async move { Ok::<_, Error>((key.clone(), self.version_if_same(key, file, there).await?)) }
+        });
+        let looks: Vec<_> = looks.collect();
+        let mut looks = stream::iter(looks).buffered(SIDE_BY_SIDE);
+        while let Some((key, same)) = looks.try_next().await? {
+            match same {
+                Some(version) => _ = difference.same.insert(key, version),
+                None => difference.changed.push(key),
+            }
+        }
+        Ok(difference)
+    }
+
+    /// The object's version, if it holds the file.
+    async fn version_if_same(&self, key: &str, file: &File, there: Option<&Listed>) -> Result<Option<ETag>> {
+        let Some(there) = there.filter(|there| there.size == file.size()) else { return Ok(None) };
+        if there.etag.as_str() == file.digest() {
+            return Ok(Some(there.etag.clone()));
+        }
+        let info = self.store.head(key).await?;
+        let is_same = info.metadata.get(DIGEST).is_some_and(|digest| digest == file.digest());
+        Ok(is_same.then_some(info.etag))
+    }
+
+    /// Puts files, many at once, and tells after each how many are there. Returns their versions.
+    async fn send(
+        &self,
+        keys: &[String],
+        files: &BTreeMap<String, File>,
+        mut told: impl FnMut(u64),
+    ) -> Result<BTreeMap<String, ETag>> {
+        let files = keys.iter().filter_map(|key| Some((key, files.get(key)?)));
+        let largest = files.clone().map(|(_, file)| file.size()).max().unwrap_or(1).max(1);
+        let at_once = usize::try_from(UNDER_WAY / largest).unwrap_or(SIDE_BY_SIDE).clamp(1, SIDE_BY_SIDE);
+        let puts = files.map(|(key, file)| async move {
+            let bytes: Bytes = file.read(key)?;
+            let version = self.store.put(key, bytes, file.options(key)).await?;
+            Ok::<_, Error>((key.clone(), version))
+        });
+        let puts: Vec<_> = puts.collect();
+        let mut puts = stream::iter(puts).buffer_unordered(at_once);
+        let mut versions = BTreeMap::new();
+        while let Some((key, version)) = puts.try_next().await? {
+            versions.insert(key, version);
+            told(versions.len() as u64);
+        }
+        Ok(versions)
+    }
+
+    /// Deletes, many at once, and tells after each how many are gone.
+    pub(crate) async fn delete(&self, keys: &[String], mut told: impl FnMut(u64)) -> Result<()> {
+        let deletions: Vec<_> = keys.iter().map(|key| self.store.delete(key)).collect();
+        let mut deletions = stream::iter(deletions).buffer_unordered(SIDE_BY_SIDE);
+        let mut gone = 0;
+        while let Some(()) = deletions.try_next().await? {
+            gone += 1;
+            told(gone);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::World;
+    use rayfold_pipeline::store::PutOptions;
+
+    fn submission(scripts: &[(&str, &str)], settings: &str) -> Submission {
+        let scripts =
+            scripts.iter().map(|(name, text)| (ScriptName::new(name).unwrap(), File::of_text(*text)));
+        Submission::new(Animation::new("film").unwrap(), scripts, File::of_text(settings)).unwrap()
+    }
+
+    async fn submit(world: &World, scripts: &[(&str, &str)], settings: &str) -> (Submitted, Vec<Sending>) {
+        let mut told = Vec::new();
+        let submission = submission(scripts, settings);
+        let submitted = world.client().submit(&submission, |sending| told.push(sending)).await.unwrap();
+        (submitted, told)
+    }
+
+    #[tokio::test]
+    async fn the_folder_becomes_equal_and_only_what_changed_is_uploaded() {
+        let world = World::new();
+        world.put("scripts/film/old.txt", "old").await;
+        world.put("scripts/film/notes.md", "not ours").await;
+        world.put("scripts/film/2/1.txt", "another animation's").await;
+        let (submitted, told) = submit(&world, &[("1", "a"), ("2", "b")], "{}").await;
+        assert_eq!(told.first(), Some(&Sending::Deleted { scripts: 1 }));
+        assert_eq!(told.last(), Some(&Sending::Finished { uploaded: 2, unchanged: 0 }));
+        assert!(told.contains(&Sending::Uploading { done: 2, total: 2 }));
+        let kept = ["scripts/film/2/1.txt", "scripts/film/notes.md"];
+        let mut keys: Vec<&str> = submitted.versions.keys().map(String::as_str).chain(kept).collect();
+        keys.sort_unstable();
+        assert_eq!(world.keys("scripts/").await, keys);
+
+        world.requests.clear();
+        let (again, told) = submit(&world, &[("1", "a"), ("2", "b")], "{}").await;
+        assert_eq!(told, [Sending::Finished { uploaded: 0, unchanged: 3 }]);
+        assert_eq!(again, submitted);
+        assert!(!world.requests.seen().iter().any(|request| request.starts_with("put")));
+
+        let (changed, told) = submit(&world, &[("1", "A"), ("2", "b")], "{}").await;
+        assert_eq!(told.last(), Some(&Sending::Finished { uploaded: 1, unchanged: 2 }));
+        assert_ne!(changed.versions["scripts/film/1.txt"], submitted.versions["scripts/film/1.txt"]);
+    }
+
+    #[tokio::test]
+    async fn deletions_go_first_then_the_settings_then_the_scripts() {
+        let world = World::new();
+        world.put("scripts/film/0.txt", "old").await;
+        world.requests.clear();
+        submit(&world, &[("1", "a")], "{}").await;
+        let mut seen = world.requests.seen();
+        seen.retain(|request| !request.starts_with("list"));
+        let expected =
+            ["delete scripts/film/0.txt", "put scripts/film/animation.json", "put scripts/film/1.txt"];
+        assert_eq!(seen, expected);
+    }
+
+    /// With encryption by one's own key, or parts, the entity tag is not the MD5; the memory store's never is.
+    #[tokio::test]
+    async fn an_object_of_other_tags_and_no_digest_is_sent_again() {
+        let world = World::new();
+        let key = "scripts/film/1.txt";
+        world.store.put(key, "a".into(), PutOptions::always()).await.unwrap();
+        let (_, told) = submit(&world, &[("1", "a")], "{}").await;
+        assert_eq!(told.last(), Some(&Sending::Finished { uploaded: 1, unchanged: 0 }));
+        assert!(world.store.head(key).await.unwrap().metadata.contains_key(DIGEST));
+    }
+
+    #[test]
+    fn names_that_the_pipeline_refuses_are_refused_before_anything_is_sent() {
+        let long = ScriptName::new(&"x".repeat(900)).unwrap();
+        let submission =
+            Submission::new(Animation::new("film").unwrap(), [(long, File::of_text(""))], File::of_text(""));
+        assert!(submission.unwrap_err().to_string().contains("longer than 900 bytes"));
+    }
+
+    #[test]
+    fn settings_say_how_many_frames_there_are() {
+        let settings = AnimationSettings::new(None, 25.0, 3).unwrap();
+        let file = settings_with_frames(&settings, 7).unwrap();
+        let parsed = rayfold_scene::parse_settings("animation.json", &file.read("k").unwrap());
+        assert_eq!(parsed.settings, AnimationSettings::new(Some(7), 25.0, 3).ok());
+        assert!(matches!(settings_with_frames(&settings, 0), Err(Error::Settings(_))));
+    }
+}

@@ -1,0 +1,290 @@
+//! Looking at an animation again and again until it is what was asked for.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use rayfold_pipeline::assemble::generation_of;
+use rayfold_pipeline::keys::Animation;
+use rayfold_pipeline::manifest::{Manifest, Status};
+use rayfold_pipeline::store::{ETag, ListRequest, ObjectInfo, Store};
+use rayfold_pipeline::{Clock, Timestamp, found};
+
+use crate::client::Client;
+use crate::error::{Error, Result};
+use crate::submit::Submitted;
+
+/// How long nothing may happen before whoever waits is told that this is unusual.
+const UNUSUAL: Duration = Duration::from_secs(20);
+
+/// How long a store may be busy or out of reach.
+const PATIENCE: Duration = Duration::from_secs(3600);
+
+/// An animation as its manifest and its GIF show it.
+#[derive(Debug)]
+pub struct Watch<'a, S, C> {
+    client: Client<'a, S, C>,
+    animation: Animation,
+    version: Option<ETag>,
+    manifest: Option<Manifest>,
+    gif: Option<ObjectInfo>,
+    started: Timestamp,
+}
+
+/// How far the frames are that someone waits for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Waiting {
+    /// The functions work on what was submitted.
+    Frames {
+        /// So many frames are drawn or cannot be.
+        done: u64,
+        /// Of so many.
+        total: u64,
+    },
+    /// Nothing has happened for so long.
+    Quiet(Duration),
+}
+
+/// What a submission has become.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ended {
+    /// A GIF.
+    Gif(ObjectInfo),
+    /// No GIF, as the manifest says.
+    Failed(Box<Manifest>),
+}
+
+impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
+    /// Nothing is known before the first look.
+    pub fn new(client: Client<'a, S, C>, animation: Animation) -> Self {
+        let started = client.clock.now();
+        Self { client, animation, version: None, manifest: None, gif: None, started }
+    }
+
+    /// The animation.
+    pub fn animation(&self) -> &Animation {
+        &self.animation
+    }
+
+    /// The manifest as last seen.
+    pub fn manifest(&self) -> Option<&Manifest> {
+        self.manifest.as_ref()
+    }
+
+    /// The GIF as last seen.
+    pub fn gif(&self) -> Option<&ObjectInfo> {
+        self.gif.as_ref()
+    }
+
+    /// Looks. The manifest, which may be large, is read only when it has changed, the GIF's version only once all
+    /// frames are drawn. Says whether anything changed.
+    ///
+    /// # Errors
+    /// Those of the store.
+    pub async fn look(&mut self) -> Result<bool> {
+        let (store, key) = (self.client.store, self.animation.manifest());
+        // At first a whole GET, whose refusal says more than that of a HEAD.
+        let is_known = match &self.version {
+            Some(_) => found(store.head(&key).await)?.map(|info| info.etag) == self.version,
+            None => false,
+        };
+        let mut changed = false;
+        if !is_known {
+            let object = found(store.get(&key).await)?;
+            let version = object.as_ref().map(|object| object.info.etag.clone());
+            changed = version != self.version;
+            self.manifest =
+                object.map(|object| Manifest::decode(&self.animation, &object.body)).transpose()?;
+            self.version = version;
+        }
+        if self.manifest.as_ref().is_some_and(|manifest| manifest.head.is_terminal()) {
+            let gif = found(store.head(&self.animation.gif()).await)?;
+            changed |= gif != self.gif;
+            self.gif = gif;
+        }
+        Ok(changed)
+    }
+
+    /// The same, but a store that is busy or out of reach for a moment is no reason to give up.
+    ///
+    /// # Errors
+    /// When the store refuses.
+    pub async fn look_patiently(&mut self) -> Result<bool> {
+        match self.look().await {
+            Err(Error::Store(error)) if error.is_retryable() && self.elapsed() < PATIENCE => Ok(false),
+            answer => answer,
+        }
+    }
+
+    /// The GIF shows what the manifest says.
+    pub fn is_current(&self) -> bool {
+        let generation = self.manifest.as_ref().map(|manifest| manifest.head.generation.as_str());
+        generation.is_some() && generation_of(self.gif.as_ref()) == generation
+    }
+
+    /// Nothing more will happen unless somebody changes something.
+    pub fn is_settled(&self) -> bool {
+        match self.manifest.as_ref().map(|manifest| manifest.head.status) {
+            None | Some(Status::Waiting | Status::Rendering) => false,
+            Some(Status::Done) => self.is_current(),
+            Some(Status::Empty) => self.gif.is_none(),
+            Some(Status::Failed | Status::Refused) => true,
+        }
+    }
+
+    /// Waits before the next look: a moment at first, longer when it takes long anyway.
+    pub async fn pause(&self) {
+        let pause = (self.elapsed() / 20).clamp(Duration::from_millis(100), Duration::from_secs(2));
+        self.client.clock.sleep(pause).await;
+    }
+
+    /// Since the first look could be taken.
+    pub(crate) fn elapsed(&self) -> Duration {
+        self.client.clock.now().since(self.started)
+    }
+}
+
+impl<S: Store, C: Clock> Client<'_, S, C> {
+    /// Waits until what was submitted has become a GIF, or the manifest says why it will not.
+    ///
+    /// # Errors
+    /// When the store refuses, and [`Error::ChangedMeanwhile`] when somebody else has changed the scripts.
+    pub async fn wait(
+        &self,
+        animation: &Animation,
+        submitted: &Submitted,
+        mut told: impl FnMut(Waiting),
+    ) -> Result<Ended> {
+        let mut watch = Watch::new(*self, animation.clone());
+        let mut last_change = self.clock.now();
+        loop {
+            if watch.look_patiently().await? {
+                last_change = self.clock.now();
+            }
+            if let Some(manifest) = watch.manifest()
+                && stands_for(manifest, animation, &submitted.versions)
+            {
+                let head = &manifest.head;
+                let total = head.total + head.missing() - head.pending;
+                told(Waiting::Frames { done: head.done + head.failed, total });
+                match (head.status, watch.gif()) {
+                    (Status::Done, Some(gif)) if watch.is_current() => return Ok(Ended::Gif(gif.clone())),
+                    (Status::Failed | Status::Refused, _) => {
+                        return Ok(Ended::Failed(Box::new(manifest.clone())));
+                    }
+                    _ => {}
+                }
+            }
+            if self.clock.now().since(last_change) > UNUSUAL {
+                last_change = self.clock.now();
+                self.must_be_unchanged(animation, &submitted.versions).await?;
+                told(Waiting::Quiet(UNUSUAL));
+            }
+            watch.pause().await;
+        }
+    }
+
+    async fn must_be_unchanged(
+        &self,
+        animation: &Animation,
+        versions: &BTreeMap<String, ETag>,
+    ) -> Result<()> {
+        let listing = self.list(ListRequest::level(animation.scripts())).await?;
+        let now: BTreeMap<_, _> =
+            listing.objects.into_iter().map(|object| (object.key, object.etag)).collect();
+        let gone = versions.iter().find(|(key, version)| now.get(*key) != Some(*version));
+        let new = now.keys().find(|key| key.ends_with(".txt") && !versions.contains_key(*key));
+        match gone.map(|(key, _)| key).or(new) {
+            Some(key) => Err(Error::ChangedMeanwhile { key: key.clone() }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The manifest is about exactly these versions of exactly these files.
+fn stands_for(manifest: &Manifest, animation: &Animation, versions: &BTreeMap<String, ETag>) -> bool {
+    let mut seen: BTreeMap<String, &ETag> =
+        manifest.frames.iter().map(|frame| (animation.script(&frame.script), &frame.version)).collect();
+    if let Some(version) = &manifest.head.settings.version {
+        seen.insert(animation.settings(), version);
+    }
+    seen.len() == versions.len() && seen.iter().all(|(key, version)| versions.get(key) == Some(*version))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::World;
+    use crate::{File, Submission};
+    use rayfold_pipeline::keys::ScriptName;
+
+    async fn submitted(world: &World, scripts: &[(&str, &str)]) -> Submitted {
+        let scripts =
+            scripts.iter().map(|(name, text)| (ScriptName::new(name).unwrap(), File::of_text(*text)));
+        let settings = File::of_text(r#"{"frames": 2}"#);
+        let submission = Submission::new(world.film(), scripts, settings).unwrap();
+        world.client().submit(&submission, |_| {}).await.unwrap()
+    }
+
+    #[tokio::test]
+    async fn waiting_ends_with_the_gif_of_what_was_submitted() {
+        let world = World::new();
+        let submitted = submitted(&world, &[("1", "frame"), ("2", "frame 2")]).await;
+        let mut told = Vec::new();
+        let client = world.client();
+        let film = world.film();
+        let ended = client.wait(&film, &submitted, |waiting| told.push(waiting));
+        let (ended, ()) = futures_util::future::join(ended, world.functions()).await;
+        let Ended::Gif(gif) = ended.unwrap() else { panic!("no GIF") };
+        assert_eq!(gif, world.store.head("animations/film.gif").await.unwrap());
+        assert_eq!(told.last(), Some(&Waiting::Frames { done: 2, total: 2 }));
+    }
+
+    #[tokio::test]
+    async fn waiting_ends_with_the_manifest_of_what_fails() {
+        let world = World::new();
+        let submitted = submitted(&world, &[("1", "frame"), ("2", "bad")]).await;
+        world.functions().await;
+        let ended = world.client().wait(&world.film(), &submitted, |_| {}).await.unwrap();
+        let Ended::Failed(manifest) = ended else { panic!("a GIF") };
+        assert_eq!((manifest.head.status, manifest.head.failed), (Status::Failed, 1));
+    }
+
+    #[tokio::test]
+    async fn silence_is_told_and_others_changes_end_the_waiting() {
+        let world = World::new();
+        let submitted = submitted(&world, &[("1", "frame"), ("2", "frame")]).await;
+        let told = std::sync::Mutex::new(Vec::new());
+        let (client, film) = (world.client(), world.film());
+        let wait = client.wait(&film, &submitted, |waiting| told.lock().unwrap().push(waiting));
+        let meddle = async {
+            while told.lock().unwrap().is_empty() {
+                tokio::task::yield_now().await;
+            }
+            world.put("scripts/film/3.txt", "frame").await;
+        };
+        let (ended, ()) = futures_util::future::join(wait, meddle).await;
+        assert_eq!(told.into_inner().unwrap(), [Waiting::Quiet(UNUSUAL)]);
+        assert!(
+            matches!(ended, Err(Error::ChangedMeanwhile { key }) if key == "scripts/film/3.txt"),
+            "the third script is none of ours"
+        );
+    }
+
+    #[tokio::test]
+    async fn a_manifest_of_other_versions_is_not_what_was_submitted() {
+        let world = World::new();
+        world.put("scripts/film/1.txt", "frame").await;
+        world.functions().await;
+        let mut watch = Watch::new(world.client(), world.film());
+        assert!(watch.look().await.unwrap() && !watch.look().await.unwrap());
+        let manifest = watch.manifest().unwrap();
+        let version = manifest.frames[0].version.clone();
+        let key = || "scripts/film/1.txt".to_owned();
+        let is_it = |versions: &[(String, ETag)]| {
+            stands_for(manifest, &world.film(), &versions.iter().cloned().collect())
+        };
+        assert!(is_it(&[(key(), version.clone())]));
+        assert!(!is_it(&[(key(), ETag::new("other"))]));
+        assert!(!is_it(&[]) && !is_it(&[(key(), version.clone()), (world.film().settings(), version)]));
+    }
+}

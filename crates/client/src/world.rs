@@ -1,0 +1,253 @@
+//! A bucket in memory whose requests are written down, a clock that jumps, and functions that work when they are told
+//! to: the real steps with a renderer of one line.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use bytes::{Bytes, BytesMut};
+use rayfold_pipeline::keys::{Animation, Key, Part, ScriptName};
+use rayfold_pipeline::manifest::Reason;
+use rayfold_pipeline::store::{
+    ETag, ListPage, ListRequest, Listing, MemoryStore, MemoryUpload, Object, ObjectInfo, PutOptions, Store,
+};
+use rayfold_pipeline::{
+    Animator, Clock, Drawing, Encoding, Invocation, Policy, Randomness, Renderer, Result, Timestamp,
+    assemble, render_frame,
+};
+use rayfold_scene::AnimationSettings;
+
+use crate::client::Client;
+
+/// The pixel version of what is drawn here.
+pub(crate) const PIXELS: u32 = 1;
+
+/// A clock that jumps to wherever someone waits for, and lets others go on meanwhile.
+#[derive(Debug, Clone)]
+pub(crate) struct JumpingClock(Arc<AtomicU64>);
+
+impl Clock for JumpingClock {
+    fn now(&self) -> Timestamp {
+        Timestamp(self.0.load(Ordering::Relaxed))
+    }
+
+    async fn sleep(&self, duration: Duration) {
+        tokio::task::yield_now().await;
+        self.0.fetch_add(duration.as_millis() as u64, Ordering::Relaxed);
+    }
+}
+
+/// What was asked of the store.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Requests(Arc<Mutex<Vec<String>>>);
+
+impl Requests {
+    pub(crate) fn clear(&self) {
+        self.0.lock().unwrap().clear();
+    }
+
+    pub(crate) fn seen(&self) -> Vec<String> {
+        self.0.lock().unwrap().clone()
+    }
+}
+
+/// Replaces an object before a request that is named so.
+struct Replacement {
+    request: &'static str,
+    after: u32,
+    body: Vec<u8>,
+    times: u8,
+}
+
+/// The bucket.
+pub(crate) struct WatchedStore {
+    inner: MemoryStore<JumpingClock>,
+    requests: Requests,
+    replacement: Mutex<Option<Replacement>>,
+}
+
+impl WatchedStore {
+    async fn note(&self, action: &str, key: &str) {
+        let request = format!("{action} {key}");
+        let body =
+            self.replacement.lock().unwrap().as_mut().and_then(|replacement| replacement.due(&request));
+        if let Some(body) = body {
+            self.inner.put(key, body.into(), PutOptions::always()).await.unwrap();
+        }
+        self.requests.0.lock().unwrap().push(request);
+    }
+}
+
+impl Replacement {
+    /// What replaces the object now: the body, and how often that will still be done, so that no two are equal.
+    fn due(&mut self, request: &str) -> Option<Vec<u8>> {
+        if self.request != request || self.times == 0 {
+            return None;
+        }
+        if self.after > 0 {
+            self.after -= 1;
+            return None;
+        }
+        self.times -= 1;
+        Some([&self.body[..], &[self.times]].concat())
+    }
+}
+
+impl Store for WatchedStore {
+    type Upload = MemoryUpload<JumpingClock>;
+
+    async fn get(&self, key: &str) -> Result<Object> {
+        self.note("get", key).await;
+        self.inner.get(key).await
+    }
+
+    async fn get_range(&self, key: &str, range: Range<u64>) -> Result<Object> {
+        self.note("get", key).await;
+        self.inner.get_range(key, range).await
+    }
+
+    async fn head(&self, key: &str) -> Result<ObjectInfo> {
+        self.note("head", key).await;
+        self.inner.head(key).await
+    }
+
+    async fn put(&self, key: &str, body: Bytes, options: PutOptions) -> Result<ETag> {
+        self.note("put", key).await;
+        self.inner.put(key, body, options).await
+    }
+
+    async fn delete(&self, key: &str) -> Result<()> {
+        self.note("delete", key).await;
+        self.inner.delete(key).await
+    }
+
+    async fn list(&self, request: ListRequest) -> Result<ListPage> {
+        self.note("list", &request.prefix).await;
+        self.inner.list(request).await
+    }
+
+    async fn upload(&self, key: &str, options: PutOptions) -> Result<Self::Upload> {
+        self.note("upload", key).await;
+        self.inner.upload(key, options).await
+    }
+}
+
+/// Everything together.
+pub(crate) struct World {
+    pub(crate) store: WatchedStore,
+    pub(crate) requests: Requests,
+    clock: JumpingClock,
+    random: Randomness,
+    policy: Policy,
+    delivered: Mutex<BTreeSet<(String, ETag)>>,
+}
+
+impl World {
+    pub(crate) fn new() -> Self {
+        let clock = JumpingClock(Arc::new(AtomicU64::new(1_000_000)));
+        let requests = Requests::default();
+        let store = WatchedStore {
+            inner: MemoryStore::new(clock.clone()),
+            requests: requests.clone(),
+            replacement: Mutex::default(),
+        };
+        let (random, policy) = (Randomness::seeded(1), Policy::new(PIXELS));
+        World { store, requests, clock, random, policy, delivered: Mutex::default() }
+    }
+
+    pub(crate) fn client(&self) -> Client<'_, WatchedStore, JumpingClock> {
+        Client::new(&self.store, &self.clock)
+    }
+
+    /// The animation that most tests are about.
+    pub(crate) fn film(&self) -> Animation {
+        Animation::new("film").unwrap()
+    }
+
+    pub(crate) async fn put(&self, key: &str, text: &str) {
+        self.store.put(key, text.to_owned().into(), PutOptions::always()).await.unwrap();
+    }
+
+    pub(crate) async fn keys(&self, prefix: &str) -> Vec<String> {
+        let request = ListRequest::all(prefix);
+        let listing = Listing::read(request, None, |request| self.store.inner.list(request)).await.unwrap();
+        listing.objects.into_iter().map(|object| object.key).collect()
+    }
+
+    /// Replaces an object before a request of this name, the first `after` of them excepted, so many times.
+    pub(crate) fn replace_before(&self, request: &'static str, after: u32, body: Vec<u8>, times: u8) {
+        *self.store.replacement.lock().unwrap() = Some(Replacement { request, after, body, times });
+    }
+
+    /// The functions work on all that is new, and on what that leads to.
+    pub(crate) async fn functions(&self) {
+        for prefix in ["scripts/", "parts/", "retries/", "assemblies/"] {
+            let listing = Listing::read(ListRequest::all(prefix), None, |r| self.store.inner.list(r)).await;
+            for object in listing.unwrap().objects {
+                if self.delivered.lock().unwrap().insert((object.key.clone(), object.etag)) {
+                    self.event(&object.key).await;
+                }
+            }
+        }
+    }
+
+    /// The functions notice that scripts are gone, once they are.
+    pub(crate) async fn deletions(&self, keys: &[&str]) {
+        for key in keys {
+            while self.store.inner.head(key).await.is_ok() {
+                tokio::task::yield_now().await;
+            }
+            tokio::task::yield_now().await;
+            self.event(key).await;
+        }
+    }
+
+    async fn event(&self, key: &str) {
+        let id = format!("request-{:016x}", self.random.bits());
+        let invocation = Invocation::new(&self.store, &self.clock, &self.random, &self.policy, &id);
+        if matches!(key.parse(), Ok(Key::Claim { .. })) {
+            assemble(&invocation, &Joiner, key).await.unwrap();
+        } else {
+            render_frame(&invocation, &OneLine, key).await.unwrap();
+        }
+    }
+}
+
+/// `bad` has no frame; all else is one, which tells its name and its text.
+struct OneLine;
+
+impl Renderer for OneLine {
+    async fn draw(&self, name: &ScriptName, script: Bytes, _: Part) -> Result<Drawing> {
+        let text = String::from_utf8_lossy(&script);
+        Ok(match text.as_ref() {
+            "bad" => Drawing::Fault(Reason::new(format!("{name}.txt: bad"))),
+            text => Drawing::Frame(format!("{name}: {text}").into()),
+        })
+    }
+}
+
+/// Frames one after the other.
+struct Joiner;
+
+struct Joined(BytesMut);
+
+impl Animator for Joiner {
+    type Encoding = Joined;
+
+    fn begin(&self, _: &AnimationSettings) -> Result<Joined, Reason> {
+        Ok(Joined(BytesMut::new()))
+    }
+}
+
+impl Encoding for Joined {
+    async fn push(&mut self, frame: Bytes) -> Result<Bytes, Reason> {
+        self.0.extend_from_slice(&frame);
+        Ok(Bytes::new())
+    }
+
+    async fn finish(self) -> Result<Bytes, Reason> {
+        Ok(self.0.freeze())
+    }
+}

@@ -1,0 +1,46 @@
+//! What can go wrong.
+
+use std::io;
+
+/// The largest width and height that the format can hold.
+pub(crate) const LONGEST_SIDE: u32 = 65_535;
+
+/// Why no animation came out. Frames are counted from 1.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The frame rate is not a number above 0, or so low that the delay has no room in the format.
+    #[error("{fps} frames a second: a GIF can hold rates from 0.00153 up")]
+    FrameRate {
+        /// The rate asked for.
+        fps: f64,
+    },
+    /// A frame differs in size from those before it.
+    #[error("frame {frame} is {} x {} pixels, the frames before it are {} x {}", found.0, found.1, expected.0, expected.1)]
+    UnlikeSize {
+        /// Which frame.
+        frame: u64,
+        /// Its width and height.
+        found: (u32, u32),
+        /// Width and height of the first frame.
+        expected: (u32, u32),
+    },
+    /// A frame has no pixels, or more on a side than the format can hold.
+    #[error("frame {frame} is {} x {} pixels, a GIF can hold 1 to {LONGEST_SIDE} on each side", found.0, found.1)]
+    Size {
+        /// Which frame.
+        frame: u64,
+        /// Its width and height.
+        found: (u32, u32),
+    },
+    /// [`Encoder::finish`](crate::Encoder::finish) was called before any [`Encoder::push`](crate::Encoder::push).
+    #[error("an animation needs at least one frame")]
+    NoFrames,
+    /// The writer failed.
+    #[error("cannot write frame {frame}")]
+    Write {
+        /// The frame that was being written.
+        frame: u64,
+        /// What the writer said.
+        source: io::Error,
+    },
+}

@@ -1,0 +1,439 @@
+//! Which pixels of a frame need to be drawn.
+//!
+//! A frame is compared with what a viewer will see before it. That is known before the previous frame is drawn, so both
+//! frames can be worked on at once: where the previous frame leaves a pixel, the viewer sees what was seen before; where
+//! it draws one, the palette's nearest entry is assumed. Where another index was chosen, the next comparison finds it.
+//!
+//! The frame is divided into tiles. A tile whose changes are small is left as a whole. Of the pixels that stay as they were
+//! but are seen wrong, the worst of each tile are refined: drawn once more with a better colour. Tiles apart from all
+//! changes are refined only when together they are worth the larger block.
+
+use rayon::prelude::*;
+
+use crate::allowance::StaticPixels;
+use crate::block::Area;
+use crate::colour::{self, LocalMetric};
+use crate::histogram::Histogram;
+use crate::nearest::Nearest;
+
+/// Width and height of a tile, which is drawn or left as a whole: single pixels drawn among others that are left cost as
+/// many bytes as if all were drawn.
+const TILE: usize = 8;
+/// A tile is left if its mean [level error](colour::level_error), beyond that of a drawn pixel, is at most this.
+pub(crate) const LEFT_ERROR: f32 = 20.0;
+/// The same where the palette has all colours of the frame: there an error is seen more easily.
+pub(crate) const LEFT_ERROR_IF_EXACT: f32 = 6.0;
+/// A tile with a pixel of a larger level error is never left: almost three levels.
+pub(crate) const GLARING: f32 = 50.0;
+/// The level error up to which a pixel that changes may be left in a tile that is drawn.
+const SEEN_RIGHT: f32 = 2.0;
+/// The squared error (see [`colour`]) above which a pixel that stays needs a better colour.
+const SEEN_WRONG: f32 = 1.5;
+/// Of these, the worst of a tile are refined: from this part of the tile's mean error on. Only they are worth the flicker.
+const AMONG_WORST: f32 = 0.8;
+/// How many pixels the area of a frame may grow by for each pixel that is refined. Even pixels that are left cost bytes:
+/// LZW learns the lengths of their runs one by one.
+const GROWN_BY: usize = 6;
+
+/// What a pixel needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Need {
+    /// To be left as it is seen.
+    Keep,
+    /// To be left or drawn, whichever makes the file smaller.
+    Either,
+    /// It stays but is seen wrong: to be drawn with a colour that is much better, else left.
+    Refine,
+    /// To be drawn.
+    Draw,
+}
+
+/// The previous frame, which is about to be drawn.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Previous<'a> {
+    pub(crate) frame: &'a [[u8; 3]],
+    pub(crate) needs: &'a [Need],
+    /// What a viewer sees before it.
+    pub(crate) seen: &'a [[u8; 3]],
+    /// Mean level error of what it draws.
+    pub(crate) error: f32,
+    /// [`LEFT_ERROR`] or [`LEFT_ERROR_IF_EXACT`].
+    pub(crate) left_error: f32,
+    /// Its colours, and the nearest palette entry of each; `None`: it is drawn without error.
+    pub(crate) nearest: Option<(&'a Histogram, &'a [Nearest])>,
+}
+
+/// What pixels need, row by row.
+#[derive(Debug, Default)]
+pub(crate) struct Needs {
+    width: usize,
+    pub(crate) pixels: Vec<Need>,
+    tiles: Vec<TileNeeds>,
+}
+
+/// What a tile needs.
+#[derive(Debug, Clone, Copy, Default)]
+struct TileNeeds {
+    /// Whether any of it is to be drawn because it changes.
+    changes: bool,
+    /// How many pixels are to be refined, and the mean of their squared errors.
+    wrong: u32,
+    error: f32,
+}
+
+impl Needs {
+    /// All of a frame is to be drawn.
+    pub(crate) fn draw_all(&mut self, width: usize, pixels: usize) {
+        self.width = width;
+        self.pixels.clear();
+        self.pixels.resize(pixels, Need::Draw);
+        self.tiles.clear();
+    }
+
+    /// Compares a frame with the one before it. `refining`: whether pixels that stay may be refined. Returns those that
+    /// stay.
+    pub(crate) fn compare(
+        &mut self,
+        pixels: &[[u8; 3]],
+        width: usize,
+        previous: Previous<'_>,
+        refining: bool,
+    ) -> StaticPixels {
+        self.width = width;
+        self.pixels.resize(pixels.len(), Need::Draw);
+        self.tiles.resize(width.div_ceil(TILE) * pixels.len().div_ceil(TILE * width), TileNeeds::default());
+        let metric = refining.then(LocalMetric::new);
+        let bands =
+            self.pixels.par_chunks_mut(TILE * width).zip(self.tiles.par_chunks_mut(width.div_ceil(TILE)));
+        let compared = bands.enumerate().fold(StaticPixels::none, |mut still, (number, (needs, tiles))| {
+            let start = number * TILE * width;
+            let part = &pixels[start..start + needs.len()];
+            compare_band(part, width, previous.part(start, needs.len()), metric, needs, tiles, &mut still);
+            still
+        });
+        compared.reduce(StaticPixels::none, StaticPixels::join)
+    }
+
+    /// Refines no tile outside of the area that changes, unless what is refined there is worth the pixels that the area
+    /// grows by. It becomes worth more with each frame that it has waited for.
+    ///
+    /// `least`: the error from which a tile may be refined. `waited`: frames in a row that refined nothing outside, plus
+    /// one. Returns the new `waited`.
+    pub(crate) fn confine(&mut self, least: f32, waited: usize) -> usize {
+        let columns = self.width.div_ceil(TILE);
+        let Some(inside) = Area::around(&self.tiles, columns, |tile| tile.changes) else { return waited };
+        let (mut all, mut outside) = (inside, 0);
+        for (at, tile) in self.tiles.iter().enumerate() {
+            let (x, y) = (at % columns, at / columns);
+            if tile.wrong > 0 && tile.error >= least && !inside.contains(x, y) {
+                outside += tile.wrong as usize;
+                all = all.with(x, y);
+            }
+        }
+        let added = (all.size() - inside.size()) * TILE * TILE;
+        if outside == 0 {
+            return waited;
+        }
+        if outside * waited * GROWN_BY >= added {
+            return 1;
+        }
+        for (at, tile) in self.tiles.iter_mut().enumerate() {
+            if !inside.contains(at % columns, at / columns) {
+                tile.error = f32::NEG_INFINITY;
+            }
+        }
+        waited + 1
+    }
+
+    /// Counts the colours of the pixels that are to be drawn or refined, into `all` with the help of `others`, each of
+    /// which takes a part of the frame. Pixels of tiles with an error below `least` are not refined, but kept. Returns how
+    /// many pixels are to be drawn.
+    pub(crate) fn count(
+        &mut self,
+        pixels: &[[u8; 3]],
+        least: f32,
+        all: &mut Histogram,
+        others: &mut [Histogram],
+    ) -> u64 {
+        let part = pixels.len().div_ceil(1 + others.len());
+        let (width, columns, tiles) = (self.width, self.width.div_ceil(TILE), &self.tiles);
+        let mut histograms = std::iter::once(&mut *all).chain(&mut *others).collect::<Vec<_>>();
+        let parts = histograms.par_iter_mut().zip(self.pixels.par_chunks_mut(part)).enumerate();
+        let changed = parts.map(|(number, (histogram, needs))| {
+            histogram.clear();
+            let mut changed = 0;
+            let (mut last, mut run) = ([0; 3], 0);
+            for (at, need) in (number * part..).zip(needs) {
+                match need {
+                    Need::Keep | Need::Either => continue,
+                    Need::Refine if tiles[at / width / TILE * columns + at % width / TILE].error < least => {
+                        *need = Need::Keep;
+                        continue;
+                    }
+                    Need::Refine => (),
+                    Need::Draw => changed += 1,
+                }
+                if pixels[at] != last {
+                    histogram.add(last, run);
+                    (last, run) = (pixels[at], 0);
+                }
+                run += 1;
+            }
+            histogram.add(last, run);
+            changed
+        });
+        let changed = changed.sum();
+        // Small frames have fewer parts.
+        for other in &others[..pixels.len().div_ceil(part) - 1] {
+            all.absorb(other);
+        }
+        changed
+    }
+}
+
+impl<'a> Previous<'a> {
+    /// The squared error with which a colour will be drawn.
+    fn error_of(&self, rgb: [u8; 3]) -> f32 {
+        let entry = self.nearest.and_then(|(histogram, nearest)| nearest.get(histogram.find(rgb)?));
+        entry.map_or(0.0, |entry| entry.error)
+    }
+
+    fn part(self, start: usize, count: usize) -> Self {
+        let range = start..start + count;
+        Self {
+            frame: &self.frame[range.clone()],
+            needs: &self.needs[range.clone()],
+            seen: &self.seen[range],
+            error: self.error,
+            left_error: self.left_error,
+            nearest: self.nearest,
+        }
+    }
+}
+
+/// Compares a row of tiles.
+fn compare_band(
+    pixels: &[[u8; 3]],
+    width: usize,
+    previous: Previous<'_>,
+    refine: Option<LocalMetric>,
+    needs: &mut [Need],
+    tiles: &mut [TileNeeds],
+    still: &mut StaticPixels,
+) {
+    if refine.is_none() && pixels == previous.frame {
+        needs.fill(Need::Keep);
+        tiles.fill(TileNeeds::default());
+        still.count(needs.len());
+        return;
+    }
+    for (left, needed) in (0..width).step_by(TILE).zip(tiles) {
+        let count = TILE.min(width - left);
+        let mut tile = Tile::new(refine);
+        let rows = (left..needs.len()).step_by(width);
+        for (row, start) in rows.clone().enumerate() {
+            let part = start..start + count;
+            tile.compare(row, &pixels[part.clone()], previous.part(start, count), &mut needs[part], still);
+        }
+        *needed = tile.needs();
+        if tile.wrong > 0 {
+            for (row, start) in rows.clone().enumerate() {
+                tile.keep_the_rest(row, &mut needs[start..start + count], still);
+            }
+            still.count_wrong(u64::from(needed.wrong), needed.error);
+        }
+        if tile.may_be_left(previous.left_error) {
+            needed.changes = false;
+            for start in rows {
+                for need in &mut needs[start..start + count] {
+                    if matches!(need, Need::Draw | Need::Either) {
+                        *need = Need::Keep;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What is known of a tile's pixels.
+#[derive(Debug)]
+struct Tile {
+    /// Given if pixels that stay may be refined.
+    refine: Option<LocalMetric>,
+    pixels: usize,
+    /// The sum of the level errors of all that changed, beyond that of a drawn pixel, and the largest level error of one.
+    excess: f32,
+    worst: f32,
+    /// Pixels that stay and are seen wrong, the sum of their squared errors, and each of these.
+    wrong: u32,
+    sum_wrong: f32,
+    errors: [f32; TILE * TILE],
+}
+
+impl Tile {
+    fn new(refine: Option<LocalMetric>) -> Self {
+        Self {
+            refine,
+            pixels: 0,
+            excess: 0.0,
+            worst: 0.0,
+            wrong: 0,
+            sum_wrong: 0.0,
+            errors: [0.0; TILE * TILE],
+        }
+    }
+
+    /// Decides what the pixels of a row need.
+    fn compare(
+        &mut self,
+        row: usize,
+        pixels: &[[u8; 3]],
+        previous: Previous<'_>,
+        needs: &mut [Need],
+        still: &mut StaticPixels,
+    ) {
+        self.pixels += pixels.len();
+        if self.refine.is_none() && pixels == previous.frame {
+            needs.fill(Need::Keep);
+            still.count(needs.len());
+            return;
+        }
+        // By index: five zipped iterators are not always inlined, which costs a tenth of the encoder's time.
+        let count = pixels.len();
+        let (frame, shown, drawn) =
+            (&previous.frame[..count], &previous.seen[..count], &previous.needs[..count]);
+        for (k, need) in needs[..count].iter_mut().enumerate() {
+            let (now, was, seen) = (pixels[k], frame[k], shown[k]);
+            let left = drawn[k] == Need::Keep;
+            *need = if now == was {
+                let error = match self.refine {
+                    Some(metric) if left && now != seen => metric.error(now, seen),
+                    Some(_) if !left => previous.error_of(now),
+                    _ => 0.0,
+                };
+                if error > SEEN_WRONG {
+                    self.wrong += 1;
+                    self.sum_wrong += error;
+                    self.errors[row * TILE + k] = error;
+                    Need::Refine
+                } else {
+                    still.count(1);
+                    Need::Keep
+                }
+            } else {
+                let error = colour::level_error(now, if left { seen } else { was }) as f32;
+                if left {
+                    self.excess += (error - previous.error).max(0.0);
+                } else {
+                    self.excess += error;
+                }
+                self.worst = self.worst.max(error);
+                match error {
+                    0.0 => Need::Keep,
+                    error if error > SEEN_RIGHT => Need::Draw,
+                    _ => Need::Either,
+                }
+            };
+        }
+    }
+
+    /// The error from which on a pixel that stays is among the worst.
+    fn least_wrong(&self) -> f32 {
+        AMONG_WORST * self.sum_wrong / self.wrong.max(1) as f32
+    }
+
+    fn needs(&self) -> TileNeeds {
+        let changes = self.worst > SEEN_RIGHT;
+        if self.wrong == 0 {
+            return TileNeeds { changes, wrong: 0, error: 0.0 };
+        }
+        let least = self.least_wrong();
+        let worst = self.errors.iter().filter(|&&error| error > 0.0 && error >= least);
+        let (wrong, sum) = worst.fold((0, 0.0), |(wrong, sum), error| (wrong + 1, sum + error));
+        TileNeeds { changes, wrong, error: sum / wrong as f32 }
+    }
+
+    /// Keeps the pixels of a row that are not among the worst.
+    fn keep_the_rest(&self, row: usize, needs: &mut [Need], still: &mut StaticPixels) {
+        let least = self.least_wrong();
+        for (need, &error) in needs.iter_mut().zip(&self.errors[row * TILE..]) {
+            if *need == Need::Refine && error < least {
+                *need = Need::Keep;
+                still.count(1);
+            }
+        }
+    }
+
+    fn may_be_left(&self, left_error: f32) -> bool {
+        self.excess <= left_error * self.pixels as f32 && self.worst <= GLARING
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 20 x 20 tiles, of which the first changes and those given are to be refined.
+    fn needs(wrong: &[(usize, usize)]) -> Needs {
+        let mut tiles = vec![TileNeeds::default(); 400];
+        tiles[0].changes = true;
+        for &(x, y) in wrong {
+            tiles[y * 20 + x] = TileNeeds { changes: false, wrong: 30, error: 9.0 };
+        }
+        Needs { width: 160, pixels: Vec::new(), tiles }
+    }
+
+    #[test]
+    fn a_little_far_from_all_changes_waits_and_much_does_not() {
+        let mut waited = 1;
+        let waits = std::iter::from_fn(|| {
+            let mut few = needs(&[(19, 19), (10, 3)]);
+            waited = few.confine(2.0, waited);
+            (few.tiles[399].error < 2.0).then_some(())
+        });
+        // 25,536 pixels for 60.
+        assert_eq!(waits.count(), 25_536 / (60 * GROWN_BY));
+        assert_eq!(waited, 1);
+        let all = (0..400).map(|at| (at % 20, at / 20)).collect::<Vec<_>>();
+        let mut many = needs(&all);
+        assert_eq!(many.confine(2.0, 1), 1);
+        assert!(many.tiles.iter().all(|tile| tile.error >= 2.0 || tile.changes));
+    }
+
+    #[test]
+    fn what_lies_among_changes_does_not_wait() {
+        let mut beside = needs(&[(0, 0), (19, 19)]);
+        beside.tiles[0].changes = true;
+        assert_eq!(beside.confine(2.0, 3), 4);
+        assert!(beside.tiles[0].error >= 2.0 && beside.tiles[399].error < 2.0);
+        // There is nothing to refine, or its error is too small.
+        assert_eq!(needs(&[]).confine(2.0, 3), 3);
+        assert_eq!(needs(&[(19, 19)]).confine(10.0, 3), 3);
+    }
+
+    #[test]
+    fn the_worst_of_a_tile_are_refined() {
+        let pixels = [[100; 3]; 64];
+        let mut seen = pixels;
+        // Half of the tile is a little wrong, the other half much.
+        seen[..32].fill([103, 100, 100]);
+        seen[32..].fill([112, 100, 100]);
+        let needs = [Need::Keep; 64];
+        let previous = Previous {
+            frame: &pixels,
+            needs: &needs,
+            seen: &seen,
+            error: 0.0,
+            left_error: LEFT_ERROR,
+            nearest: None,
+        };
+        let mut found = Needs::default();
+        let _ = found.compare(&pixels, 8, previous, true);
+        assert!(found.pixels[..32].iter().all(|&need| need == Need::Keep));
+        assert!(found.pixels[32..].iter().all(|&need| need == Need::Refine));
+        let [tile] = found.tiles[..] else { panic!("{:?}", found.tiles) };
+        assert_eq!((tile.changes, tile.wrong), (false, 32));
+        let error = LocalMetric::new().error(pixels[0], seen[63]);
+        assert!((tile.error - error).abs() < 0.001 * error, "{} for {error}", tile.error);
+    }
+}

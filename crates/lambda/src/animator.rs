@@ -1,0 +1,89 @@
+//! The assemble function's animator: PNG frames to a GIF by `rayfold-gif`, piece by piece.
+
+use std::io::{self, Write};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use bytes::Bytes;
+use rayfold_gif::Encoder;
+use rayfold_pipeline::manifest::Reason;
+use rayfold_pipeline::{Animator, Encoding};
+use rayfold_scene::AnimationSettings;
+
+use crate::{png, pool};
+
+/// Makes GIFs.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct GifAnimator;
+
+impl Animator for GifAnimator {
+    type Encoding = GifEncoding;
+
+    fn begin(&self, settings: &AnimationSettings) -> Result<GifEncoding, Reason> {
+        let ready = Shelf::default();
+        let settings = rayfold_gif::Settings { fps: settings.fps(), loops: settings.loops() };
+        let encoder = Encoder::new(ready.clone(), settings).map_err(reason)?;
+        Ok(GifEncoding { encoder: Some(encoder), ready })
+    }
+}
+
+/// A GIF being encoded.
+pub struct GifEncoding {
+    /// `None` while a frame is worked on, and after a failure.
+    encoder: Option<Encoder<Shelf>>,
+    ready: Shelf,
+}
+
+impl Encoding for GifEncoding {
+    async fn push(&mut self, frame: Bytes) -> Result<Bytes, Reason> {
+        let mut encoder = self.encoder.take().ok_or_else(failed_before)?;
+        let work = move || {
+            let image = png::decode(&frame).map_err(reason)?;
+            encoder.push(image).map_err(reason)?;
+            Ok(encoder)
+        };
+        self.encoder = Some(pool::run(work).await.unwrap_or_else(|| Err(failed_before()))?);
+        Ok(self.ready.take())
+    }
+
+    async fn finish(mut self) -> Result<Bytes, Reason> {
+        let encoder = self.encoder.take().ok_or_else(failed_before)?;
+        let work = move || encoder.finish().map_err(reason);
+        pool::run(work).await.unwrap_or_else(|| Err(failed_before()))?;
+        Ok(self.ready.take())
+    }
+}
+
+fn reason(error: impl std::error::Error) -> Reason {
+    let mut message = error.to_string();
+    let mut source = error.source();
+    while let Some(error) = source {
+        message = format!("{message}: {error}");
+        source = error.source();
+    }
+    Reason::new(message)
+}
+
+fn failed_before() -> Reason {
+    Reason::new("the encoder failed on an earlier frame")
+}
+
+/// Where the encoder leaves what it has written until it is fetched.
+#[derive(Debug, Clone, Default)]
+struct Shelf(Arc<Mutex<Vec<u8>>>);
+
+impl Shelf {
+    fn take(&self) -> Bytes {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner)).into()
+    }
+}
+
+impl Write for Shelf {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}

@@ -1,0 +1,92 @@
+//! What a script may ask for at most, out of the function's environment.
+//!
+//! Whoever may upload makes the account pay, and a script too large for the function's memory fails three times before
+//! it is given up. So the limits are settings of the stack. Knows only names and numbers; what a limit means is
+//! [`Limits`]'s.
+
+use std::num::NonZeroU64;
+
+use anyhow::Context as _;
+use rayfold_scene::Limits;
+
+/// The default limits, changed by the variables that `variable` finds: `RAYFOLD_MAX_SCRIPT_BYTES`, `RAYFOLD_MAX_OBJECTS`,
+/// `RAYFOLD_MAX_LIGHTS`, `RAYFOLD_MAX_PIXELS` and `RAYFOLD_MAX_FRAMES` (of one script).
+///
+/// # Errors
+/// The variable that is no whole number of at least 1.
+pub(crate) fn limits(variable: impl Fn(&str) -> Option<String>) -> anyhow::Result<Limits> {
+    let default = Limits::default();
+    let number = |name: &str| -> anyhow::Result<Option<u64>> {
+        let Some(text) = variable(name) else { return Ok(None) };
+        let number: NonZeroU64 =
+            text.parse().with_context(|| format!("{name}={text}: expected a whole number of at least 1"))?;
+        Ok(Some(number.get()))
+    };
+    let size =
+        |name: &str| Ok::<_, anyhow::Error>(number(name)?.map(|n| usize::try_from(n).unwrap_or(usize::MAX)));
+    Ok(Limits {
+        max_script_bytes: size("RAYFOLD_MAX_SCRIPT_BYTES")?.unwrap_or(default.max_script_bytes),
+        max_objects: size("RAYFOLD_MAX_OBJECTS")?.unwrap_or(default.max_objects),
+        max_lights: size("RAYFOLD_MAX_LIGHTS")?.unwrap_or(default.max_lights),
+        max_pixels: number("RAYFOLD_MAX_PIXELS")?.unwrap_or(default.max_pixels),
+        max_frames: size("RAYFOLD_MAX_FRAMES")?.or(default.max_frames),
+        max_described: default.max_described,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with(name: &'static str, text: &'static str) -> anyhow::Result<Limits> {
+        limits(|asked| (asked == name).then(|| text.to_owned()))
+    }
+
+    #[test]
+    fn without_variables_the_defaults_hold() {
+        assert_eq!(limits(|_| None).unwrap(), Limits::default());
+    }
+
+    #[test]
+    fn each_variable_sets_its_limit_and_no_other() {
+        let default = Limits::default();
+        for (name, expected) in [
+            ("RAYFOLD_MAX_SCRIPT_BYTES", Limits { max_script_bytes: 7, ..default }),
+            ("RAYFOLD_MAX_OBJECTS", Limits { max_objects: 7, ..default }),
+            ("RAYFOLD_MAX_LIGHTS", Limits { max_lights: 7, ..default }),
+            ("RAYFOLD_MAX_PIXELS", Limits { max_pixels: 7, ..default }),
+            ("RAYFOLD_MAX_FRAMES", Limits { max_frames: Some(7), ..default }),
+        ] {
+            assert_eq!(with(name, "7").unwrap(), expected, "{name}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_limit_is_named() {
+        for text in ["0", "-1", "many", "1.5", ""] {
+            let error = with("RAYFOLD_MAX_OBJECTS", text).unwrap_err();
+            assert!(
+                format!("{error:#}").starts_with(&format!("RAYFOLD_MAX_OBJECTS={text}: expected")),
+                "{error:#}"
+            );
+        }
+    }
+
+    /// The stack must set variables that are read here, and each of them.
+    #[test]
+    fn the_stack_sets_these_variables() {
+        let stack = include_str!("../../../infra/terraform/functions.tf");
+        let mut set: Vec<_> =
+            stack.split_whitespace().filter(|word| word.starts_with("RAYFOLD_MAX_")).collect();
+        set.sort_unstable();
+        let read = std::cell::RefCell::new(Vec::new());
+        limits(|name| {
+            read.borrow_mut().push(name.to_owned());
+            None
+        })
+        .unwrap();
+        let mut read = read.into_inner();
+        read.sort_unstable();
+        assert_eq!(set, read);
+    }
+}

@@ -1,0 +1,62 @@
+//! The owner's keys: random, and kept beside the data, readable by the user alone.
+
+use std::fs::{self, OpenOptions};
+use std::io::Write;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+
+/// An access key and its secret.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Credentials {
+    /// The access key's id.
+    pub access_key: String,
+    /// The secret.
+    pub secret_key: String,
+}
+
+impl Credentials {
+    /// Fresh ones, from the system's randomness.
+    ///
+    /// # Errors
+    /// [`Error::Random`].
+    pub fn random() -> Result<Self> {
+        Ok(Self { access_key: format!("rayfold{}", token(6)?), secret_key: token(20)? })
+    }
+
+    /// Those of an earlier run beside `data`, or fresh ones, kept there.
+    pub(crate) fn kept(data: &Path) -> Result<Self> {
+        let path = data.join("credentials.json");
+        if let Ok(text) = fs::read(&path)
+            && let Ok(kept) = serde_json::from_slice(&text)
+        {
+            return Ok(kept);
+        }
+        let fresh = Self::random()?;
+        let mut file = OpenOptions::new()
+            .write(true)
+            .create(true)
+            .truncate(true)
+            .mode(0o600)
+            .open(&path)
+            .map_err(Error::file(&path))?;
+        serde_json::to_writer(&mut file, &fresh)
+            .map_err(std::io::Error::from)
+            .and_then(|()| file.flush())
+            .map_err(Error::file(&path))?;
+        Ok(fresh)
+    }
+}
+
+/// `bytes` random bytes in hexadecimal.
+///
+/// # Errors
+/// [`Error::Random`].
+pub(crate) fn token(bytes: usize) -> Result<String> {
+    let mut random = vec![0; bytes];
+    getrandom::fill(&mut random).map_err(Error::Random)?;
+    Ok(random.iter().map(|byte| format!("{byte:02x}")).collect())
+}

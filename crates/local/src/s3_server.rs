@@ -1,0 +1,239 @@
+//! The S3 server that holds the bucket: the store built in, in this process, or MinIO, as a child process.
+//!
+//! A folder can hold the data of both, each in a folder of its own below it: they never touch each other's, and share the
+//! owner's credentials, so that what a terminal has exported stays right. Buckets and objects are the S3 store's business
+//! (`rayfold_pipeline::store`), which speaks the same to both and to AWS.
+//!
+//! Invariants: it ends with us, however we end; two processes never share a data folder; a folder that MinIO itself has
+//! for its data is refused, not written into.
+
+use std::fmt;
+use std::fs::{self, File};
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+
+use rayfold_bucket::{Options, Webhook};
+use rayfold_pipeline::store::Connection;
+
+use crate::credentials::Credentials;
+use crate::error::{Error, Result};
+use crate::minio::{self, Minio};
+use crate::region::REGION;
+
+/// What MinIO keeps at the top of its data.
+const MINIO_MARK: &str = ".minio.sys";
+
+/// Which S3 server.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum StoreKind {
+    /// The one in this program, which needs nothing installed.
+    #[default]
+    BuiltIn,
+    /// MinIO.
+    Minio,
+}
+
+impl StoreKind {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::BuiltIn, Self::Minio];
+
+    /// Where it keeps its objects in a data folder.
+    pub fn objects(self, data: &Path) -> PathBuf {
+        data.join(match self {
+            Self::BuiltIn => "bucket",
+            Self::Minio => "objects",
+        })
+    }
+}
+
+impl fmt::Display for StoreKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::BuiltIn => "the store built in",
+            Self::Minio => "MinIO",
+        })
+    }
+}
+
+/// A running server; dropping it stops it.
+pub struct S3Server {
+    running: Running,
+    data: PathBuf,
+    credentials: Credentials,
+    /// Of the data folder, until the server is gone.
+    _lock: File,
+}
+
+enum Running {
+    BuiltIn(rayfold_bucket::Server),
+    Minio(Minio),
+}
+
+impl S3Server {
+    /// Starts a server on the folder `data` (made when missing), which is ready when this returns.
+    ///
+    /// MinIO is found, or installed from source; `say` hears what takes time, a line at a time.
+    ///
+    /// # Errors
+    /// [`Error::DataInUse`], [`Error::MinioFolder`], and whatever keeps the server from starting.
+    pub async fn start(
+        kind: StoreKind,
+        data: &Path,
+        address: SocketAddr,
+        webhook: Option<Webhook>,
+        say: &mut (dyn FnMut(&str) + Send),
+    ) -> Result<Self> {
+        if data.join(MINIO_MARK).exists() {
+            return Err(Error::MinioFolder(data.to_owned()));
+        }
+        let objects = kind.objects(data);
+        fs::create_dir_all(&objects).map_err(Error::file(&objects))?;
+        let lock_path = data.join("lock");
+        let lock = File::create(&lock_path).map_err(Error::file(&lock_path))?;
+        lock.try_lock().map_err(|_| Error::DataInUse(data.to_owned()))?;
+        let credentials = Credentials::kept(data)?;
+        let running = match kind {
+            StoreKind::BuiltIn => {
+                let root = rayfold_bucket::Credentials {
+                    access_key: credentials.access_key.clone(),
+                    secret_key: credentials.secret_key.clone(),
+                };
+                let options = Options { data: objects, address, root, region: REGION.into(), webhook };
+                let server = rayfold_bucket::Server::start(options).await.map_err(Error::Store)?;
+                Running::BuiltIn(server)
+            }
+            StoreKind::Minio => {
+                let binary = minio::find_or_install(say)?;
+                let log = data.join("minio.log");
+                let minio = Minio::start(&binary, &objects, &log, address, &credentials, webhook.as_ref());
+                Running::Minio(minio.await?)
+            }
+        };
+        Ok(Self { running, data: data.to_owned(), credentials, _lock: lock })
+    }
+
+    /// Which one it is.
+    pub fn kind(&self) -> StoreKind {
+        match &self.running {
+            Running::BuiltIn(_) => StoreKind::BuiltIn,
+            Running::Minio(_) => StoreKind::Minio,
+        }
+    }
+
+    /// Of the S3 endpoint.
+    pub fn address(&self) -> SocketAddr {
+        match &self.running {
+            Running::BuiltIn(server) => server.address(),
+            Running::Minio(minio) => minio.address(),
+        }
+    }
+
+    /// The S3 endpoint.
+    pub fn endpoint(&self) -> String {
+        format!("http://{}", self.address())
+    }
+
+    /// The folder with everything of it.
+    pub fn data(&self) -> &Path {
+        &self.data
+    }
+
+    /// Of the owner.
+    pub fn credentials(&self) -> &Credentials {
+        &self.credentials
+    }
+
+    /// The queue that bucket notifications name to reach the webhook.
+    pub fn queue_arn(&self) -> &'static str {
+        match &self.running {
+            Running::BuiltIn(_) => rayfold_bucket::QUEUE_ARN,
+            Running::Minio(_) => minio::QUEUE_ARN,
+        }
+    }
+
+    /// Returns when the server has ended by itself, and how. The one built in ends with this process alone.
+    pub async fn ended(&self) -> std::process::ExitStatus {
+        match &self.running {
+            Running::BuiltIn(_) => std::future::pending().await,
+            Running::Minio(minio) => minio.ended().await,
+        }
+    }
+
+    /// Stops it, and returns when its data may be used again.
+    pub async fn stop(self) {
+        match self.running {
+            Running::BuiltIn(server) => server.stop().await,
+            Running::Minio(minio) => drop(minio),
+        }
+    }
+
+    /// What the standard AWS environment has to say so that S3 is this one.
+    pub fn environment(&self) -> Vec<(String, String)> {
+        [
+            ("AWS_ENDPOINT_URL", self.endpoint().as_str()),
+            ("AWS_REGION", REGION),
+            ("AWS_ACCESS_KEY_ID", &self.credentials.access_key),
+            ("AWS_SECRET_ACCESS_KEY", &self.credentials.secret_key),
+        ]
+        .map(|(name, value)| (name.to_owned(), value.to_owned()))
+        .to_vec()
+    }
+
+    /// How to reach it as its owner.
+    pub fn connection(&self) -> Connection {
+        Connection {
+            endpoint: self.endpoint(),
+            region: REGION.to_owned(),
+            access_key: self.credentials.access_key.clone(),
+            secret_key: self.credentials.secret_key.clone(),
+            session_token: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::http::any_port;
+
+    async fn started(data: &Path) -> Result<S3Server> {
+        S3Server::start(StoreKind::BuiltIn, data, any_port(), None, &mut |_| {}).await
+    }
+
+    async fn answers(address: SocketAddr) -> bool {
+        tokio::net::TcpStream::connect(address).await.is_ok()
+    }
+
+    #[tokio::test]
+    async fn it_starts_keeps_its_credentials_and_is_gone_afterwards() {
+        let data = tempfile::tempdir().unwrap();
+        let server = started(data.path()).await.unwrap();
+        let (address, credentials) = (server.address(), server.credentials().clone());
+        assert!(answers(address).await);
+        assert!(matches!(started(data.path()).await, Err(Error::DataInUse(_))));
+        server.stop().await;
+        assert!(!answers(address).await);
+        assert_eq!(*started(data.path()).await.unwrap().credentials(), credentials);
+    }
+
+    #[tokio::test]
+    async fn a_folder_of_a_minio_of_its_own_stays_as_it_is() {
+        let data = tempfile::tempdir().unwrap();
+        fs::create_dir(data.path().join(MINIO_MARK)).unwrap();
+        let error = started(data.path()).await.err().unwrap();
+        assert!(error.to_string().contains("MinIO"), "{error}");
+        assert_eq!(fs::read_dir(data.path()).unwrap().count(), 1);
+    }
+
+    /// What `rayfold dev` kept in MinIO before there was another store.
+    #[tokio::test]
+    async fn the_data_of_minio_beside_it_stays_as_it_is() {
+        let data = tempfile::tempdir().unwrap();
+        let old = StoreKind::Minio.objects(data.path());
+        fs::create_dir_all(old.join(MINIO_MARK)).unwrap();
+        fs::write(old.join(MINIO_MARK).join("format.json"), "{}").unwrap();
+        started(data.path()).await.unwrap().stop().await;
+        assert_eq!(fs::read_dir(&old).unwrap().count(), 1);
+        assert_eq!(fs::read_to_string(old.join(MINIO_MARK).join("format.json")).unwrap(), "{}");
+    }
+}

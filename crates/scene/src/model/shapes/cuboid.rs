@@ -1,0 +1,98 @@
+//! Boxes along the axes; cuboids in the code, where `Box` is another word.
+
+use std::fmt;
+
+use glam::DVec3;
+
+use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
+use crate::model::invalid::{Faults, InvalidValue, Parameter, finite};
+use crate::model::material::{self, Material};
+
+/// An axis-aligned box, closed: its faces, edges and corners belong to it. One without thickness is a rectangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cuboid {
+    corners: [DVec3; 2],
+    material: Material,
+}
+
+impl Cuboid {
+    /// From any two opposite corners.
+    ///
+    /// # Errors
+    /// When a number is not finite or the material mirrors.
+    pub fn new(corners: [DVec3; 2], material: Material) -> Result<Self, InvalidValue> {
+        finite(Parameter::Corner, corners[0])?;
+        finite(Parameter::Corner, corners[1])?;
+        material.must_be_matte()?;
+        Ok(Self { corners, material })
+    }
+
+    /// The two corners as the script gave them.
+    pub fn corners(&self) -> &[DVec3; 2] {
+        &self.corners
+    }
+
+    /// The corner with the smallest coordinates.
+    pub fn min(&self) -> DVec3 {
+        self.corners[0].min(self.corners[1])
+    }
+
+    /// The corner with the largest coordinates.
+    pub fn max(&self) -> DVec3 {
+        self.corners[0].max(self.corners[1])
+    }
+
+    /// How its surface answers light.
+    pub fn material(&self) -> &Material {
+        &self.material
+    }
+
+    pub(super) fn placed(&self, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
+        Self::new(self.corners.map(place), self.material)
+    }
+}
+
+impl Scripted for Cuboid {
+    const FORM: Form = Form::new(
+        "Box",
+        &[
+            Field::new(Parameter::Corner, &["ux", "uy", "uz"], Kind::Position, Values::Any),
+            Field::new(Parameter::Corner, &["vx", "vy", "vz"], Kind::Position, Values::Any),
+            material::AMBIENT,
+            material::DIFFUSE,
+        ],
+    );
+
+    fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        let corners = [numbers.vector(), numbers.vector()];
+        Ok(Self::new(corners, Material::read_matte(numbers)?)?)
+    }
+
+    fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        self.corners.iter().try_for_each(|corner| line.vector(*corner))?;
+        self.material.write_matte(line)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_is_matte_and_finite() {
+        let mirror = Material::new(DVec3::ZERO, DVec3::ZERO, DVec3::Z).unwrap();
+        assert_eq!(Cuboid::new([DVec3::ZERO; 2], mirror), Err(InvalidValue::MirrorOnFlat));
+        for bad in [DVec3::NAN, DVec3::INFINITY] {
+            let cuboid = Cuboid::new([bad, DVec3::X], Material::default());
+            assert_eq!(cuboid, Err(InvalidValue::NotFinite(Parameter::Corner)));
+        }
+    }
+
+    #[test]
+    fn corners_of_a_box_come_in_any_order() {
+        let cuboid =
+            Cuboid::new([DVec3::new(1.0, -2.0, 3.0), DVec3::new(-1.0, 2.0, 3.0)], Material::default());
+        let cuboid = cuboid.unwrap();
+        assert_eq!((cuboid.min(), cuboid.max()), (DVec3::new(-1.0, -2.0, 3.0), DVec3::new(1.0, 2.0, 3.0)));
+    }
+}

@@ -1,0 +1,92 @@
+//! Spheres.
+
+use std::fmt;
+
+use glam::DVec3;
+
+use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
+use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, positive};
+use crate::model::material::{self, Material};
+
+/// A sphere of positive radius.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    radius: f64,
+    center: DVec3,
+    material: Material,
+}
+
+impl Sphere {
+    /// # Errors
+    /// When the radius is not positive or a number is not finite.
+    pub fn new(radius: f64, center: DVec3, material: Material) -> Result<Self, InvalidValue> {
+        positive(Parameter::Radius, radius)?;
+        finite(Parameter::Center, center)?;
+        Ok(Self { radius, center, material })
+    }
+
+    /// Greater than zero.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Its middle.
+    pub fn center(&self) -> DVec3 {
+        self.center
+    }
+
+    /// How its surface answers light.
+    pub fn material(&self) -> &Material {
+        &self.material
+    }
+
+    pub(super) fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
+        Self::new(scale * self.radius, place(self.center), self.material)
+    }
+}
+
+impl Scripted for Sphere {
+    const FORM: Form = Form::new(
+        "Sphere",
+        &[
+            Field::new(Parameter::Radius, &["R"], Kind::Length, Values::Positive),
+            Field::new(Parameter::Center, &["cx", "cy", "cz"], Kind::Position, Values::Any),
+            material::AMBIENT,
+            material::DIFFUSE,
+            material::MIRROR.optional(),
+        ],
+    );
+
+    fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        Ok(Self::new(numbers.number(), numbers.vector(), Material::read(numbers)?)?)
+    }
+
+    fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        line.number(self.radius)?;
+        line.vector(self.center)?;
+        self.material.write(line)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sphere_has_a_radius() {
+        let sphere = |radius| Sphere::new(radius, DVec3::ZERO, Material::default());
+        for radius in [0.0, -0.0, -1.0] {
+            assert_eq!(sphere(radius), Err(InvalidValue::NotPositive(Parameter::Radius)));
+        }
+        assert_eq!(sphere(f64::INFINITY), Err(InvalidValue::NotFinite(Parameter::Radius)));
+        assert_eq!(sphere(5e-324).unwrap().radius(), 5e-324);
+    }
+
+    #[test]
+    fn every_number_is_finite() {
+        for bad in [DVec3::NAN, DVec3::INFINITY] {
+            let sphere = Sphere::new(1.0, bad, Material::default());
+            assert_eq!(sphere, Err(InvalidValue::NotFinite(Parameter::Center)));
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! Directions and scales of vectors of any length, without overflow and without loss.
+
+use glam::DVec3;
+
+/// `v / |v|` for any finite non-zero vector, also where `|v|²` would overflow or vanish.
+pub fn unit(v: DVec3) -> DVec3 {
+    let largest = v.abs().max_element();
+    // Powers of two, so that the direction of a scaled vector is the same bit for bit.
+    let scaled = if largest > 2f64.powi(500) {
+        v * 2f64.powi(-600)
+    } else if largest < 2f64.powi(-500) {
+        v * 2f64.powi(600)
+    } else {
+        v
+    };
+    scaled / scaled.length()
+}
+
+/// The power of two that brings a positive `largest` to 1..2; 1 for zero.
+pub(super) fn to_unit_scale(largest: f64) -> f64 {
+    if largest == 0.0 {
+        return 1.0;
+    }
+    let exponent = ((largest.to_bits() >> 52) & 0x7ff) as i32 - 1023;
+    2f64.powi(-exponent)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unit_vectors_of_any_length() {
+        let check = |v: DVec3, expect: DVec3| assert!(unit(v).distance(expect) < 1e-15, "{v}");
+        let diagonal = DVec3::ONE / 3f64.sqrt();
+        for length in [5e-324, 1e-310, 1e-200, 1.0, 1e200, f64::MAX] {
+            check(DVec3::NEG_Y * length, DVec3::NEG_Y);
+            check(DVec3::ONE * length, diagonal);
+        }
+        check(DVec3::new(f64::MAX, 0.0, f64::MIN_POSITIVE), DVec3::X);
+    }
+
+    #[test]
+    fn a_power_of_two_does_not_turn_a_vector() {
+        let v = DVec3::new(0.1, -0.7, 0.3);
+        for exponent in [-1000, -501, -499, -1, 1, 499, 501, 1000] {
+            assert_eq!(unit(v * 2f64.powi(exponent)), unit(v), "2^{exponent}");
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! How messages show pieces of a text and counts.
+
+/// A piece of the text for a message: in quotes, short, and with nothing in it that cannot be seen.
+pub(crate) fn quoted(text: &str) -> String {
+    const LONGEST: usize = 40;
+    let end = text.char_indices().nth(LONGEST).map_or(text.len(), |(end, _)| end);
+    let more = if end < text.len() { "…" } else { "" };
+    format!("`{}{more}`", visible(&text[..end]))
+}
+
+/// The text with control characters and others that cannot be seen written as escapes.
+pub(crate) fn visible(text: &str) -> String {
+    let mut visible = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\'' | '"' | '\\' => visible.push(c),
+            _ => visible.extend(c.escape_debug()),
+        }
+    }
+    visible
+}
+
+/// A count as people write it: 64,000,000.
+pub(crate) fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let mut grouped = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            grouped.push(',');
+        }
+        grouped.push(digit);
+    }
+    grouped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_seen_is_escaped() {
+        assert_eq!(quoted("a\u{feff}b\u{1b}[31m\"\\"), r#"`a\u{feff}b\u{1b}[31m"\`"#);
+        assert_eq!(quoted(&"ä".repeat(41)), format!("`{}…`", "ä".repeat(40)));
+    }
+
+    #[test]
+    fn counts_are_grouped() {
+        assert_eq!([0, 999, 1000, 64_000_000].map(grouped), ["0", "999", "1,000", "64,000,000"]);
+    }
+}

@@ -1,0 +1,103 @@
+//! Boxes along the axes.
+
+use glam::DVec3;
+use rayfold_scene::{Cuboid, Object};
+
+use super::{ROUNDOFF, Shape, Surface};
+use crate::camera::Ray;
+
+impl Shape for Cuboid {
+    fn extent(&self, origin: DVec3) -> f64 {
+        self.corners().iter().fold(origin.abs(), |m, v| m.max(v.abs())).max_element()
+    }
+
+    fn distance(&self, ray: Ray) -> Option<f64> {
+        let (enter, leave) = slabs(self, ray)?;
+        Some(if enter.0 > 0.0 { enter.0 } else { leave.0 })
+    }
+
+    fn surface(&self, ray: Ray, distance: f64) -> Surface {
+        let (min, max) = (self.min(), self.max());
+        let (axis, entering) = match slabs(self, ray) {
+            Some(((near, axis), _)) if near > 0.0 => (axis, true),
+            Some((_, (_, axis))) => (axis, false),
+            None => unreachable!("the ray hits the box at {distance}"),
+        };
+        let forwards = ray.direction[axis] > 0.0;
+        let mut point = (ray.origin + distance * ray.direction).clamp(min, max);
+        point[axis] = if forwards == entering { min[axis] } else { max[axis] };
+        let normal = if forwards { -DVec3::AXES[axis] } else { DVec3::AXES[axis] };
+        let largest = min.abs().max(max.abs()).max_element();
+        Surface { point, normal, offset: 16.0 * ROUNDOFF * largest }
+    }
+
+    fn seen_from(&self, eye: DVec3) -> Option<Object> {
+        Object::from(*self).placed(1.0, |corner| corner - eye).ok()
+    }
+}
+
+/// Distances at which the ray enters and leaves the box, each with its axis: Kay and Kajiya's slabs, where the planes
+/// of a slab belong to it and a ray along them is inside for its whole length.
+///
+/// Leaving is put later by the rounding error of the divisions (Ize, "Robust BVH ray traversal", JCGT 2(2), 2013), so
+/// that edges and corners belong to the box.
+fn slabs(cuboid: &Cuboid, ray: Ray) -> Option<((f64, usize), (f64, usize))> {
+    let (min, max) = (cuboid.min(), cuboid.max());
+    let mut enter = (f64::NEG_INFINITY, 0);
+    let mut leave = (f64::INFINITY, 0);
+    for axis in 0..3 {
+        let (o, d) = (ray.origin[axis], ray.direction[axis]);
+        if d == 0.0 {
+            if o < min[axis] || o > max[axis] {
+                return None;
+            }
+            continue;
+        }
+        let (a, b) = ((min[axis] - o) / d, (max[axis] - o) / d);
+        let (near, far) = (a.min(b), a.max(b));
+        if near > enter.0 {
+            enter = (near, axis);
+        }
+        if far < leave.0 {
+            leave = (far, axis);
+        }
+    }
+    let slack = 8.0 * ROUNDOFF * leave.0.abs();
+    (enter.0 <= leave.0 + slack).then_some((enter, leave))
+}
+
+#[cfg(test)]
+mod tests {
+    use rayfold_scene::Material;
+
+    use super::*;
+    use crate::reference::shapes::distance;
+
+    fn ray(origin: [f64; 3], direction: [f64; 3]) -> Ray {
+        Ray { origin: origin.into(), direction: DVec3::from(direction).normalize() }
+    }
+
+    fn cuboid(u: [f64; 3], v: [f64; 3]) -> Object {
+        Cuboid::new([u.into(), v.into()], Material::default()).unwrap().into()
+    }
+
+    #[test]
+    fn the_faces_edges_and_corners_belong_to_a_box() {
+        let unit = cuboid([1.0; 3], [-1.0; 3]);
+        for zero in [0.0, -0.0] {
+            assert_eq!(distance(&unit, ray([1.0, 0.0, 4.0], [zero, zero, -1.0])), Some(3.0));
+            assert_eq!(distance(&unit, ray([1.0, -1.0, 4.0], [zero, zero, -1.0])), Some(3.0));
+            assert_eq!(distance(&unit, ray([1.0 + 1e-15, 0.0, 4.0], [zero, zero, -1.0])), None);
+        }
+        assert!(distance(&unit, ray([3.0, 3.0, 3.0], [-1.0, -1.0, -1.0])).is_some());
+        assert!(distance(&unit, ray([0.0, 0.0, 6.0], [1.0, 1.0, -5.0])).is_some());
+    }
+
+    #[test]
+    fn a_flat_box_is_a_rectangle() {
+        let flat = cuboid([-1.0, -1.0, 0.0], [1.0, 1.0, 0.0]);
+        assert_eq!(distance(&flat, ray([0.5, 0.5, 2.0], [0.0, 0.0, -1.0])), Some(2.0));
+        assert_eq!(distance(&flat, ray([3.0, 0.0, 0.0], [-1.0, 0.0, 0.0])), Some(2.0));
+        assert_eq!(distance(&flat, ray([3.0, 0.0, 1e-300], [-1.0, 0.0, 0.0])), None);
+    }
+}

@@ -1,0 +1,167 @@
+//! Where a ray meets an object, and what it finds there.
+//!
+//! A shape is a file. Bounds on rounding errors are multiples of the unit roundoff and of the largest number that took
+//! part.
+
+mod cuboid;
+mod sphere;
+mod triangle;
+
+use glam::DVec3;
+use rayfold_scene::Object;
+
+pub(crate) use sphere::power;
+pub(crate) use triangle::{normal_and_width, triangle_normal};
+
+use crate::camera::Ray;
+use crate::scale::below_inverse;
+
+/// The largest relative error of one rounding.
+const ROUNDOFF: f64 = f64::EPSILON / 2.0;
+
+/// The surface at a hit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surface {
+    /// The hit, brought back onto the object.
+    pub point: DVec3,
+    /// Unit normal, on the side that the ray came from.
+    pub normal: DVec3,
+    /// `point + offset * normal` lies outside the object for certain, whatever the rounding.
+    pub offset: f64,
+}
+
+/// What the tracer asks of a shape.
+trait Shape {
+    /// The largest of the numbers that take part in what is asked for rays from `origin`.
+    fn extent(&self, origin: DVec3) -> f64;
+
+    /// Distance to the nearest hit in front of the origin. What is not a number, or not greater than zero, is no hit.
+    fn distance(&self, ray: Ray) -> Option<f64>;
+
+    /// The surface that the ray hits at `distance`.
+    fn surface(&self, ray: Ray, distance: f64) -> Surface;
+
+    /// As [`seen_from`].
+    fn seen_from(&self, eye: DVec3) -> Option<Object>;
+}
+
+/// The one place that tells shapes apart.
+fn shape(object: &Object) -> &dyn Shape {
+    match object {
+        Object::Sphere(sphere) => sphere,
+        Object::Triangle(triangle) => triangle,
+        Object::Cuboid(cuboid) => cuboid,
+    }
+}
+
+/// Distance to the nearest hit in front of the origin.
+pub(super) fn distance(object: &Object, ray: Ray) -> Option<f64> {
+    let scale = scale(object, ray);
+    let distance = if scale == 1.0 {
+        shape(object).distance(ray)?
+    } else {
+        let (object, ray) = scaled(object, ray, scale)?;
+        shape(&object).distance(ray)? / scale
+    };
+    (distance > 0.0 && distance.is_finite()).then_some(distance)
+}
+
+/// The surface of an object that the ray hits at `distance`.
+///
+/// # Panics
+/// When the ray does not hit the object.
+pub(super) fn surface(object: &Object, ray: Ray, distance: f64) -> Surface {
+    let scale = scale(object, ray);
+    if scale == 1.0 {
+        return shape(object).surface(ray, distance);
+    }
+    let Some((object, ray)) = scaled(object, ray, scale) else {
+        unreachable!("the ray hits the object at {distance}")
+    };
+    let surface = shape(&object).surface(ray, distance * scale);
+    Surface { point: surface.point / scale, offset: surface.offset / scale, ..surface }
+}
+
+/// The largest exponent whose fourth power leaves room for sums of products.
+const ORDINARY: i32 = 200;
+
+/// The power of two that scales world units to such in which no product overflows or vanishes, 1 for most.
+fn scale(object: &Object, ray: Ray) -> f64 {
+    let extent = shape(object).extent(ray.origin);
+    let ordinary = extent == 0.0 || (2f64.powi(-ORDINARY)..=2f64.powi(ORDINARY)).contains(&extent);
+    if ordinary { 1.0 } else { below_inverse(extent) }
+}
+
+/// Object and ray in units of 1 / scale; `None` for an object that is too small to be seen in the ray's units.
+fn scaled(object: &Object, ray: Ray, scale: f64) -> Option<(Object, Ray)> {
+    let object = object.placed(scale, |position| position * scale).ok()?;
+    Some((object, Ray { origin: ray.origin * scale, ..ray }))
+}
+
+/// The object in coordinates whose origin is the eye; `None` where it has none, or where rounding would change which
+/// side of it the eye is on.
+pub(super) fn seen_from(object: &Object, eye: DVec3) -> Option<Object> {
+    shape(object).seen_from(eye)
+}
+
+#[cfg(test)]
+mod tests {
+    use rayfold_scene::{Cuboid, Material, Sphere, Triangle};
+
+    use super::*;
+
+    fn ray(origin: [f64; 3], direction: [f64; 3]) -> Ray {
+        Ray { origin: origin.into(), direction: DVec3::from(direction).normalize() }
+    }
+
+    fn sphere(radius: f64, center: [f64; 3]) -> Object {
+        Sphere::new(radius, center.into(), Material::default()).unwrap().into()
+    }
+
+    fn cuboid(u: [f64; 3], v: [f64; 3]) -> Object {
+        Cuboid::new([u.into(), v.into()], Material::default()).unwrap().into()
+    }
+
+    fn triangle(u: [f64; 3], v: [f64; 3], w: [f64; 3]) -> Object {
+        Triangle::new([u.into(), v.into(), w.into()], Material::default()).unwrap().into()
+    }
+
+    #[test]
+    fn normals_face_the_ray_from_inside_too() {
+        for object in [sphere(2.0, [0.0; 3]), cuboid([-2.0; 3], [2.0; 3])] {
+            for z in [0.0, 5.0] {
+                let r = ray([0.5, 0.25, z], [0.0, 0.0, -1.0]);
+                let t = distance(&object, r).unwrap();
+                assert!(surface(&object, r, t).normal.z > 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_ray_leaves_its_surface() {
+        for object in [sphere(2.0, [1e3, 7.0, 0.1]), cuboid([1e3, 0.0, 0.3], [1001.0, 9.0, -3.0])] {
+            let r = ray([1000.3, 5.0, 9.0], [0.0, 0.1, -1.0]);
+            let s = surface(&object, r, distance(&object, r).unwrap());
+            let origin = s.point + s.offset * s.normal;
+            assert_eq!(distance(&object, Ray { origin, direction: s.normal }), None);
+        }
+    }
+
+    #[test]
+    fn objects_of_any_size_are_hit_alike() {
+        let origin = DVec3::new(0.3, 0.2, 3.0);
+        for exponent in [-1000, -500, 500, 1000] {
+            let scale = 2f64.powi(exponent);
+            let [p, q, r] =
+                [[-1.0, -1.0, 0.0], [2.0, -1.0, 0.0], [-1.0, 2.0, 0.5]].map(|v| v.map(|x| scale * x));
+            for object in [sphere(scale, [0.0; 3]), cuboid(p, [scale; 3]), triangle(p, q, r)] {
+                let r = Ray { origin: scale * origin, direction: DVec3::NEG_Z };
+                let t = distance(&object, r).unwrap();
+                let s = surface(&object, r, t);
+                assert!((1.0..4.0).contains(&(t / scale)), "{t:e} at 2^{exponent}");
+                assert!((s.point.z - (r.origin.z - t)).abs() <= 1e-14 * scale);
+                assert!((s.normal.length() - 1.0).abs() < 1e-14 && s.normal.z > 0.0);
+            }
+        }
+    }
+}

@@ -1,0 +1,32 @@
+# What the stack may cost in a month before somebody is told. It tells; it stops nothing.
+
+resource "aws_budgets_budget" "this" {
+  count = var.budget == null ? 0 : 1
+
+  # Budgets are the account's, not the region's.
+  name         = local.global_name
+  budget_type  = "COST"
+  time_unit    = "MONTHLY"
+  limit_amount = tostring(var.budget.monthly_usd)
+  limit_unit   = "USD"
+  tags         = local.tags
+
+  # Empty until the account's owner activates the tag for cost allocation.
+  cost_filter {
+    name   = "TagKeyValue"
+    values = [format("user:Application$%s", local.tags.Application)]
+  }
+
+  dynamic "notification" {
+    for_each = { ACTUAL = 80, FORECASTED = 100 }
+
+    content {
+      notification_type          = notification.key
+      comparison_operator        = "GREATER_THAN"
+      threshold                  = notification.value
+      threshold_type             = "PERCENTAGE"
+      subscriber_email_addresses = var.budget.emails
+      subscriber_sns_topic_arns  = var.budget.topic_arns
+    }
+  }
+}

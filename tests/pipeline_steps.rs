@@ -1,0 +1,295 @@
+//! The steps with the real renderer and encoder on a store in memory, events delivered by hand: what a bucket holds
+//! after the things that users do.
+
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use rayfold_lambda::animator::GifAnimator;
+use rayfold_lambda::raytracer::RayTracer;
+use rayfold_pipeline::keys::{Animation, Key};
+use rayfold_pipeline::manifest::{FrameState, Manifest, Status};
+use rayfold_pipeline::render::Outcome;
+use rayfold_pipeline::retry::{Scope, retry};
+use rayfold_pipeline::store::{ListRequest, MemoryStore, PutOptions, Store};
+use rayfold_pipeline::{
+    Clock, Invocation, Policy, Randomness, Result, Timestamp, assemble, render_frame, sweep,
+};
+
+/// A clock that jumps to wherever someone waits for.
+#[derive(Clone, Default)]
+struct JumpingClock(Arc<AtomicU64>);
+
+impl Clock for JumpingClock {
+    fn now(&self) -> Timestamp {
+        Timestamp(self.0.load(Ordering::Relaxed))
+    }
+
+    async fn sleep(&self, duration: Duration) {
+        self.0.fetch_add(duration.as_millis() as u64, Ordering::Relaxed);
+    }
+}
+
+struct World {
+    store: MemoryStore<JumpingClock>,
+    clock: JumpingClock,
+    random: Randomness,
+    policy: Policy,
+    delivered: BTreeSet<String>,
+    events: u64,
+}
+
+impl World {
+    fn new() -> Self {
+        let clock = JumpingClock::default();
+        clock.0.store(1_000_000, Ordering::Relaxed);
+        World {
+            store: MemoryStore::new(clock.clone()),
+            clock,
+            random: Randomness::seeded(1),
+            policy: Policy::new(rayfold_tracer::PIXEL_VERSION),
+            delivered: BTreeSet::new(),
+            events: 0,
+        }
+    }
+
+    async fn upload(&mut self, key: &str, text: &str) -> Outcome {
+        self.store.put(key, text.to_owned().into(), PutOptions::always()).await.unwrap();
+        self.event(key).await
+    }
+
+    async fn remove(&mut self, key: &str) -> Outcome {
+        self.store.delete(key).await.unwrap();
+        self.event(key).await
+    }
+
+    /// Delivers an event for the render function, and then those that it causes.
+    async fn event(&mut self, key: &str) -> Outcome {
+        self.events += 1;
+        let id = format!("request-{}", self.events);
+        let invocation = Invocation::new(&self.store, &self.clock, &self.random, &self.policy, &id);
+        // The functions run on runtimes that move futures between threads.
+        let rendering = require_send(render_frame(&invocation, &RayTracer::default(), key)).await;
+        let outcome = rendering.unwrap().outcome;
+        Box::pin(self.deliver()).await;
+        outcome
+    }
+
+    /// Delivers what is new below `parts/`, `retries/` and `assemblies/`.
+    async fn deliver(&mut self) {
+        for prefix in ["parts/", "retries/", "assemblies/"] {
+            for listed in self.store.list(ListRequest::all(prefix)).await.unwrap().objects {
+                if !self.delivered.insert(listed.key.clone()) {
+                    continue;
+                }
+                if prefix == "assemblies/" {
+                    let invocation =
+                        Invocation::new(&self.store, &self.clock, &self.random, &self.policy, &listed.key);
+                    require_send(assemble(&invocation, &GifAnimator, &listed.key)).await.unwrap();
+                } else {
+                    self.event(&listed.key).await;
+                }
+            }
+        }
+    }
+
+    async fn manifest(&self, name: &str) -> Manifest {
+        let animation = Animation::new(name).unwrap();
+        let body = self.store.get(&animation.manifest()).await.unwrap().body;
+        Manifest::decode(&animation, &body).unwrap()
+    }
+
+    async fn gif(&self, name: &str) -> Option<Vec<u8>> {
+        self.store.get(&format!("animations/{name}.gif")).await.ok().map(|gif| gif.body.to_vec())
+    }
+}
+
+fn require_send<F: Future + Send>(future: F) -> F {
+    future
+}
+
+fn script(x: u32, traces: usize) -> String {
+    let sphere = format!("Screen 16 12\nSphere 3 {x} 6 -9 1 .5 0 0 0 0\n");
+    let more: String = (1..traces).map(|n| format!("Sphere 1 {} 2 -5 0 1 0 0 0 0\nTrace\n", 2 * n)).collect();
+    format!("{sphere}Trace\n{more}")
+}
+
+/// What rendering the same scripts in one process gives.
+fn local_gif(scripts: &[String], fps: f64) -> Vec<u8> {
+    let mut file = Vec::new();
+    let settings = rayfold_gif::Settings { fps, loops: 0 };
+    let mut encoder = rayfold_gif::Encoder::new(&mut file, settings).unwrap();
+    for script in scripts {
+        let parsed = rayfold_scene::parse("x.txt", script.as_bytes(), &rayfold_scene::Limits::default());
+        for scene in parsed.script.unwrap().frames() {
+            encoder.push(rayfold_tracer::render(&scene, &Default::default()).unwrap()).unwrap();
+        }
+    }
+    encoder.finish().unwrap();
+    file
+}
+
+#[tokio::test]
+async fn a_folder_becomes_the_gif_that_local_rendering_gives() {
+    let mut world = World::new();
+    let scripts: Vec<String> = (1..=11).map(|n| script(n, 1)).collect();
+    for (n, text) in scripts.iter().enumerate() {
+        assert_eq!(world.upload(&format!("scripts/films/ü + 1/f{}.txt", n + 1), text).await, Outcome::Drawn);
+    }
+    let manifest = world.manifest("films/ü + 1").await;
+    assert_eq!((manifest.head.status, manifest.head.done), (Status::Done, 11));
+    let names: Vec<&str> = manifest.frames.iter().map(|frame| frame.script.as_str()).collect();
+    assert_eq!(names[..3], ["f1", "f2", "f3"]);
+    assert_eq!(names[10], "f11");
+    assert!(world.gif("films/ü + 1").await.unwrap() == local_gif(&scripts, 10.0));
+}
+
+#[tokio::test]
+async fn changes_deletions_and_repetitions() {
+    let mut world = World::new();
+    world.upload("scripts/a/animation.json", r#"{"frames": 2, "fps": 25}"#).await;
+    world.upload("scripts/a/1.txt", &script(1, 1)).await;
+    let waiting = world.manifest("a").await.head;
+    assert_eq!((waiting.status, waiting.total, waiting.missing()), (Status::Waiting, 1, 1));
+    assert_eq!(world.gif("a").await, None);
+    world.upload("scripts/a/2.txt", &script(2, 1)).await;
+    assert!(world.gif("a").await.unwrap() == local_gif(&[script(1, 1), script(2, 1)], 25.0));
+
+    let revision = world.manifest("a").await.head.revision;
+    assert_eq!(world.upload("scripts/a/2.txt", &script(2, 1)).await, Outcome::Present);
+    assert_eq!(world.manifest("a").await.head.revision, revision, "the same again changes nothing");
+
+    world.upload("scripts/a/1.txt", &script(7, 1)).await;
+    world.upload("scripts/a/3.txt", &script(3, 1)).await;
+    let three = [script(7, 1), script(2, 1), script(3, 1)];
+    assert!(world.gif("a").await.unwrap() == local_gif(&three, 25.0), "more than expected are all used");
+
+    assert_eq!(world.remove("scripts/a/2.txt").await, Outcome::Gone);
+    assert!(world.gif("a").await.unwrap() == local_gif(&[script(7, 1), script(3, 1)], 25.0));
+
+    for key in ["scripts/a/animation.json", "scripts/a/1.txt", "scripts/a/3.txt"] {
+        world.remove(key).await;
+    }
+    assert_eq!(world.manifest("a").await.head.status, Status::Empty);
+    assert_eq!(world.gif("a").await, None, "no script, no GIF");
+}
+
+#[tokio::test]
+async fn a_script_with_several_traces_is_several_frames() {
+    let mut world = World::new();
+    assert!(
+        matches!(world.upload("scripts/a/1.txt", &script(1, 3)).await, Outcome::Split(count) if count.get() == 3)
+    );
+    world.upload("scripts/a/2.txt", &script(2, 1)).await;
+    let manifest = world.manifest("a").await;
+    assert_eq!((manifest.head.scripts, manifest.head.total, manifest.head.status), (2, 4, Status::Done));
+    assert!(world.gif("a").await.unwrap() == local_gif(&[script(1, 3), script(2, 1)], 10.0));
+}
+
+#[tokio::test]
+async fn a_bad_script_fails_the_animation_with_its_place_until_it_is_mended() {
+    let mut world = World::new();
+    world.upload("scripts/a/1.txt", &script(1, 1)).await;
+    assert!(world.gif("a").await.is_some());
+    let bad = "Screen 16 12\n  Spere 1 2 3 4\nTrace\n";
+    assert!(matches!(world.upload("scripts/a/2.txt", bad).await, Outcome::Faulty(_)));
+    let manifest = world.manifest("a").await;
+    assert_eq!(manifest.head.status, Status::Failed);
+    let FrameState::Failed(fault) = &manifest.frames[1].state else { panic!() };
+    let reason = fault.reason.as_ref().unwrap();
+    assert!(reason.message.starts_with("2.txt:2:3: "), "{}", reason.message);
+    assert_eq!((reason.diagnostics[0].line, reason.diagnostics[0].column), (2, 3));
+    assert_eq!(world.gif("a").await, None, "never silently shorter");
+
+    world.upload("scripts/a/2.txt", &script(2, 1)).await;
+    assert!(world.gif("a").await.unwrap() == local_gif(&[script(1, 1), script(2, 1)], 10.0));
+
+    world.upload("scripts/a/animation.json", r#"{"fps": "ten"}"#).await;
+    let head = world.manifest("a").await.head;
+    assert_eq!(head.status, Status::Failed);
+    assert!(head.settings.fault.unwrap().message.starts_with("animation.json:1:"));
+    world.remove("scripts/a/animation.json").await;
+    assert!(world.gif("a").await.is_some());
+
+    let long = format!("scripts/a/{}.txt", "x".repeat(900));
+    world.store.put(&long, script(3, 1).into(), PutOptions::always()).await.unwrap();
+    world.upload("scripts/a/3.txt", &script(3, 1)).await;
+    let head = world.manifest("a").await.head;
+    assert_eq!((head.status, head.rejected.len()), (Status::Failed, 1));
+    assert_eq!(head.rejected[0].problem, "the key is longer than 900 bytes");
+}
+
+#[tokio::test]
+async fn frames_of_unlike_sizes_are_refused_by_name() {
+    let mut world = World::new();
+    world.upload("scripts/a/1.txt", &script(1, 1)).await;
+    world.upload("scripts/a/2.txt", &script(1, 1).replace("16 12", "12 16")).await;
+    let head = world.manifest("a").await.head;
+    assert_eq!(head.status, Status::Refused);
+    let message = head.refusal.unwrap().reason.unwrap().message;
+    assert!(message.contains("frame 2") && message.contains("12 x 16"), "{message}");
+    assert_eq!(world.gif("a").await, None);
+    world.upload("scripts/a/2.txt", &script(2, 1)).await;
+    assert!(world.gif("a").await.is_some());
+}
+
+#[tokio::test]
+async fn the_sweep_wakes_what_was_lost_and_gives_up_in_the_end() {
+    let mut world = World::new();
+    world.upload("scripts/a/1.txt", &script(1, 1)).await;
+    for key in ["scripts/a/2.txt", "scripts/b//3.txt"] {
+        world.store.put(key, script(2, 1).into(), PutOptions::always()).await.unwrap();
+    }
+    for attempt in 1..=4_u64 {
+        let before = world.policy.stuck_after * 8;
+        world.clock.sleep(before).await;
+        let id = format!("sweep-{attempt}");
+        let invocation = Invocation::new(&world.store, &world.clock, &world.random, &world.policy, &id);
+        let swept = require_send(sweep(&invocation)).await.unwrap();
+        assert_eq!(swept.rejected.len(), 1, "scripts/b//3.txt is named");
+        let visit = *swept.visits[0].1.as_ref().unwrap();
+        let expected = if attempt <= 3 { (1, 0) } else { (0, 1) };
+        assert_eq!((visit.woken, visit.given_up), expected, "attempt {attempt}");
+        // The wakings are lost as well.
+        let retries = world.store.list(ListRequest::all("retries/")).await.unwrap().objects;
+        assert_eq!(retries.len() as u64, attempt.min(3));
+        world.delivered.extend(retries.into_iter().map(|listed| listed.key));
+        world.deliver().await;
+    }
+    let manifest = world.manifest("a").await;
+    assert_eq!(manifest.head.status, Status::Failed);
+    let FrameState::Failed(fault) = &manifest.frames[1].state else { panic!() };
+    assert_eq!(fault.reason.as_ref().unwrap().message, "no result in each of 3 attempts");
+
+    let animation = Animation::new("a").unwrap();
+    let invocation = Invocation::new(&world.store, &world.clock, &world.random, &world.policy, "retry");
+    let retried = retry(&invocation, &animation, Scope::Failed).await.unwrap();
+    assert_eq!((retried.deleted, retried.woken), (1, 1));
+    let retries = world.store.list(ListRequest::all("retries/")).await.unwrap().objects;
+    let key: Key = retries[0].key.parse().unwrap();
+    assert!(matches!(key, Key::Retry { attempt, .. } if attempt.get() == 1), "the count starts again");
+    assert_eq!(world.event(&retries[0].key).await, Outcome::Drawn);
+    assert!(world.gif("a").await.unwrap() == local_gif(&[script(1, 1), script(2, 1)], 10.0));
+}
+
+#[tokio::test]
+async fn the_sweep_deletes_what_is_long_superseded() -> Result<()> {
+    let mut world = World::new();
+    world.upload("scripts/a/1.txt", &script(1, 3)).await;
+    world.upload("scripts/a/1.txt", &script(2, 1)).await;
+    let count = async |world: &World, prefix: &str| {
+        world.store.list(ListRequest::all(prefix)).await.unwrap().objects.len()
+    };
+    assert_eq!((count(&world, "frames/").await, count(&world, "parts/").await), (5, 3));
+    for (days, frames, parts) in [(6, 5, 3), (2, 1, 0)] {
+        world.clock.sleep(Duration::from_secs(days * 24 * 3600)).await;
+        let invocation = Invocation::new(&world.store, &world.clock, &world.random, &world.policy, "sweep");
+        sweep(&invocation).await?.visits[0].1.as_ref().unwrap();
+        assert_eq!((count(&world, "frames/").await, count(&world, "parts/").await), (frames, parts));
+    }
+    assert!(world.gif("a").await.unwrap() == local_gif(&[script(2, 1)], 10.0));
+    Ok(())
+}
