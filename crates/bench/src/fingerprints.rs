@@ -23,7 +23,7 @@ use rayfold_scene::{
 use rayfold_tracer::{Precision, RenderOptions, probe, reference, render, render_naive};
 use rayon::prelude::*;
 
-use crate::tracers::levels;
+use crate::backends::levels;
 
 /// What to draw.
 #[derive(Debug, clap::Args)]

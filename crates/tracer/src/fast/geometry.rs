@@ -16,6 +16,7 @@ use super::placed::Placed;
 use super::shapes::{Shape, Solid, reach};
 use super::tree::{Branches, group};
 use crate::RenderError;
+use crate::camera::{Axis, grid};
 use crate::parallel::map;
 use crate::scale::below_inverse;
 
@@ -23,8 +24,8 @@ use crate::scale::below_inverse;
 #[derive(Clone, Copy, Debug)]
 pub(super) enum View {
     /// The eye is the origin; `right`, `up` and `back` are orthonormal. The ray of column `i` and row `j` (from the
-    /// bottom) goes along `(x.0 + i·x.1)·right + (y.0 + j·y.1)·up - back`.
-    Pinhole { right: DVec3, up: DVec3, back: DVec3, x: (f64, f64), y: (f64, f64) },
+    /// bottom) goes along `x.at(i)·right + y.at(j)·up - back`.
+    Pinhole { right: DVec3, up: DVec3, back: DVec3, x: Axis, y: Axis },
     /// The ray starts at `corner + (i·pixel, j·pixel, 0)` and goes along `(0, 0, -1)`.
     Parallel { corner: DVec3, pixel: f64 },
 }
@@ -40,7 +41,7 @@ pub(super) struct Geometry {
     pub(super) suns: Vec<Direction>,
     /// A length of the scene times this is a length in here.
     pub(super) scale: f64,
-    /// What the scene calls its origin's opposite: `(point - center) * scale` is a point in here.
+    /// Where the origin of these coordinates is in the scene: `(point - center) * scale` is a point in here.
     pub(super) center: DVec3,
 }
 
@@ -93,17 +94,13 @@ fn middle(screen: Screen) -> DVec3 {
 }
 
 fn view(scene: &Scene, scale: f64) -> View {
-    let axis = |from: f64, to: f64, samples: u32| {
-        if samples == 1 { (0.5 * from + 0.5 * to, 0.0) } else { (from, (to - from) / f64::from(samples - 1)) }
-    };
     match &scene.camera {
         Camera::Orthographic => View::Parallel { corner: -middle(scene.screen) * scale, pixel: scale },
         Camera::Pinhole(pinhole) => {
             let (right, up, back) = pinhole.basis();
             let from = pinhole.lower_left() / pinhole.distance();
             let to = pinhole.upper_right() / pinhole.distance();
-            let x = axis(from.x, to.x, scene.screen.width());
-            let y = axis(from.y, to.y, scene.screen.height());
+            let (x, y) = grid(from, to, scene.screen);
             View::Pinhole { right, up, back, x, y }
         }
     }

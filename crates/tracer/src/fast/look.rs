@@ -9,7 +9,8 @@ use super::candidates::Candidates;
 use super::features::Features;
 use super::packet::Ray;
 use super::prepare::Prepared;
-use super::real::{Lanes, Real, Vec3, constant, splat};
+use super::rays::{AlongAxis, FromEye};
+use super::real::{Lanes, Real, Vec3, constant};
 use super::search::nearest;
 
 /// The numbers of the column and the row of each pixel of the tile, packet by packet; rows count from the bottom.
@@ -43,7 +44,7 @@ pub(super) fn look_from_eye<S: Simd, E: Real, F: Features<E>>(
     simd: S,
     scene: &Prepared<E>,
     (tile, band): (Tile, &Band),
-    [corner, right, up]: [[E; 3]; 3],
+    rays: FromEye<E>,
     candidates: Candidates,
     queue: &mut Queue<E>,
     hits: &mut Hits<E>,
@@ -57,8 +58,7 @@ pub(super) fn look_from_eye<S: Simd, E: Real, F: Features<E>>(
                 (tile, band),
                 #[inline(always)]
                 |at, i, j| {
-                    let along = Vec3::splat(simd, right).scale_add(i, Vec3::splat(simd, corner));
-                    let direction = Vec3::splat(simd, up).scale_add(j, along).normalize(simd);
+                    let direction = rays.direction(simd, i, j);
                     direction.store(&mut queue.direction, at);
                     let ray = Ray { origin: Vec3::zero(simd), direction };
                     let found = nearest::<S, E, F, true>(simd, scene, ray, candidates);
@@ -80,14 +80,12 @@ pub(super) fn look_from_eye<S: Simd, E: Real, F: Features<E>>(
 pub(super) fn aim_along_axis<S: Simd, E: Real>(
     simd: S,
     (tile, band): (Tile, &Band),
-    (corner, pixel): ([E; 3], E),
+    rays: AlongAxis<E>,
     queue: &mut Queue<E>,
 ) {
     simd.vectorize(
         #[inline(always)]
         || {
-            let pixel = splat::<S, E>(simd, pixel);
-            let corner = Vec3::<S, E>::splat(simd, corner);
             let (zero, one) = (E::narrow(0.0), E::narrow(1.0));
             each_packet::<S, E>(
                 simd,
@@ -95,8 +93,7 @@ pub(super) fn aim_along_axis<S: Simd, E: Real>(
                 #[inline(always)]
                 |at, i, j| {
                     let end = at + Lanes::<S, E>::LEN;
-                    Vec3::<S, E>::new(i.mul_add(pixel, corner.x), j.mul_add(pixel, corner.y), corner.z)
-                        .store(&mut queue.origin, at);
+                    rays.origin(simd, i, j).store(&mut queue.origin, at);
                     Vec3::<S, E>::splat(simd, [zero, zero, E::narrow(-1.0)]).store(&mut queue.direction, at);
                     Vec3::<S, E>::splat(simd, [one; 3]).store(&mut queue.weight, at);
                     lanes::<S, E>(simd, at, usize::MAX).store_slice(&mut queue.pixel.0[at..end]);

@@ -26,6 +26,7 @@ mod precision;
 mod predicate;
 mod prepare;
 pub mod probe;
+mod rays;
 mod real;
 mod rounding;
 mod search;

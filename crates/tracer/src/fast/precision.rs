@@ -13,6 +13,7 @@ use super::geometry::{Geometry, View};
 use super::placed::{Placed, Sight};
 use super::real::Real;
 use super::shapes::Solid;
+use crate::camera::Axis;
 use crate::{Precision, RenderOptions};
 
 /// Rounding errors that add up in a ray's direction, in roundoffs.
@@ -119,11 +120,8 @@ impl Colors {
 }
 
 /// The largest slopes across and along the window.
-fn widest((x, y): ((f64, f64), (f64, f64)), size: (u32, u32)) -> (f64, f64) {
-    let of = |(start, step): (f64, f64), samples: u32| {
-        let end = start + step * f64::from(samples - 1);
-        start.abs().max(end.abs())
-    };
+fn widest((x, y): (Axis, Axis), size: (u32, u32)) -> (f64, f64) {
+    let of = |axis: Axis, samples: u32| axis.start.abs().max(axis.at(f64::from(samples - 1)).abs());
     (of(x, size.0), of(y, size.1))
 }
 
@@ -141,7 +139,7 @@ fn is_enough(geometry: &Geometry, scene: &Scene, colors: &Colors) -> bool {
             let size = (scene.screen.width(), scene.screen.height());
             let (across, along) = widest((x, y), size);
             let farthest = 1.0 + across * across + along * along;
-            let steps = [x.1, y.1].map(f64::abs).into_iter().filter(|step| *step > 0.0);
+            let steps = [x.step, y.step].map(f64::abs).into_iter().filter(|step| *step > 0.0);
             // Pixels at the window's corners are the smallest from the eye.
             steps.reduce(f64::min).unwrap_or(ONE_PIXEL) / farthest
         }

@@ -15,6 +15,7 @@ use super::kind::{ByKind, Kind, Row};
 use super::lights::buffer::LightBuffer;
 use super::lights::sun::{Direction, Outline, Outlines, Sun};
 use super::lists::LISTED;
+use super::rays::Rays;
 use super::real::Real;
 use super::shapes::{self, Obstacles, Shape, Shapes, Solid, Sorted};
 use super::sights::Sights;
@@ -52,13 +53,6 @@ pub(super) struct Entry<E> {
     pub(super) ambient: [E; 3],
     pub(super) diffuse: [E; 3],
     pub(super) mirror: [E; 3],
-}
-
-/// Where the rays of pixels start and go: see [`View`].
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Rays<E> {
-    Pinhole { corner: [E; 3], right: [E; 3], up: [E; 3] },
-    Parallel { corner: [E; 3], pixel: E },
 }
 
 /// Everything that the kernels read.
@@ -134,7 +128,7 @@ impl<E: Real> Prepared<E> {
         needs.shadows = !geometry.suns.is_empty() && !alone;
         needs.check()?;
         Ok(Self {
-            rays: rays(&geometry.view),
+            rays: Rays::new(&geometry.view),
             shapes,
             suns,
             counts,
@@ -173,19 +167,6 @@ fn entry<E: Real>(object: &Object) -> Entry<E> {
         ambient: narrow(material.ambient()),
         diffuse: narrow(material.diffuse()),
         mirror: narrow(material.mirror()),
-    }
-}
-
-fn rays<E: Real>(view: &View) -> Rays<E> {
-    match *view {
-        View::Parallel { corner, pixel } => {
-            Rays::Parallel { corner: narrow(corner), pixel: E::narrow(pixel) }
-        }
-        View::Pinhole { right, up, back, x, y } => Rays::Pinhole {
-            corner: narrow(x.0 * right + y.0 * up - back),
-            right: narrow(x.1 * right),
-            up: narrow(y.1 * up),
-        },
     }
 }
 

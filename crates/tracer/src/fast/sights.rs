@@ -10,7 +10,8 @@ use super::lists::{LONGEST, Lists, Rectangle};
 use super::placed::Placed;
 use super::rounding::{BOUNDS, MARGIN};
 use super::shapes::Shape;
-use super::window::steps;
+use super::window::axes;
+use crate::camera::Axis;
 
 /// What each tile's rays can meet.
 #[derive(Debug)]
@@ -31,8 +32,8 @@ impl Sights {
         roundoff: f64,
     ) -> Option<Self> {
         let (columns, rows) = (width.div_ceil(side.0) as usize, height.div_ceil(side.1) as usize);
-        let (x, y) = steps(view);
-        let tiles = |span: Option<(f64, f64)>, (start, step): (f64, f64), pixels: u32, side: u32| {
+        let (x, y) = axes(view);
+        let tiles = |span: Option<(f64, f64)>, Axis { start, step }: Axis, pixels: u32, side: u32| {
             let last = f64::from(pixels - 1);
             let (from, to) = span.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
             let (a, b) = ((from - start) / step, (to - start) / step);
@@ -48,8 +49,7 @@ impl Sights {
             let (across, along) = outline(view, shape, BOUNDS * roundoff * shape.magnitude())?;
             let columns = tiles(across, x, width, side.0)?;
             // Rows of tiles count from the top.
-            let flip = |(start, step): (f64, f64)| (start + step * f64::from(height - 1), -step);
-            Some(Rectangle { columns, rows: tiles(along, flip(y), height, side.1)? })
+            Some(Rectangle { columns, rows: tiles(along, y.reversed(height), height, side.1)? })
         };
         let rectangles: Vec<_> = shapes.map(rectangle).collect();
         let lists = Lists::new(columns, rows, &rectangles, LONGEST * columns * rows)?;

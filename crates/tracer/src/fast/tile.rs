@@ -15,7 +15,8 @@ use super::features::{BUILT, Kernel, Variant, fitted};
 use super::kind::ByKind;
 use super::light::{InTheWay, light_up};
 use super::look::{aim_along_axis, look, look_from_eye};
-use super::prepare::{Prepared, Rays};
+use super::prepare::Prepared;
+use super::rays::Rays;
 use super::real::Real;
 use super::surfaces::{ambient, reflect, surfaces};
 
@@ -74,16 +75,16 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     hits.packets.clear();
     let seen = candidates.kinds;
     match scene.rays {
-        Rays::Pinhole { corner, right, up } => {
-            let (image, aim) = ((tile, &*band), [corner, right, up]);
+        Rays::Pinhole(rays) => {
+            let image = (tile, &*band);
             fitted!(N, seen, tree, C T D => {
-                look_from_eye::<S, E, Variant<N::By, C, T, D>>(simd, scene, image, aim, candidates, queue, hits)
+                look_from_eye::<S, E, Variant<N::By, C, T, D>>(simd, scene, image, rays, candidates, queue, hits)
             });
             let met = Met { kinds: seen, background, queue, next: Some(&mut *next) };
             shade::<S, E, N, true>(simd, scene, met, hits, in_the_way);
         }
-        Rays::Parallel { corner, pixel } => {
-            aim_along_axis::<S, E>(simd, (tile, band), (corner, pixel), queue);
+        Rays::Parallel(rays) => {
+            aim_along_axis::<S, E>(simd, (tile, band), rays, queue);
             fitted!(N, seen, tree, C T D => {
                 look::<S, E, Variant<N::By, C, T, D>>(simd, scene, candidates, background, queue, hits)
             });

@@ -10,6 +10,7 @@ use super::geometry::View;
 use super::placed::Placed;
 use super::rounding::{BOUNDS, MARGIN};
 use super::shapes::Shape;
+use crate::camera::Axis;
 
 /// A sphere as the eye sees it.
 #[derive(Clone, Copy, Debug)]
@@ -68,17 +69,16 @@ impl Window {
             });
             Span { from, to, candidates: candidates & visible }
         };
-        let (x, y) = steps(&view);
+        let (x, y) = axes(&view);
         let tiles = |pixels: u32, side: u32| {
             (0..pixels).step_by(side as usize).map(move |i| (i, (i + side).min(pixels) - 1))
         };
-        let at = |(start, step): (f64, f64), pixel: f64| start + step * pixel;
         let columns = tiles(width, side.0).map(|(first, last)| {
-            span(at(x, f64::from(first) - MARGIN), at(x, f64::from(last) + MARGIN), right)
+            span(x.at(f64::from(first) - MARGIN), x.at(f64::from(last) + MARGIN), right)
         });
         let rows = tiles(height, side.1).map(|(first, last)| {
             let (first, last) = (height - 1 - first, height - 1 - last);
-            span(at(y, f64::from(first) + MARGIN), at(y, f64::from(last) - MARGIN), up)
+            span(y.at(f64::from(first) + MARGIN), y.at(f64::from(last) - MARGIN), up)
         });
         let caps = match view {
             View::Pinhole { .. } => caps(shapes, slack),
@@ -134,17 +134,19 @@ fn up(view: &View) -> DVec3 {
     }
 }
 
-/// Start and step of the pixels' coordinates along both axes.
-pub(super) fn steps(view: &View) -> ((f64, f64), (f64, f64)) {
+/// The pixels' coordinates along both axes.
+pub(super) fn axes(view: &View) -> (Axis, Axis) {
     match *view {
         View::Pinhole { x, y, .. } => (widened(x), widened(y)),
-        View::Parallel { corner, pixel } => ((corner.x, pixel), (corner.y, pixel)),
+        View::Parallel { corner, pixel } => {
+            (Axis { start: corner.x, step: pixel }, Axis { start: corner.y, step: pixel })
+        }
     }
 }
 
 /// A single sample has no step; its tile is given a little width all the same.
-fn widened((start, step): (f64, f64)) -> (f64, f64) {
-    (start, if step == 0.0 { 1e-3 * start.abs().max(1.0) } else { step })
+fn widened(Axis { start, step }: Axis) -> Axis {
+    Axis { start, step: if step == 0.0 { 1e-3 * start.abs().max(1.0) } else { step } }
 }
 
 fn mask(shapes: &[Shape], is_candidate: impl Fn(&Shape) -> bool) -> u64 {
