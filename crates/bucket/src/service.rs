@@ -1,6 +1,6 @@
 //! S3's operations, by the storage.
 //!
-//! One module a family: `buckets`, `reads`, `writes`, `copies`, `deletes`, `lists`, `uploads` (in parts),
+//! One module a family: `buckets`, `reads`, `writes`, `copies`, `deletes`, `lists`, `versions`, `uploads` (in parts),
 //! `notifications`. What an operation's headers ask for beyond it is `meaning`'s; conditions are `conditions`'; a body on
 //! its way in is `ingest`'s, out `outgest`'s. Operations that are not listed here answer `NotImplemented`.
 
@@ -18,6 +18,7 @@ mod outgest;
 mod reads;
 mod uploads;
 mod uploads_listed;
+mod versions;
 mod writes;
 
 use std::sync::Arc;
@@ -258,6 +259,14 @@ impl S3 for Service {
     ) -> S3Result<S3Response<ListObjectsV2Output>> {
         check(&req)?;
         self.objects_listed_v2(req.input).await.map(S3Response::new)
+    }
+
+    async fn list_object_versions(
+        &self,
+        req: S3Request<ListObjectVersionsInput>,
+    ) -> S3Result<S3Response<ListObjectVersionsOutput>> {
+        check(&req)?;
+        self.versions_listed(req.input).await.map(S3Response::new)
     }
 
     async fn get_object(&self, req: S3Request<GetObjectInput>) -> S3Result<S3Response<GetObjectOutput>> {

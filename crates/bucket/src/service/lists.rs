@@ -87,7 +87,7 @@ fn behind(prefix: &[u8]) -> Option<Vec<u8>> {
 }
 
 /// Where a listing after a key begins. A key within a common prefix stands for all of it.
-fn after(name: &str, prefix: &str, delimiter: &str) -> Vec<u8> {
+pub(super) fn after(name: &str, prefix: &str, delimiter: &str) -> Vec<u8> {
     let within =
         name.starts_with(prefix).then(|| common_prefix(name.as_bytes(), prefix, delimiter)).flatten();
     match within {
@@ -163,7 +163,7 @@ impl Service {
     }
 
     /// Reads a page where it may block.
-    async fn page(&self, query: Query, from: Vec<u8>) -> Answer<Page> {
+    pub(super) async fn page(&self, query: Query, from: Vec<u8>) -> Answer<Page> {
         let snapshot = self.snapshot()?;
         self.bucket(&snapshot, &query.bucket)?;
         let read = tokio::task::spawn_blocking(move || walk(&snapshot, &query, &from));

@@ -12,7 +12,7 @@ use s3s::s3_error;
 pub(crate) const OWNER: &str = "000000000000";
 
 /// Headers (and their start) that would change the meaning.
-const UNSUPPORTED: [&str; 12] = [
+const UNSUPPORTED: [&str; 11] = [
     "x-amz-server-side-encryption",
     "x-amz-copy-source-server-side-encryption",
     "x-amz-object-lock-",
@@ -20,7 +20,6 @@ const UNSUPPORTED: [&str; 12] = [
     "x-amz-website-redirect-location",
     "x-amz-grant-",
     "x-amz-write-offset-bytes",
-    "x-amz-bypass-governance-retention",
     "x-amz-mfa",
     "x-amz-rename-source",
     "x-amz-if-match-",
@@ -100,6 +99,8 @@ mod tests {
             ("x-amz-meta-colour", "red"),
             ("x-amz-expected-bucket-owner", OWNER),
             ("x-amz-request-payer", "requester"),
+            // Nothing is under retention here.
+            ("x-amz-bypass-governance-retention", "true"),
         ] {
             assert_eq!(code(name, value), None, "{name}: {value}");
         }
