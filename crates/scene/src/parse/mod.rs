@@ -96,6 +96,10 @@ struct Statement<'a> {
 /// The first parameter that was probably written with a comma for a point: `1,5`, in a line that would have as many
 /// numbers as its command takes if only blanks separated them.
 fn decimal_comma(text: &str, command: Command, words: &Words) -> Option<Range<usize>> {
+    // Most lines have no comma, which is quickly seen.
+    if !text.contains(',') {
+        return None;
+    }
     let start = words.command.end;
     let parameters = text[start..].split('#').next().unwrap_or_default();
     let is_decimal = |part: &&str| {
