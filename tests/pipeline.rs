@@ -360,3 +360,34 @@ async fn nothing_is_written_where_it_does_not_belong() {
     })
     .await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_script_beyond_the_limits_of_the_stack_is_named_with_the_limit() {
+    on_every_store(async |store| {
+        let limits = [("RAYFOLD_MAX_OBJECTS", "1"), ("RAYFOLD_MAX_PIXELS", "432"), ("RAYFOLD_MAX_FRAMES", "2")];
+        let mut stage = stage(store, |settings| {
+            settings.environment.extend(limits.map(|(name, value)| (name.into(), value.into())));
+        })
+        .await;
+        let within = scene(8.0);
+        let sphere = "Sphere 1 0 0 -5 .1 .1 .1 .1 .1 .1\nTrace";
+        let files = [
+            ("frames.txt", within.replace("Trace", "Trace\nTrace\nTrace")),
+            ("objects.txt", within.replace("Trace", sphere)),
+            ("pixels.txt", within.replace("Screen 24 18", "Screen 24 19")),
+            ("within.txt", within),
+            frames(4),
+        ];
+        stage.upload("film", &files).await;
+        let manifest = stage.until("film", Status::Failed).await;
+        let said: Vec<_> = failures(&manifest)
+            .into_iter()
+            .map(|(script, reason)| (script, reason.diagnostics.iter().map(|found| &found.message).collect::<Vec<_>>()))
+            .collect();
+        assert_eq!(
+            format!("{said:?}"),
+            r#"[("frames", ["more than 2 frames"]), ("objects", ["more than 1 objects in a scene"]), ("pixels", ["the image has 456 pixels, the limit is 432"])]"#
+        );
+    })
+    .await;
+}

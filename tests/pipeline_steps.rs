@@ -15,6 +15,7 @@ use rayfold_pipeline::manifest::{FrameState, Manifest, Status};
 use rayfold_pipeline::render::Outcome;
 use rayfold_pipeline::retry::{Scope, retry};
 use rayfold_pipeline::store::{ListRequest, MemoryStore, PutOptions, Store};
+use rayfold_pipeline::sweep::Visit;
 use rayfold_pipeline::{
     Clock, Invocation, Policy, Randomness, Result, Timestamp, assemble, render_frame, sweep,
 };
@@ -38,6 +39,7 @@ struct World {
     clock: JumpingClock,
     random: Randomness,
     policy: Policy,
+    renderer: RayTracer,
     delivered: BTreeSet<String>,
     events: u64,
 }
@@ -51,6 +53,7 @@ impl World {
             clock,
             random: Randomness::seeded(1),
             policy: Policy::new(rayfold_tracer::PIXEL_VERSION),
+            renderer: RayTracer::default(),
             delivered: BTreeSet::new(),
             events: 0,
         }
@@ -72,7 +75,7 @@ impl World {
         let id = format!("request-{}", self.events);
         let invocation = Invocation::new(&self.store, &self.clock, &self.random, &self.policy, &id);
         // The functions run on runtimes that move futures between threads.
-        let rendering = require_send(render_frame(&invocation, &RayTracer::default(), key)).await;
+        let rendering = require_send(render_frame(&invocation, &self.renderer, key)).await;
         let outcome = rendering.unwrap().outcome;
         Box::pin(self.deliver()).await;
         outcome
@@ -94,6 +97,27 @@ impl World {
                 }
             }
         }
+    }
+
+    async fn put(&self, key: &str, body: impl Into<bytes::Bytes>) {
+        self.store.put(key, body.into(), PutOptions::always()).await.unwrap();
+    }
+
+    /// Sweeps, and delivers what that leads to; says what was done for the animation `a`.
+    async fn sweep(&mut self) -> Visit {
+        self.events += 1;
+        let id = format!("sweep-{}", self.events);
+        let invocation = Invocation::new(&self.store, &self.clock, &self.random, &self.policy, &id);
+        let swept = require_send(sweep(&invocation)).await.unwrap();
+        let of_a = |(animation, visit)| (Animation::as_str(&animation) == "a").then_some(visit);
+        let visit: Result<Visit> = swept.visits.into_iter().find_map(of_a).unwrap();
+        // What is put again fires again.
+        self.delivered.retain(|key| key.starts_with("parts/"));
+        let visit = visit.unwrap();
+        if visit.claimed || visit.woken > 0 {
+            Box::pin(self.deliver()).await;
+        }
+        visit
     }
 
     async fn manifest(&self, name: &str) -> Manifest {
@@ -292,4 +316,111 @@ async fn the_sweep_deletes_what_is_long_superseded() -> Result<()> {
     }
     assert!(world.gif("a").await.unwrap() == local_gif(&[script(2, 1)], 10.0));
     Ok(())
+}
+
+/// Garbage, an empty file, a later schema: uploads, sweeps, `status` and `retry` all failed until it was deleted by hand.
+#[tokio::test]
+async fn a_manifest_that_cannot_be_read_is_made_anew_and_set_aside() {
+    let mut world = World::new();
+    world.upload("scripts/b/1.txt", &script(1, 1)).await;
+    let of_another = world.store.get("manifests/b.json").await.unwrap().body;
+    world.upload("scripts/a/1.txt", &script(1, 1)).await;
+    let whole = world.store.get("manifests/a.json").await.unwrap().body;
+    let whole = std::str::from_utf8(&whole).unwrap();
+    let broken: Vec<bytes::Bytes> = vec![
+        "".into(),
+        "garbage".into(),
+        whole.replace("\"schema\":1", "\"schema\":2").into(),
+        whole.replace("\"revision\":1,", &format!("\"revision\":{},", u64::MAX)).into(),
+        whole.replace("\"state\":\"done\"", "\"state\":\"eaten\"").into(),
+        of_another,
+        vec![b'x'; 100_000].into(),
+        [b"{\n".to_vec(), vec![b'x'; 100_000]].concat().into(),
+    ];
+    let expected = world.manifest("a").await;
+    for (place, body) in broken.into_iter().enumerate() {
+        assert_ne!(whole.as_bytes(), body, "{place}");
+        for by_sweep in [true, false] {
+            world.put("manifests/a.json", body.clone()).await;
+            let version = world.store.head("manifests/a.json").await.unwrap().etag;
+            if by_sweep {
+                assert!(world.sweep().await.claimed, "{place}");
+            } else {
+                assert_eq!(world.event("scripts/a/1.txt").await, Outcome::Present, "{place}");
+            }
+            let healed = world.manifest("a").await;
+            assert!(healed.agrees_with(&expected) && healed.head.revision < 3, "{place}: {healed:?}");
+            let aside = format!("manifests/a.json~{version}");
+            assert_eq!(world.store.get(&aside).await.unwrap().body, body, "{place}");
+            world.store.delete(&aside).await.unwrap();
+        }
+        assert_eq!(world.sweep().await, Visit::default(), "{place}: nothing is left to do");
+    }
+    assert!(world.gif("a").await.unwrap() == local_gif(&[script(1, 1)], 10.0));
+}
+
+#[tokio::test]
+async fn an_error_receipt_that_cannot_be_read_is_made_anew() {
+    let mut world = World::new();
+    world.upload("scripts/a/1.txt", &script(1, 1)).await;
+    world.upload("scripts/a/2.txt", "Spere 1\n").await;
+    let message = async |world: &World| match &world.manifest("a").await.frames[1].state {
+        FrameState::Failed(fault) => fault.reason.as_ref().unwrap().message.clone(),
+        state => panic!("{state:?}"),
+    };
+    let before = message(&world).await;
+    let receipts = world.store.list(ListRequest::all("frames/a/2@")).await.unwrap().objects;
+    world.put(&receipts[0].key, "{").await;
+    world.upload("scripts/a/1.txt", &script(2, 1)).await;
+    assert_eq!(world.manifest("a").await.head.status, Status::Failed);
+    assert!(message(&world).await.starts_with("the error receipt cannot be read"));
+    let visit = world.sweep().await;
+    assert_eq!((visit.deleted, visit.woken), (1, 1));
+    assert_eq!(message(&world).await, before);
+    assert_eq!(world.sweep().await, Visit::default());
+}
+
+#[tokio::test]
+async fn a_faulty_script_whose_name_starts_with_an_at_sign_is_named() {
+    let mut world = World::new();
+    world.upload("scripts/a/1.txt", &script(1, 1)).await;
+    world.upload("scripts/a/@2.txt", "Spere 1\n").await;
+    let manifest = world.manifest("a").await;
+    assert_eq!((manifest.head.status, manifest.head.pending), (Status::Failed, 0));
+    let FrameState::Failed(fault) = &manifest.frames[1].state else { panic!() };
+    assert!(fault.reason.as_ref().unwrap().message.starts_with("@2.txt:1:1: "));
+    assert_eq!(world.sweep().await, Visit::default());
+}
+
+/// `x@<etag of x>-p1.txt`, uploaded first, kept `x.txt` pending: its receipt was taken for one of `x`.
+#[tokio::test]
+async fn a_script_that_is_called_like_anothers_receipts_does_not_stand_for_it() {
+    let mut world = World::new();
+    world.put("scripts/a/x.txt", script(1, 1)).await;
+    let version = world.store.head("scripts/a/x.txt").await.unwrap().etag;
+    world.upload(&format!("scripts/a/x@{version}-p1.txt"), &script(2, 1)).await;
+    world.upload(&format!("scripts/a/x@{version}-p2.txt"), &script(2, 3)).await;
+    assert_eq!(world.event("scripts/a/x.txt").await, Outcome::Drawn);
+    let head = world.manifest("a").await.head;
+    assert_eq!((head.status, head.done), (Status::Done, 5));
+}
+
+#[tokio::test]
+async fn what_is_too_large_is_named_and_not_read_whole() {
+    let mut world = World::new();
+    world.upload("scripts/a/1.txt", &script(1, 1)).await;
+    let large = format!("{{{}\"fps\": 20}}", " ".repeat(64 * 1024));
+    world.upload("scripts/a/animation.json", &large).await;
+    let head = world.manifest("a").await.head;
+    assert_eq!(head.status, Status::Failed);
+    let size = large.len();
+    let message = head.settings.fault.unwrap().message;
+    assert_eq!(message, format!("animation.json has {size} bytes: expected at most 65536"));
+    world.upload("scripts/a/animation.json", &large[size - 64 * 1024..].replacen(' ', "{", 1)).await;
+    assert_eq!(world.manifest("a").await.head.status, Status::Done, "at the limit it is read");
+
+    world.renderer.limits.max_script_bytes = 200;
+    let long = script(2, 1) + &"#".repeat(1_000_000);
+    let Outcome::Faulty(reason) = world.upload("scripts/a/2.txt", &long).await else { panic!("it is drawn") };
+    assert!(reason.message.contains("200 bytes"), "{}", reason.message);
 }

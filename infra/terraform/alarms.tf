@@ -1,5 +1,5 @@
-# What someone should look at. Each alarm is quiet while nothing happens, and each says where RUNBOOK.md tells what to do:
-# the last word of its name is a heading there.
+# What someone should look at. Each alarm is quiet while nothing happens, and its text names the heading of RUNBOOK.md under
+# which stands what to do.
 
 locals {
   # Per function, by heading of the runbook.

@@ -5,11 +5,10 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
-use rayfold_local::Functions;
 use rayfold_local::invoker::{Invoker, Settings};
-use rayfold_local::minio::any_port;
 use rayfold_local::observation::Seen;
 use rayfold_local::routes::Function;
+use rayfold_local::{Functions, any_port};
 
 /// What to measure.
 #[derive(Debug, clap::Args)]

@@ -11,6 +11,7 @@ pub mod backends;
 #[cfg(feature = "bucket")]
 pub mod cold_start;
 pub mod cpu_time;
+pub mod fingerprints;
 pub mod gif;
 pub mod hard_cases;
 pub mod measure;

@@ -1,7 +1,7 @@
 //! The program that measures: a subcommand a report.
 
 use clap::{Parser, Subcommand};
-use rayfold_bench::{accuracy, gif, measure, needs, parsing, speed};
+use rayfold_bench::{accuracy, fingerprints, gif, measure, needs, parsing, speed};
 #[cfg(feature = "bucket")]
 use rayfold_bench::{cold_start, pipeline, simulate};
 
@@ -16,7 +16,7 @@ struct Cli {
 enum Measurement {
     /// Error and speed of every backend, and the hard cases at full size
     Accuracy(accuracy::Args),
-    /// The paper's table: scenes from upload to GIF on MinIO and the local invoker
+    /// The paper's table: scenes from upload to GIF, in a local bucket and by the local invoker
     #[cfg(feature = "bucket")]
     Pipeline(pipeline::Args),
     /// Size of the functions, and how soon a new process asks for its first invocation
@@ -29,6 +29,8 @@ enum Measurement {
     Simulate(simulate::Args),
     /// Time, memory, size and quality of GIFs, beside those of other encoders
     Gif(gif::Args),
+    /// A line for each of many pictures, by which the program before a change is compared with the one after
+    Fingerprints(fingerprints::Args),
     /// Run a program and print what it took
     #[command(hide = true)]
     Measure(measure::Args),
@@ -49,6 +51,7 @@ fn main() -> anyhow::Result<()> {
         #[cfg(feature = "bucket")]
         Measurement::Simulate(args) => simulate::run(&args),
         Measurement::Gif(args) => gif::run(&args),
+        Measurement::Fingerprints(args) => fingerprints::run(&args),
         Measurement::Measure(args) => measure::run(&args),
         Measurement::Needs(args) => needs::run(&args),
         Measurement::Speed(args) => speed::run(&args),

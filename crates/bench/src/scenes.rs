@@ -22,19 +22,8 @@ pub fn looking_at(eye: DVec3, target: DVec3, width: f64, screen: Screen) -> Resu
 
 /// The ray of column `i` from the left and row `j` from the bottom, of unit length.
 pub fn pixel_ray(scene: &Scene, i: u32, j: u32) -> Ray {
-    let (i, j) = (f64::from(i), f64::from(j));
-    let Camera::Pinhole(pinhole) = scene.camera else {
-        return Ray { origin: DVec3::new(i, j, 0.0), direction: DVec3::NEG_Z };
-    };
-    let along = |from: f64, to: f64, index: f64, count: u32| {
-        if count == 1 { 0.5 * (from + to) } else { from + (to - from) * index / f64::from(count - 1) }
-    };
-    let (a, b) = (pinhole.lower_left(), pinhole.upper_right());
-    let (u, v, w) = pinhole.basis();
-    let across = along(a.x, b.x, i, scene.screen.width());
-    let upward = along(a.y, b.y, j, scene.screen.height());
-    let direction = across * u + upward * v - pinhole.distance() * w;
-    Ray { origin: pinhole.eye(), direction: direction.normalize() }
+    let (origin, direction) = rayfold_tracer::pixel_ray(scene, f64::from(i), f64::from(j));
+    Ray { origin, direction }
 }
 
 /// The middle frame of an animation in `scenes/`.

@@ -52,6 +52,9 @@ pub enum Error {
         /// What is wrong with it.
         reason: String,
     },
+    /// A part of the program failed while starting.
+    #[error("the store did not start: {0}")]
+    Start(String),
     /// The database could not be read or written.
     #[error("the database in {}", path.display())]
     Storage {

@@ -12,7 +12,7 @@ mod caller;
 mod session;
 mod sts;
 
-pub(crate) use access::{Access, DeniedKeys, absent};
+pub(crate) use access::{Access, DeniedKeys, discreetly};
 pub(crate) use caller::Identities;
 pub(crate) use session::Sessions;
-pub(crate) use sts::{AssumeRole, StsErrors};
+pub(crate) use sts::{AssumeRole, in_sts_shape, is_for_sts};

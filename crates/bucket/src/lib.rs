@@ -22,11 +22,16 @@
 //! # Ok(()) }
 //! ```
 
+mod checksum;
+mod delivery;
 mod error;
+mod events;
+mod front;
 mod host;
 mod identity;
 mod options;
 pub mod policy;
+mod records;
 mod server;
 mod service;
 mod storage;

@@ -1,20 +1,23 @@
 //! The listener: connections in, requests to the service, an end in order.
 
 use std::net::SocketAddr;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
-use s3s::auth::SimpleAuth;
 use s3s::service::{S3Service, S3ServiceBuilder};
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
 use tokio::task::{JoinHandle, JoinSet};
 use tokio::time::timeout;
 
+use crate::delivery::Delivery;
+use crate::front::Front;
 use crate::host::Hosts;
+use crate::identity::{Access, AssumeRole, Identities, Sessions};
 use crate::options::Options;
 use crate::service::Service;
+use crate::storage::{Storage, Writing};
 use crate::{Error, Result};
 
 /// How long requests that are under way at the end may take.
@@ -24,11 +27,12 @@ const GRACE: Duration = Duration::from_secs(5);
 const ACCEPT_PAUSE: Duration = Duration::from_millis(20);
 
 /// A running store. Dropping it closes the listener and every connection; [`Server::stop`] lets requests end first.
-#[derive(Debug)]
 pub struct Server {
     address: SocketAddr,
     ending: Option<oneshot::Sender<()>>,
     accepting: JoinHandle<()>,
+    delivering: Option<JoinHandle<()>>,
+    writing: Option<Writing>,
 }
 
 impl Server {
@@ -41,12 +45,26 @@ impl Server {
         let failed = |source| Error::Listen { address: options.address.to_string(), source };
         let listener = TcpListener::bind(options.address).await.map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
-        let mut builder = S3ServiceBuilder::new(Service::new());
+        let data = options.data;
+        let opened = tokio::task::spawn_blocking(move || Storage::open(&data)).await;
+        let (storage, writing) = opened.map_err(|panicked| Error::Start(panicked.to_string()))??;
+        let delivery = options.webhook.as_ref();
+        let delivery = delivery.map(|webhook| Delivery::new(storage.clone(), &options.region, webhook));
+        let delivering = delivery.transpose()?.map(|delivery| tokio::spawn(delivery.run()));
+        let collected = storage.clone();
+        // Files that a killed run left take room, and stand in nobody's way.
+        tokio::task::spawn_blocking(move || drop(collected.collect_orphans()));
+        let sessions = Sessions::open(storage.clone(), SystemTime::now());
+        let identities =
+            Identities::new(options.root, sessions.map_err(|why| Error::Start(why.to_string()))?);
+        let mut builder = S3ServiceBuilder::new(Service::new(storage, &options.region));
         builder.set_host(Hosts);
-        builder.set_auth(SimpleAuth::from_single(options.root.access_key, options.root.secret_key));
+        builder.set_auth(identities.clone());
+        builder.set_access(Access(identities.clone()));
+        builder.set_route(AssumeRole(identities));
         let (ending, end) = oneshot::channel();
         let accepting = tokio::spawn(accept(listener, builder.build(), end));
-        Ok(Self { address, ending: Some(ending), accepting })
+        Ok(Self { address, ending: Some(ending), accepting, delivering, writing: Some(writing) })
     }
 
     /// Where it listens.
@@ -60,12 +78,27 @@ impl Server {
             let _ = ending.send(());
         }
         let _ = (&mut self.accepting).await;
+        if let Some(delivering) = self.delivering.take() {
+            delivering.abort();
+        }
+        if let Some(writing) = self.writing.take() {
+            let _ = tokio::task::spawn_blocking(|| writing.end()).await;
+        }
+    }
+}
+
+impl std::fmt::Debug for Server {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Server").field("address", &self.address).finish_non_exhaustive()
     }
 }
 
 impl Drop for Server {
     fn drop(&mut self) {
         self.accepting.abort();
+        if let Some(delivering) = &self.delivering {
+            delivering.abort();
+        }
     }
 }
 
@@ -78,14 +111,14 @@ async fn accept(listener: TcpListener, service: S3Service, mut end: oneshot::Rec
             accepted = listener.accept() => accepted,
             _ = &mut end => break,
         };
-        let Ok((stream, _)) = accepted else {
+        let Ok((stream, peer)) = accepted else {
             tokio::time::sleep(ACCEPT_PAUSE).await;
             continue;
         };
         let _ = stream.set_nodelay(true);
         let connection = hyper::server::conn::http1::Builder::new()
             .timer(TokioTimer::new())
-            .serve_connection(TokioIo::new(stream), service.clone());
+            .serve_connection(TokioIo::new(stream), Front { service: service.clone(), peer: peer.ip() });
         let connection = graceful.watch(connection);
         // A client that goes away in the middle is that client's end.
         connections.spawn(async move { drop(connection.await) });

@@ -1,16 +1,379 @@
 //! S3's operations, by the storage.
+//!
+//! One module a family: `buckets`, `reads`, `writes`, `copies`, `deletes`, `lists`, `uploads` (in parts),
+//! `notifications`. What an operation's headers ask for beyond it is `meaning`'s; conditions are `conditions`'; a body on
+//! its way in is `ingest`'s, out `outgest`'s. Operations that are not listed here answer `NotImplemented`.
 
-use s3s::S3;
+mod answer;
+mod buckets;
+mod conditions;
+mod copies;
+mod deletes;
+mod ingest;
+mod lists;
+mod meaning;
+mod notifications;
+mod objects;
+mod outgest;
+mod reads;
+mod uploads;
+mod uploads_listed;
+mod writes;
+
+use std::sync::Arc;
+
+use redb::StorageError;
+use s3s::dto::*;
+use s3s::{S3, S3Error, S3Request, S3Response, S3Result};
+
+use crate::front::Origin;
+use crate::identity::discreetly;
+use crate::records::{self, key};
+use crate::storage::{Batch, Kind, Snapshot, Storage, Table};
+use answer::{Answer, no_such_bucket, no_such_key, unavailable, unreadable};
 
 /// See the module.
-#[derive(Clone, Debug)]
-pub(crate) struct Service;
+#[derive(Clone)]
+pub(crate) struct Service {
+    storage: Storage,
+    region: Arc<str>,
+}
 
-impl Service {
-    pub(crate) fn new() -> Self {
-        Self
+/// Who asks, for events.
+#[derive(Clone, Debug)]
+pub(crate) struct Caller {
+    principal: String,
+    origin: Origin,
+}
+
+/// Why a change was not made.
+pub(crate) enum Stop {
+    /// By the request: nothing was changed.
+    Refused(Box<S3Error>),
+    /// By the disk.
+    Storage(StorageError),
+}
+
+impl From<S3Error> for Stop {
+    fn from(error: S3Error) -> Self {
+        Self::Refused(Box::new(error))
     }
 }
 
+impl From<StorageError> for Stop {
+    fn from(error: StorageError) -> Self {
+        Self::Storage(error)
+    }
+}
+
+impl Service {
+    pub(crate) fn new(storage: Storage, region: &str) -> Self {
+        Self { storage, region: region.into() }
+    }
+
+    fn snapshot(&self) -> Answer<Snapshot> {
+        self.storage.snapshot().map_err(|reason| unavailable(&reason))
+    }
+
+    /// Runs a change. It must not stop by a refusal after its first write.
+    async fn change<T, F>(&self, kind: Kind, function: F) -> Answer<T>
+    where
+        T: Send + 'static,
+        F: FnOnce(&mut Batch<'_>) -> Result<T, Stop> + Send + 'static,
+    {
+        let settled = self.storage.change(kind, |batch| match function(batch) {
+            Ok(value) => Ok(Ok(value)),
+            Err(Stop::Refused(error)) => Ok(Err(*error)),
+            Err(Stop::Storage(error)) => Err(error),
+        });
+        settled.await.map_err(|reason| unavailable(&reason))?
+    }
+
+    /// The bucket, or `NoSuchBucket`.
+    fn bucket(&self, snapshot: &Snapshot, name: &str) -> Answer<records::Bucket> {
+        records::find(snapshot, Table::Buckets, name.as_bytes())
+            .map_err(unreadable)?
+            .ok_or_else(no_such_bucket)
+    }
+
+    /// The object, or `NoSuchBucket` or `NoSuchKey`.
+    fn object(&self, snapshot: &Snapshot, bucket: &str, key: &str) -> Answer<records::Object> {
+        self.bucket(snapshot, bucket)?;
+        let row = key::object(bucket, key.as_bytes());
+        records::find(snapshot, Table::Objects, &row).map_err(unreadable)?.ok_or_else(no_such_key)
+    }
+}
+
+/// What an operation is given besides its input.
+fn caller<T>(request: &S3Request<T>) -> Caller {
+    let principal = request.credentials.as_ref().map(|c| c.access_key.clone()).unwrap_or_default();
+    let origin = request.extensions.get::<Origin>().cloned().unwrap_or_default();
+    Caller { principal, origin }
+}
+
+fn check<T>(request: &S3Request<T>) -> Answer<()> {
+    meaning::check(&request.headers, &request.uri)
+}
+
+fn time(moment: records::Moment) -> Timestamp {
+    moment.system_time().into()
+}
+
+/// Each operation is its family's function of the same name.
 #[async_trait::async_trait]
-impl S3 for Service {}
+impl S3 for Service {
+    async fn list_buckets(
+        &self,
+        req: S3Request<ListBucketsInput>,
+    ) -> S3Result<S3Response<ListBucketsOutput>> {
+        check(&req)?;
+        self.buckets_listed(&req.input).map(S3Response::new)
+    }
+
+    async fn create_bucket(
+        &self,
+        req: S3Request<CreateBucketInput>,
+    ) -> S3Result<S3Response<CreateBucketOutput>> {
+        check(&req)?;
+        self.bucket_created(req.input).await.map(S3Response::new)
+    }
+
+    async fn head_bucket(&self, req: S3Request<HeadBucketInput>) -> S3Result<S3Response<HeadBucketOutput>> {
+        check(&req)?;
+        self.bucket_found(&req.input).map(S3Response::new)
+    }
+
+    async fn delete_bucket(
+        &self,
+        req: S3Request<DeleteBucketInput>,
+    ) -> S3Result<S3Response<DeleteBucketOutput>> {
+        check(&req)?;
+        self.bucket_deleted(req.input).await.map(S3Response::new)
+    }
+
+    async fn get_bucket_location(
+        &self,
+        req: S3Request<GetBucketLocationInput>,
+    ) -> S3Result<S3Response<GetBucketLocationOutput>> {
+        check(&req)?;
+        self.bucket_location(&req.input).map(S3Response::new)
+    }
+
+    async fn get_bucket_versioning(
+        &self,
+        req: S3Request<GetBucketVersioningInput>,
+    ) -> S3Result<S3Response<GetBucketVersioningOutput>> {
+        check(&req)?;
+        self.bucket_exists(&req.input.bucket)?;
+        Ok(S3Response::new(GetBucketVersioningOutput::default()))
+    }
+
+    async fn get_bucket_acl(
+        &self,
+        req: S3Request<GetBucketAclInput>,
+    ) -> S3Result<S3Response<GetBucketAclOutput>> {
+        check(&req)?;
+        self.bucket_exists(&req.input.bucket)?;
+        Ok(S3Response::new(buckets::owners_alone()))
+    }
+
+    async fn get_bucket_policy(
+        &self,
+        req: S3Request<GetBucketPolicyInput>,
+    ) -> S3Result<S3Response<GetBucketPolicyOutput>> {
+        self.no_configuration(&req, &req.input.bucket, s3s::S3ErrorCode::NoSuchBucketPolicy)
+    }
+
+    async fn get_bucket_cors(
+        &self,
+        req: S3Request<GetBucketCorsInput>,
+    ) -> S3Result<S3Response<GetBucketCorsOutput>> {
+        self.no_configuration(&req, &req.input.bucket, s3s::S3ErrorCode::NoSuchCORSConfiguration)
+    }
+
+    async fn get_bucket_lifecycle_configuration(
+        &self,
+        req: S3Request<GetBucketLifecycleConfigurationInput>,
+    ) -> S3Result<S3Response<GetBucketLifecycleConfigurationOutput>> {
+        self.no_configuration(&req, &req.input.bucket, s3s::S3ErrorCode::NoSuchLifecycleConfiguration)
+    }
+
+    async fn get_bucket_tagging(
+        &self,
+        req: S3Request<GetBucketTaggingInput>,
+    ) -> S3Result<S3Response<GetBucketTaggingOutput>> {
+        self.no_configuration(&req, &req.input.bucket, s3s::S3ErrorCode::NoSuchTagSet)
+    }
+
+    async fn get_bucket_encryption(
+        &self,
+        req: S3Request<GetBucketEncryptionInput>,
+    ) -> S3Result<S3Response<GetBucketEncryptionOutput>> {
+        let code = s3s::S3ErrorCode::ServerSideEncryptionConfigurationNotFoundError;
+        self.no_configuration(&req, &req.input.bucket, code)
+    }
+
+    async fn get_object_lock_configuration(
+        &self,
+        req: S3Request<GetObjectLockConfigurationInput>,
+    ) -> S3Result<S3Response<GetObjectLockConfigurationOutput>> {
+        let code = s3s::S3ErrorCode::ObjectLockConfigurationNotFoundError;
+        self.no_configuration(&req, &req.input.bucket, code)
+    }
+
+    async fn get_bucket_website(
+        &self,
+        req: S3Request<GetBucketWebsiteInput>,
+    ) -> S3Result<S3Response<GetBucketWebsiteOutput>> {
+        self.no_configuration(&req, &req.input.bucket, s3s::S3ErrorCode::NoSuchWebsiteConfiguration)
+    }
+
+    async fn put_bucket_notification_configuration(
+        &self,
+        req: S3Request<PutBucketNotificationConfigurationInput>,
+    ) -> S3Result<S3Response<PutBucketNotificationConfigurationOutput>> {
+        check(&req)?;
+        self.notifications_set(req.input).await.map(S3Response::new)
+    }
+
+    async fn get_bucket_notification_configuration(
+        &self,
+        req: S3Request<GetBucketNotificationConfigurationInput>,
+    ) -> S3Result<S3Response<GetBucketNotificationConfigurationOutput>> {
+        check(&req)?;
+        self.notifications_told(&req.input).map(S3Response::new)
+    }
+
+    async fn list_objects(
+        &self,
+        req: S3Request<ListObjectsInput>,
+    ) -> S3Result<S3Response<ListObjectsOutput>> {
+        check(&req)?;
+        self.objects_listed(req.input).await.map(S3Response::new)
+    }
+
+    async fn list_objects_v2(
+        &self,
+        req: S3Request<ListObjectsV2Input>,
+    ) -> S3Result<S3Response<ListObjectsV2Output>> {
+        check(&req)?;
+        self.objects_listed_v2(req.input).await.map(S3Response::new)
+    }
+
+    async fn get_object(&self, req: S3Request<GetObjectInput>) -> S3Result<S3Response<GetObjectOutput>> {
+        check(&req)?;
+        let told = discreetly(&req.extensions);
+        self.object_read(req.input).await.map_err(told)
+    }
+
+    async fn head_object(&self, req: S3Request<HeadObjectInput>) -> S3Result<S3Response<HeadObjectOutput>> {
+        check(&req)?;
+        self.object_looked_at(&req).map_err(discreetly(&req.extensions))
+    }
+
+    async fn get_object_attributes(
+        &self,
+        req: S3Request<GetObjectAttributesInput>,
+    ) -> S3Result<S3Response<GetObjectAttributesOutput>> {
+        check(&req)?;
+        let attributes = self.object_attributes(&req.input).map(S3Response::new);
+        attributes.map_err(discreetly(&req.extensions))
+    }
+
+    async fn get_object_acl(
+        &self,
+        req: S3Request<GetObjectAclInput>,
+    ) -> S3Result<S3Response<GetObjectAclOutput>> {
+        check(&req)?;
+        self.object(&self.snapshot()?, &req.input.bucket, &req.input.key)?;
+        let GetBucketAclOutput { grants, owner } = buckets::owners_alone();
+        Ok(S3Response::new(GetObjectAclOutput { grants, owner, request_charged: None }))
+    }
+
+    async fn get_object_tagging(
+        &self,
+        req: S3Request<GetObjectTaggingInput>,
+    ) -> S3Result<S3Response<GetObjectTaggingOutput>> {
+        check(&req)?;
+        self.object(&self.snapshot()?, &req.input.bucket, &req.input.key)?;
+        Ok(S3Response::new(GetObjectTaggingOutput { tag_set: Vec::new(), version_id: None }))
+    }
+
+    async fn put_object(&self, req: S3Request<PutObjectInput>) -> S3Result<S3Response<PutObjectOutput>> {
+        check(&req)?;
+        self.object_put(req).await.map(S3Response::new)
+    }
+
+    async fn copy_object(&self, req: S3Request<CopyObjectInput>) -> S3Result<S3Response<CopyObjectOutput>> {
+        check(&req)?;
+        let told = discreetly(&req.extensions);
+        self.object_copied(req).await.map(S3Response::new).map_err(told)
+    }
+
+    async fn delete_object(
+        &self,
+        req: S3Request<DeleteObjectInput>,
+    ) -> S3Result<S3Response<DeleteObjectOutput>> {
+        check(&req)?;
+        self.object_deleted(req).await.map(S3Response::new)
+    }
+
+    async fn delete_objects(
+        &self,
+        req: S3Request<DeleteObjectsInput>,
+    ) -> S3Result<S3Response<DeleteObjectsOutput>> {
+        check(&req)?;
+        self.objects_deleted(req).await.map(S3Response::new)
+    }
+
+    async fn create_multipart_upload(
+        &self,
+        req: S3Request<CreateMultipartUploadInput>,
+    ) -> S3Result<S3Response<CreateMultipartUploadOutput>> {
+        check(&req)?;
+        self.upload_created(req).await.map(S3Response::new)
+    }
+
+    async fn upload_part(&self, req: S3Request<UploadPartInput>) -> S3Result<S3Response<UploadPartOutput>> {
+        check(&req)?;
+        self.part_uploaded(req).await.map(S3Response::new)
+    }
+
+    async fn upload_part_copy(
+        &self,
+        req: S3Request<UploadPartCopyInput>,
+    ) -> S3Result<S3Response<UploadPartCopyOutput>> {
+        check(&req)?;
+        let told = discreetly(&req.extensions);
+        self.part_copied(req).await.map(S3Response::new).map_err(told)
+    }
+
+    async fn complete_multipart_upload(
+        &self,
+        req: S3Request<CompleteMultipartUploadInput>,
+    ) -> S3Result<S3Response<CompleteMultipartUploadOutput>> {
+        check(&req)?;
+        self.upload_completed(req).await.map(S3Response::new)
+    }
+
+    async fn abort_multipart_upload(
+        &self,
+        req: S3Request<AbortMultipartUploadInput>,
+    ) -> S3Result<S3Response<AbortMultipartUploadOutput>> {
+        check(&req)?;
+        self.upload_aborted(req.input).await.map(S3Response::new)
+    }
+
+    async fn list_parts(&self, req: S3Request<ListPartsInput>) -> S3Result<S3Response<ListPartsOutput>> {
+        check(&req)?;
+        self.parts_listed(&req.input).map(S3Response::new)
+    }
+
+    async fn list_multipart_uploads(
+        &self,
+        req: S3Request<ListMultipartUploadsInput>,
+    ) -> S3Result<S3Response<ListMultipartUploadsOutput>> {
+        check(&req)?;
+        self.uploads_listed(&req.input).map(S3Response::new)
+    }
+}

@@ -25,8 +25,8 @@ use tokio::sync::{Notify, oneshot};
 
 use crate::{Error, Result};
 
-pub(crate) use bodies::{Bodies, BodyId, NewBody};
-pub(crate) use table::{Batch, Snapshot, Table, View};
+pub(crate) use bodies::{Bodies, BodyId, NewBody, Pins};
+pub(crate) use table::{Batch, Row, Snapshot, Table, View};
 pub(crate) use writer::{Kind, Unavailable};
 
 use folder::Folder;

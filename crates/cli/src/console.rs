@@ -68,21 +68,21 @@ impl Console {
         }
     }
 
-    /// A remark for people, unless they asked for quiet.
+    /// A remark for people, unless they asked for quiet. Names in it may be anybody's.
     pub(crate) fn note(&self, text: impl std::fmt::Display) {
         if !self.quiet {
-            self.say(text);
+            self.say(visible(&text.to_string()));
         }
     }
 
     /// An error and its causes, on one line: `error: cannot read a.txt: permission denied`.
     pub(crate) fn error(&self, error: &anyhow::Error) {
-        self.say(format_args!("{}: {}", self.label(), describe(error)));
+        self.say(format_args!("{}: {}", self.label(), visible(&describe(error))));
     }
 
     /// An error that was found elsewhere: `error: <what>: <why>`.
     pub(crate) fn fault(&self, what: &str, why: &str) {
-        self.say(format_args!("{}: {what}: {why}", self.label()));
+        self.say(format_args!("{}: {}: {}", self.label(), visible(what), visible(why)));
     }
 
     fn label(&self) -> &'static str {
@@ -93,6 +93,25 @@ impl Console {
     pub(crate) fn say(&self, text: impl std::fmt::Display) {
         let _ = writeln!(std::io::stderr().lock(), "{text}");
     }
+}
+
+/// The text with control characters written as escapes, so that nobody's name commands a terminal. Lines stay lines.
+pub(crate) fn visible(text: &str) -> String {
+    let is_command = |c: char| (c.is_control() && c != '\n') || is_formatting(c);
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        if is_command(c) {
+            shown.extend(c.escape_unicode());
+        } else {
+            shown.push(c);
+        }
+    }
+    shown
+}
+
+/// Characters that turn the direction of text, which is how a name looks like another one.
+fn is_formatting(c: char) -> bool {
+    matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// An error and its causes.
@@ -110,4 +129,16 @@ fn without_number(error: &(dyn std::error::Error + 'static)) -> String {
         text.truncate(end);
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_command_no_terminal() {
+        assert_eq!(visible("a \x1b[31mred\x07\u{9b}2J\r"), "a \\u{1b}[31mred\\u{7}\\u{9b}2J\\u{d}");
+        assert_eq!(visible("\u{202e}fig.olleh"), "\\u{202e}fig.olleh");
+        assert_eq!(visible("über\n  日本 🎞"), "über\n  日本 🎞");
+    }
 }

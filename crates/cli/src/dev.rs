@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use rayfold_local::invoker::Settings;
 use rayfold_local::{Error, Functions, Plan, Platform, StoreKind};
 use tokio::sync::mpsc::unbounded_channel;
@@ -42,8 +43,8 @@ Examples:
   aws s3 sync scenes/hello s3://rayfold/scripts/hello/   there; the GIF appears below animations/")]
 pub(crate) struct Args {
     /// What keeps the bucket
-    #[arg(long, value_name = "STORE", value_enum, default_value_t = StoreName::BuiltIn)]
-    store: StoreName,
+    #[arg(long, value_name = "STORE", default_value = StoreKind::BuiltIn.name(), value_parser = stores())]
+    store: StoreKind,
     /// Where objects and credentials are kept [default: rayfold/dev in the user's data folder]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -58,22 +59,10 @@ pub(crate) struct Args {
     bucket: String,
 }
 
-/// As the flag has it.
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum StoreName {
-    /// The store in rayfold itself
-    BuiltIn,
-    /// MinIO, a program of its own
-    Minio,
-}
-
-impl From<StoreName> for StoreKind {
-    fn from(name: StoreName) -> Self {
-        match name {
-            StoreName::BuiltIn => Self::BuiltIn,
-            StoreName::Minio => Self::Minio,
-        }
-    }
+/// The names of the stores, for the flag.
+fn stores() -> impl TypedValueParser<Value = StoreKind> {
+    PossibleValuesParser::new(StoreKind::ALL.map(StoreKind::name))
+        .map(|name| StoreKind::named(&name).unwrap_or_default())
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
@@ -96,8 +85,8 @@ async fn serve(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         Some(address) => address,
         None => usual_address(),
     };
-    let store = args.store.into();
-    let plan = Plan { store, data: data.clone(), address, bucket: args.bucket.clone(), functions };
+    let plan =
+        Plan { store: args.store, data: data.clone(), address, bucket: args.bucket.clone(), functions };
     let settings = |settings: &mut Settings| {
         settings.concurrency = usize::from(args.concurrency);
         // An animation in which nothing has happened for so long has lost an event.
@@ -121,7 +110,8 @@ async fn serve(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let _ = tokio::time::timeout(CATCH_UP, invoker.idle()).await;
     console.print(exports(&platform))?;
     console.note(format_args!("data in {}; Ctrl-C stops everything", data.display()));
-    for other in StoreKind::ALL.into_iter().filter(|kind| *kind != store && kind.objects(&data).exists()) {
+    for other in StoreKind::ALL.into_iter().filter(|kind| *kind != args.store && kind.objects(&data).exists())
+    {
         console.note(format_args!("{}", left_alone(other, &data)));
     }
     console.print(format!("aws s3 sync scenes/hello s3://{0}/scripts/hello/\n", args.bucket))?;

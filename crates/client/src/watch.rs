@@ -26,6 +26,7 @@ pub struct Watch<'a, S, C> {
     animation: Animation,
     version: Option<ETag>,
     manifest: Option<Manifest>,
+    is_unreadable: bool,
     gif: Option<ObjectInfo>,
     started: Timestamp,
 }
@@ -57,7 +58,7 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
     /// Nothing is known before the first look.
     pub fn new(client: Client<'a, S, C>, animation: Animation) -> Self {
         let started = client.clock.now();
-        Self { client, animation, version: None, manifest: None, gif: None, started }
+        Self { client, animation, version: None, manifest: None, is_unreadable: false, gif: None, started }
     }
 
     /// The animation.
@@ -68,6 +69,11 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
     /// The manifest as last seen.
     pub fn manifest(&self) -> Option<&Manifest> {
         self.manifest.as_ref()
+    }
+
+    /// There is a manifest, but what was last seen of it cannot be read.
+    pub fn is_unreadable(&self) -> bool {
+        self.is_unreadable
     }
 
     /// The GIF as last seen.
@@ -92,8 +98,10 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
             let object = found(store.get(&key).await)?;
             let version = object.as_ref().map(|object| object.info.etag.clone());
             changed = version != self.version;
+            // One that cannot be read is made anew by the functions; until then nothing is known.
             self.manifest =
-                object.map(|object| Manifest::decode(&self.animation, &object.body)).transpose()?;
+                object.as_ref().and_then(|object| Manifest::decode(&self.animation, &object.body).ok());
+            self.is_unreadable = object.is_some() && self.manifest.is_none();
             self.version = version;
         }
         if self.manifest.as_ref().is_some_and(|manifest| manifest.head.is_terminal()) {
@@ -268,6 +276,19 @@ mod tests {
             matches!(ended, Err(Error::ChangedMeanwhile { key }) if key == "scripts/film/3.txt"),
             "the third script is none of ours"
         );
+    }
+
+    #[tokio::test]
+    async fn a_manifest_that_cannot_be_read_is_no_failure_but_nothing_known() {
+        let world = World::new();
+        world.put("scripts/film/1.txt", "frame").await;
+        world.put("manifests/film.json", "garbage").await;
+        let mut watch = Watch::new(world.client(), world.film());
+        assert!(watch.look().await.unwrap());
+        assert!(watch.is_unreadable() && !watch.is_settled() && !watch.is_current());
+        world.functions().await;
+        assert!(watch.look().await.unwrap());
+        assert!(!watch.is_unreadable() && watch.is_current());
     }
 
     #[tokio::test]

@@ -219,6 +219,10 @@ impl World {
 struct OneLine;
 
 impl Renderer for OneLine {
+    fn most_bytes(&self) -> u64 {
+        1_000
+    }
+
     async fn draw(&self, name: &ScriptName, script: Bytes, _: Part) -> Result<Drawing> {
         let text = String::from_utf8_lossy(&script);
         Ok(match text.as_ref() {

@@ -173,12 +173,13 @@ mod tests {
     use rayfold_pipeline::store::{
         ETag, ListPage, ListRequest, MemoryStore, MemoryUpload, Object, ObjectInfo, PutOptions,
     };
-    use rayfold_pipeline::studio::Studio;
     use rayfold_pipeline::{Randomness, Result, SystemClock, Timestamp};
     use serde_json::json;
 
     use super::*;
+    use crate::animator::GifAnimator;
     use crate::logs::tests::Kept;
+    use crate::raytracer::RayTracer;
 
     /// A bucket that fails whatever is asked of one animation's GIF.
     struct Faulty(MemoryStore<SystemClock>);
@@ -226,8 +227,9 @@ mod tests {
         Context {
             store: Faulty(store),
             bucket: "films".into(),
-            studio: Studio::default(),
-            policy: Policy { request_attempts: 1, ..Policy::default() },
+            renderer: RayTracer::default(),
+            animator: GifAnimator,
+            policy: Policy { request_attempts: 1, ..Policy::new(1) },
             random: Randomness::seeded(1),
         }
     }

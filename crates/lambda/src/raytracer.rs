@@ -33,6 +33,10 @@ pub struct RayTracer {
 }
 
 impl Renderer for RayTracer {
+    fn most_bytes(&self) -> u64 {
+        self.limits.max_script_bytes as u64
+    }
+
     async fn draw(&self, name: &ScriptName, script: Bytes, part: Part) -> Result<Drawing> {
         let cancelled = CancelOnDrop::default();
         let (flag, limits, file) = (cancelled.0.clone(), self.limits, format!("{name}.txt"));

@@ -37,6 +37,19 @@ impl StoreKind {
     /// Both.
     pub const ALL: [Self; 2] = [Self::BuiltIn, Self::Minio];
 
+    /// As a flag has it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::BuiltIn => "built-in",
+            Self::Minio => "minio",
+        }
+    }
+
+    /// The one of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
     /// Where it keeps its objects in a data folder.
     pub fn objects(self, data: &Path) -> PathBuf {
         data.join(match self {

@@ -3,7 +3,8 @@
 //! Each round reads the manifest, the GIF's version and generation, and lists, in this order; then it does what is due:
 //! commits the manifest where it differs (without a claim: the assembler is here already), builds the GIF of a set
 //! that is done and settled, removes the GIF of a set that can have none. It ends only on a round that wrote nothing,
-//! so that no GIF from an older listing stays, and no set that became whole while it worked is left.
+//! so that no GIF from an older listing stays, and no set that became whole while it worked is left. Whoever waits or builds
+//! holds the animation's lease; another assembler that finds it taken leaves the GIF to its holder.
 //!
 //! Memory does not grow with the number of frames: they are fetched a few ahead of the encoder, and what it writes goes
 //! out piece by piece.
@@ -15,7 +16,7 @@ use bytes::Bytes;
 use futures_util::stream::{self, StreamExt};
 use rayfold_scene::AnimationSettings;
 
-use crate::invocation::{Invocation, Mutation};
+use crate::invocation::{Invocation, Known, Mutation};
 use crate::keys::{Animation, Generation, Key, Receipt, Tag};
 use crate::manifest::{Frame, FrameState, Head, Manifest, Reason, Status};
 use crate::observe::Observation;
@@ -121,10 +122,31 @@ enum Built {
     Refused(Reason),
 }
 
+/// How a round ended.
+enum Next {
+    /// Something was written or waited for: look again.
+    Round,
+    /// There is nothing to do, or another assembler does it.
+    End,
+    /// The set does not settle in this invocation's time: wake the next one.
+    HandOver,
+}
+
+/// When the set of scripts last changed; `None` when it is settled: when there are just as many frames as
+/// `animation.json` says.
+fn last_change(
+    head: &Head,
+    newest_script: Option<Timestamp>,
+    removed_at: Option<Timestamp>,
+) -> Option<Timestamp> {
+    let expected = head.settings.value.as_ref().and_then(AnimationSettings::frames);
+    newest_script.max(removed_at).filter(|_| expected != Some(head.total))
+}
+
 /// Quiet that has been waited for.
 #[derive(Default)]
 struct Quiet {
-    newest: Option<Timestamp>,
+    since: Option<Timestamp>,
     waited: Duration,
 }
 
@@ -137,16 +159,17 @@ struct Tally {
     frames: u64,
     waited: Duration,
     building: Duration,
+    holds_lease: bool,
 }
 
 impl Quiet {
-    /// How long to wait until `newest` is a quiet period old. A store's clock may run ahead of this one's, so a period
-    /// that was slept through counts as well.
-    fn left(&mut self, period: Duration, newest: Timestamp, now: Timestamp) -> Duration {
-        if self.newest != Some(newest) {
-            *self = Quiet { newest: Some(newest), waited: Duration::ZERO };
+    /// How long to wait until the last change is a quiet period old. The clock that dated it may run ahead of this one,
+    /// so a period that was slept through counts as well.
+    fn left(&mut self, period: Duration, changed: Timestamp, now: Timestamp) -> Duration {
+        if self.since != Some(changed) {
+            *self = Quiet { since: Some(changed), waited: Duration::ZERO };
         }
-        let wait = period.saturating_sub(now.since(newest).max(self.waited));
+        let wait = period.saturating_sub(now.since(changed).max(self.waited));
         self.waited += wait;
         wait
     }
@@ -155,7 +178,8 @@ impl Quiet {
 impl Tally {
     fn new(began: Timestamp) -> Self {
         let (waited, building) = (Duration::ZERO, Duration::ZERO);
-        Tally { began, quiet: Quiet::default(), rounds: 0, built: 0, frames: 0, waited, building }
+        let quiet = Quiet::default();
+        Tally { began, quiet, rounds: 0, built: 0, frames: 0, waited, building, holds_lease: false }
     }
 
     fn of(self, head: &Head) -> Assembled {
@@ -174,36 +198,72 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             let gif = self.head(&animation.gif()).await?;
             let observation = self.observe(animation, known.as_ref()).await?;
             let observed = &observation.manifest;
-            let agrees = known.as_ref().is_some_and(|known| known.manifest.agrees_with(observed));
-            if !agrees && self.commit(animation, known.as_ref(), observed.clone()).await?.is_none() {
-                continue;
-            }
-            let leaves_early = self.breaks(Mutation::AssemblerLeavesEarly) && !observed.head.is_terminal();
-            let wrote = match due(&observed.head, gif.as_ref()) {
-                Due::Nothing => !agrees && !leaves_early,
-                Due::NoGif => self.delete(&animation.gif()).await.map(|()| true)?,
-                Due::Gif => self.make_gif(animator, &observation, gif, &mut tally).await?,
+            let (known, agrees) = match known {
+                Some(known) if known.manifest.agrees_with(observed) => (known, true),
+                known => match self.commit(animation, known.as_ref(), observed.clone()).await? {
+                    Some(known) => (known, false),
+                    None => continue,
+                },
             };
-            if !wrote {
-                return Ok(tally.of(&observed.head));
+            let leaves_early = self.breaks(Mutation::AssemblerLeavesEarly) && !observed.head.is_terminal();
+            let next = match due(&observed.head, gif.as_ref()) {
+                Due::Nothing if agrees || leaves_early => Next::End,
+                Due::Nothing => Next::Round,
+                Due::NoGif => self.delete(&animation.gif()).await.map(|()| Next::Round)?,
+                Due::Gif => self.make_gif(animator, &observation, &known, gif, &mut tally).await?,
+            };
+            match next {
+                Next::Round => {}
+                Next::End if tally.holds_lease || self.left_lease(&observation).await? => {
+                    tally.holds_lease = false;
+                    self.release_lease(animation).await?;
+                    // Whoever found the lease taken was woken for a manifest that was written before.
+                    let now = self.head(&animation.manifest()).await?;
+                    let is_blind = self.breaks(Mutation::AssemblerDoesNotLookAgain);
+                    if is_blind || now.is_some_and(|now| now.etag == known.etag) {
+                        return Ok(tally.of(&observed.head));
+                    }
+                }
+                Next::End => return Ok(tally.of(&observed.head)),
+                Next::HandOver => {
+                    self.release_lease(animation).await?;
+                    self.claim(&known.manifest).await?;
+                    return Ok(tally.of(&observed.head));
+                }
             }
         }
     }
 
-    /// Waits until the set is settled, or builds its GIF; says whether to look again.
+    /// Whether an earlier attempt at the same event died with the lease.
+    async fn left_lease(&self, observation: &Observation) -> Result<bool> {
+        Ok(observation.has_lease && self.holds_lease(&observation.manifest.head.animation).await?)
+    }
+
+    /// Waits until the set is settled, or builds its GIF, unless another assembler does.
     async fn make_gif<A: Animator>(
         &self,
         animator: &A,
         observation: &Observation,
+        known: &Known,
         gif: Option<ObjectInfo>,
         tally: &mut Tally,
-    ) -> Result<bool> {
+    ) -> Result<Next> {
         let observed = &observation.manifest;
-        let wait = self.unsettled(observation, &mut tally.quiet);
+        tally.holds_lease = tally.holds_lease || self.take_lease(&observed.head.animation).await?;
+        if !tally.holds_lease {
+            return Ok(Next::End);
+        }
+        let changed =
+            last_change(&observed.head, observation.newest_script(), known.manifest.head.removed_at);
+        let wait = changed
+            .map_or(Duration::ZERO, |changed| tally.quiet.left(self.policy.quiet, changed, self.clock.now()));
         if wait > Duration::ZERO {
+            if self.is_out_of_time_in(wait) {
+                return Ok(Next::HandOver);
+            }
             self.clock.sleep(wait).await;
             tally.waited += wait;
-            return Ok(true);
+            return Ok(Next::Round);
         }
         let start = self.clock.now();
         let built = self.build(animator, observed, gif, tally.began).await?;
@@ -212,23 +272,14 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             Built::Put => {
                 tally.built += 1;
                 tally.frames = observed.head.total;
-                return Ok(!self.breaks(Mutation::AssemblerDoesNotLookAgain));
+                if self.breaks(Mutation::AssemblerDoesNotLookAgain) {
+                    return Ok(Next::End);
+                }
             }
             Built::Stale => {}
             Built::Refused(reason) => self.refuse(observed, &reason).await?,
         }
-        Ok(true)
-    }
-
-    /// How long to wait until the newest script is a quiet period old; zero when it is, or when `animation.json` says
-    /// how many frames to wait for.
-    fn unsettled(&self, observation: &Observation, quiet: &mut Quiet) -> Duration {
-        let settings = observation.manifest.head.settings.value.as_ref();
-        let expects = settings.and_then(AnimationSettings::frames);
-        match observation.newest_script() {
-            Some(newest) if expects.is_none() => quiet.left(self.policy.quiet, newest, self.clock.now()),
-            _ => Duration::ZERO,
-        }
+        Ok(Next::Round)
     }
 
     /// Writes the GIF of a manifest that is done over the version that was there, or fails to.
@@ -317,7 +368,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 
     fn is_out_of_time(&self) -> bool {
-        self.deadline.is_some_and(|deadline| self.clock.now().after(self.policy.margin) >= deadline)
+        self.is_out_of_time_in(Duration::ZERO)
+    }
+
+    /// Whether no time will be left to go on after `wait`.
+    fn is_out_of_time_in(&self, wait: Duration) -> bool {
+        let then = self.clock.now().after(wait).after(self.policy.margin);
+        self.deadline.is_some_and(|deadline| then >= deadline)
     }
 
     /// Writes down that this generation gives no GIF.
@@ -405,6 +462,22 @@ mod tests {
         // A newer script: all over again.
         assert_eq!(quiet.left(period, second(14), second(15)), Duration::from_secs(4));
         assert_eq!(Quiet::default().left(period, second(10), second(15)), Duration::ZERO);
+    }
+
+    #[test]
+    fn a_set_is_settled_when_it_is_just_what_was_announced_or_quiet() {
+        let (script, removal) = (Some(Timestamp(7)), Some(Timestamp(8)));
+        let changed = |frames: Option<u64>, removed_at| {
+            let value = AnimationSettings::new(frames, 10.0, 0).ok();
+            let settings = Settings { version: None, value, fault: None };
+            last_change(&Head { settings, ..head(Status::Done) }, script, removed_at)
+        };
+        assert_eq!(changed(None, None), script);
+        assert_eq!(changed(None, removal), removal);
+        assert_eq!(changed(None, Some(Timestamp(6))), script);
+        assert_eq!(changed(Some(9), removal), None, "nine frames are announced, and there");
+        assert_eq!(changed(Some(8), None), script);
+        assert_eq!(changed(Some(8), removal), removal);
     }
 
     #[test]

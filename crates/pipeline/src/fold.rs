@@ -78,13 +78,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             }
             let mut known = match glimpse {
                 Glimpse::Nothing => None,
-                Glimpse::Whole(known) => Some(known),
+                Glimpse::Unreadable(known) | Glimpse::Whole(known) => Some(known),
                 Glimpse::Start { .. } => self.manifest(animation).await?,
             };
             if let Some(folded) = self.commit_until_agreed(animation, &mut known).await? {
                 return Ok(folded);
             }
-            glimpse = known.map_or(Glimpse::Nothing, Glimpse::Whole);
+            glimpse = known.into();
         }
     }
 
@@ -155,6 +155,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let before = known.map(|known| &known.manifest);
         next.head.revision = before.map_or(0, |manifest| manifest.head.revision) + 1;
         next.head.writer = self.request_id().to_owned();
+        next.head.removed_at = next.removed_at(before, self.clock.now());
         invariants::check(&next, before)?;
         let options = match known {
             _ if self.breaks(Mutation::DropIfMatch) => PutOptions::always(),
@@ -162,8 +163,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             Some(known) => PutOptions::if_match(known.etag.clone()),
         };
         let options = options.content_type("application/json");
+        if let Some(Known { etag, unreadable: Some(body), .. }) = known {
+            let key = Key::SetAside { animation: animation.clone(), version: etag.clone() };
+            self.put_receipt(&key.to_string(), body.clone(), "application/octet-stream").await?;
+        }
         match self.store.put(&animation.manifest(), next.encode(self.policy.glimpse)?, options).await {
-            Ok(etag) => Ok(Some(Known { manifest: next, etag })),
+            Ok(etag) => Ok(Some(Known { manifest: next, etag, unreadable: None })),
             Err(error) if error.is_conflict() || error.is_retryable() || error.is_not_found() => Ok(None),
             Err(error) => Err(error),
         }

@@ -9,8 +9,9 @@ use std::time::Duration;
 
 use bytes::Bytes;
 
-use crate::keys::Animation;
-use crate::manifest::{Beginning, Fact, Head, Manifest, frames_of};
+use crate::keys::{Animation, Generation};
+use crate::manifest::{Beginning, Fact, Head, Manifest, Settings, frames_of};
+use crate::reconcile::{Results, Scripts, reconcile};
 use crate::store::{ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store};
 use crate::{Clock, Error, Randomness, Result, Timestamp, found};
 
@@ -101,7 +102,7 @@ pub enum Mutation {
     NeverClaim,
     /// The assembler leaves as soon as a frame is pending, though it has just written.
     AssemblerLeavesEarly,
-    /// The assembler does not look again after it has put the GIF.
+    /// The assembler does not look again after it has put the GIF, nor after it has given back the lease.
     AssemblerDoesNotLookAgain,
     /// The GIF is put without its condition.
     DropGifCondition,
@@ -124,8 +125,30 @@ impl Mutation {
 /// A manifest as it was read or written.
 #[derive(Debug, Clone)]
 pub(crate) struct Known {
+    /// Of one that cannot be read, a blank one, which agrees with none.
     pub(crate) manifest: Manifest,
     pub(crate) etag: ETag,
+    /// The document, if it cannot be read: to be set aside when it is made anew.
+    pub(crate) unreadable: Option<Bytes>,
+}
+
+impl Known {
+    fn of(animation: &Animation, object: Object) -> Self {
+        let Object { info, body } = object;
+        match Manifest::decode(animation, &body) {
+            Ok(manifest) => Known { manifest, etag: info.etag, unreadable: None },
+            Err(_) => Known { manifest: blank(animation), etag: info.etag, unreadable: Some(body) },
+        }
+    }
+}
+
+/// What stands for a manifest that cannot be read.
+fn blank(animation: &Animation) -> Manifest {
+    let nothing = (&Scripts::default(), &Results::default());
+    let mut manifest = reconcile(animation, nothing.0, nothing.1, &Settings::absent());
+    // No set has this hash.
+    manifest.head.generation = Generation::of_hash("0".repeat(32));
+    manifest
 }
 
 /// What one small request shows of a manifest.
@@ -133,22 +156,34 @@ pub(crate) struct Known {
 pub(crate) enum Glimpse {
     /// There is none.
     Nothing,
+    /// It cannot be read.
+    Unreadable(Known),
     /// All of it.
     Whole(Known),
     /// Its beginning; it is larger.
     Start { beginning: Beginning, etag: ETag, size: u64 },
 }
 
+impl From<Option<Known>> for Glimpse {
+    fn from(known: Option<Known>) -> Self {
+        match known {
+            None => Glimpse::Nothing,
+            Some(known) if known.unreadable.is_some() => Glimpse::Unreadable(known),
+            Some(known) => Glimpse::Whole(known),
+        }
+    }
+}
+
 impl Glimpse {
     pub(crate) fn head(&self) -> Option<&Head> {
         match self {
-            Glimpse::Nothing => None,
+            Glimpse::Nothing | Glimpse::Unreadable(_) => None,
             Glimpse::Whole(known) => Some(&known.manifest.head),
             Glimpse::Start { beginning, .. } => Some(&beginning.head),
         }
     }
 
-    /// 0 when there is none.
+    /// 0 when there is none that can be read.
     pub(crate) fn revision(&self) -> u64 {
         self.head().map_or(0, |head| head.revision)
     }
@@ -211,6 +246,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         found(self.persist(|| self.store.get(key)).await)
     }
 
+    /// Reads an object's first bytes, at least one more than `most` if there are more, or `None` when there is none.
+    pub(crate) async fn get_start(&self, key: &str, most: u64) -> Result<Option<Object>> {
+        let range = 0..most.saturating_add(1);
+        found(self.persist(|| self.store.get_range(key, range.clone())).await)
+    }
+
     /// Reads all but the body, or `None` when there is no such object.
     pub(crate) async fn head(&self, key: &str) -> Result<Option<ObjectInfo>> {
         found(self.persist(|| self.store.head(key)).await)
@@ -249,26 +290,22 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
 
     /// Reads the manifest.
     pub(crate) async fn manifest(&self, animation: &Animation) -> Result<Option<Known>> {
-        match self.get(&animation.manifest()).await? {
-            None => Ok(None),
-            Some(Object { info, body }) => {
-                Ok(Some(Known { manifest: Manifest::decode(animation, &body)?, etag: info.etag }))
-            }
-        }
+        Ok(self.get(&animation.manifest()).await?.map(|object| Known::of(animation, object)))
     }
 
     /// Reads the manifest's beginning, or all of it when it is small.
     pub(crate) async fn glimpse(&self, animation: &Animation) -> Result<Glimpse> {
         let key = animation.manifest();
         let read = self.persist(|| self.store.get_range(&key, 0..self.policy.glimpse)).await;
-        let Some(Object { info, body }) = found(read)? else { return Ok(Glimpse::Nothing) };
-        if info.size == body.len() as u64 {
-            let manifest = Manifest::decode(animation, &body)?;
-            return Ok(Glimpse::Whole(Known { manifest, etag: info.etag }));
+        let Some(object) = found(read)? else { return Ok(Glimpse::Nothing) };
+        if object.info.size == object.body.len() as u64 {
+            return Ok(Some(Known::of(animation, object)).into());
         }
-        match Beginning::decode(animation, &body)? {
-            Some(beginning) => Ok(Glimpse::Start { beginning, etag: info.etag, size: info.size }),
-            None => Ok(self.manifest(animation).await?.map_or(Glimpse::Nothing, Glimpse::Whole)),
+        match Beginning::decode(animation, &object.body) {
+            Ok(Some(beginning)) => {
+                Ok(Glimpse::Start { beginning, etag: object.info.etag, size: object.info.size })
+            }
+            Ok(None) | Err(_) => Ok(self.manifest(animation).await?.into()),
         }
     }
 
@@ -276,7 +313,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     /// it does not.
     pub(crate) async fn shows(&self, animation: &Animation, glimpse: &Glimpse, fact: &Fact) -> Result<bool> {
         let (beginning, etag, size) = match glimpse {
-            Glimpse::Nothing => return Ok(false),
+            Glimpse::Nothing | Glimpse::Unreadable(_) => return Ok(false),
             Glimpse::Whole(known) => return Ok(known.manifest.shows(fact)),
             Glimpse::Start { beginning, etag, size } => (beginning, etag, *size),
         };
@@ -287,7 +324,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let Some(lines) = found(self.persist(|| self.store.get_range(&key, range.clone())).await)? else {
             return Ok(false);
         };
-        Ok(lines.info.etag == *etag && fact.is_shown_by(&beginning.head, &frames_of(animation, &lines.body)?))
+        // Lines that cannot be read show nothing.
+        let frames = frames_of(animation, &lines.body).unwrap_or_default();
+        Ok(lines.info.etag == *etag && fact.is_shown_by(&beginning.head, &frames))
     }
 
     /// Whether this invocation, or an earlier attempt at the same event, wrote the manifest.

@@ -33,6 +33,9 @@ pub const SCRIPTS: &str = "scripts/";
 /// What the manifests' folder is called.
 pub const MANIFESTS: &str = "manifests/";
 
+/// What a lease's file is called. No receipt ends like this.
+const LEASE_FILE: &str = "@assembler.json";
+
 /// An animation's name: path segments joined by `/`, none of them empty, `.` or `..`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
@@ -93,10 +96,22 @@ pub enum Key {
         /// Which receipt.
         receipt: Receipt,
     },
+    /// `frames/<animation>/@assembler.json`: which invocation waits for the set to settle, or builds its GIF.
+    Lease {
+        /// The animation.
+        animation: Animation,
+    },
     /// `manifests/<animation>.json`
     Manifest {
         /// The animation.
         animation: Animation,
+    },
+    /// `manifests/<animation>.json~<version>`: a manifest that could not be read, set aside when it was made anew.
+    SetAside {
+        /// The animation.
+        animation: Animation,
+        /// The version that it had in its place.
+        version: ETag,
     },
     /// `assemblies/<animation>/<revision>-<generation>.json`
     Claim {
@@ -291,7 +306,9 @@ impl Key {
             | Key::Settings { animation }
             | Key::Part { animation, .. }
             | Key::Receipt { animation, .. }
+            | Key::Lease { animation }
             | Key::Manifest { animation }
+            | Key::SetAside { animation, .. }
             | Key::Claim { animation, .. }
             | Key::Retry { animation, .. }
             | Key::Gif { animation } => animation,
@@ -313,13 +330,23 @@ impl FromStr for Key {
                 let number = file.strip_suffix(".json").and_then(canonical).ok_or_else(unknown)?;
                 Key::Part { animation: Animation::new(animation)?, name, tag, number }
             }
+            "frames" if rest.ends_with(LEASE_FILE) => {
+                let animation = rest.strip_suffix(LEASE_FILE).and_then(|above| above.strip_suffix('/'));
+                Key::Lease { animation: Animation::new(animation.ok_or_else(unknown)?)? }
+            }
             "frames" => {
                 let (animation, receipt) = receipt(rest).ok_or_else(unknown)?;
                 Key::Receipt { animation: Animation::new(animation)?, receipt }
             }
             "manifests" => {
-                let animation = rest.strip_suffix(".json").ok_or_else(unknown)?;
-                Key::Manifest { animation: Animation::new(animation)? }
+                // An escaped version has no full stop, so that no key is both.
+                if let Some(animation) = rest.strip_suffix(".json") {
+                    Key::Manifest { animation: Animation::new(animation)? }
+                } else {
+                    let (animation, version) = rest.rsplit_once(".json~").ok_or_else(unknown)?;
+                    let version = unescape(version).ok_or_else(unknown)?;
+                    Key::SetAside { animation: Animation::new(animation)?, version }
+                }
             }
             "assemblies" => {
                 let (animation, file) = rest.rsplit_once('/').ok_or_else(unknown)?;
@@ -352,6 +379,18 @@ impl FromStr for Key {
             _ => return Err(unknown()),
         };
         Ok(key)
+    }
+}
+
+impl Receipt {
+    /// Whether it is about this version of a script, whatever drew it.
+    pub fn is_of(&self, script: &ScriptName, version: &ETag) -> bool {
+        match self {
+            Receipt::Frame { name, tag, .. }
+            | Receipt::Fault { name, tag, .. }
+            | Receipt::Split { name, tag, .. } => name == script && tag.version == *version,
+            Receipt::Refusal { .. } => false,
+        }
     }
 }
 
@@ -407,8 +446,10 @@ fn name_and_tag(text: &str) -> Option<(ScriptName, Tag)> {
 fn receipt(rest: &str) -> Option<(&str, Receipt)> {
     let (above, file) = rest.rsplit_once('/')?;
     if file.contains('@') {
-        if let Some(generation) = file.strip_prefix('@').and_then(|f| f.strip_suffix(".error.json")) {
-            return Some((above, Receipt::Refusal { generation: Generation::new(generation).ok()? }));
+        // A script's name may start with `@`, too; but what follows a generation is nothing more.
+        let refused = file.strip_prefix('@').and_then(|file| file.strip_suffix(".error.json"));
+        if let Some(generation) = refused.and_then(|text| Generation::new(text).ok()) {
+            return Some((above, Receipt::Refusal { generation }));
         }
         let receipt = if let Some(stem) = file.strip_suffix(".png") {
             let (name, tag) = name_and_tag(stem)?;
@@ -475,7 +516,11 @@ impl fmt::Display for Key {
                 write!(f, "parts/{animation}/{name}@{tag}/{number}.json")
             }
             Key::Receipt { animation, receipt } => f.write_str(&animation.receipt(receipt)),
+            Key::Lease { animation } => write!(f, "{}{LEASE_FILE}", animation.frames()),
             Key::Manifest { animation } => f.write_str(&animation.manifest()),
+            Key::SetAside { animation, version } => {
+                write!(f, "{}~{}", animation.manifest(), escape(version))
+            }
             Key::Claim { animation, revision, generation } => {
                 write!(f, "assemblies/{animation}/{revision}-{generation}.json")
             }

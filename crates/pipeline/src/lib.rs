@@ -11,6 +11,7 @@ pub mod fold;
 pub mod invariants;
 mod invocation;
 pub mod keys;
+mod lease;
 pub mod manifest;
 mod observe;
 pub mod reconcile;

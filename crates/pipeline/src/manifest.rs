@@ -6,11 +6,13 @@
 //! Its first line is the [`Head`], whose size does not grow with the number of frames; the frames follow, a line each,
 //! and the first line tells where.
 
+use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 
 use rayfold_scene::{AnimationSettings, Diagnostic, SETTINGS_FILE, parse_settings};
 use serde::{Deserialize, Serialize};
 
+use crate::Timestamp;
 use crate::keys::{Animation, Generation, Part, ScriptName};
 use crate::store::ETag;
 
@@ -23,6 +25,9 @@ pub const SCHEMA: u32 = 1;
 
 /// How many diagnostics of a script the manifest repeats; the receipt has more.
 pub const DIAGNOSTICS_SHOWN: usize = 3;
+
+/// The largest `animation.json` that is read: thousands of times what its fields need.
+pub const MOST_SETTINGS_BYTES: u64 = 64 * 1024;
 
 /// The manifest of an animation.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,6 +71,9 @@ pub struct Head {
     /// Why this generation gives no GIF though all its frames are there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refusal: Option<Fault>,
+    /// When a script was last found to be gone, by the clock of the function that found it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub removed_at: Option<Timestamp>,
     /// Every 1,000th script's name: where listings in ranges start.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub marks: Vec<ScriptName>,
@@ -217,6 +225,14 @@ impl Manifest {
         Some(parts.filter(|(_, state)| **state == FrameState::Pending).map(|(part, _)| part).collect())
     }
 
+    /// When a script was last found to be gone, if this manifest is written `now` over `before`.
+    pub(crate) fn removed_at(&self, before: Option<&Manifest>, now: Timestamp) -> Option<Timestamp> {
+        let before = before?;
+        let left: BTreeSet<&ScriptName> = self.frames.iter().map(|frame| &frame.script).collect();
+        let is_gone = before.frames.iter().any(|frame| !left.contains(&frame.script));
+        if is_gone { Some(now) } else { before.head.removed_at }
+    }
+
     /// Whether it shows the fact.
     pub fn shows(&self, fact: &Fact) -> bool {
         fact.is_shown_by(&self.head, &self.frames)
@@ -277,6 +293,12 @@ impl Settings {
         Settings { version: None, value: Some(AnimationSettings::default()), fault: None }
     }
 
+    /// Of an `animation.json` that is too large to be one.
+    pub fn too_large(version: ETag, size: u64) -> Self {
+        let message = format!("{SETTINGS_FILE} has {size} bytes: expected at most {MOST_SETTINGS_BYTES}");
+        Settings { version: Some(version), value: None, fault: Some(Reason::new(message)) }
+    }
+
     /// Reads `animation.json`.
     pub fn parse(version: ETag, body: &[u8]) -> Self {
         let parsed = parse_settings(SETTINGS_FILE, body);
@@ -289,6 +311,15 @@ impl Settings {
 }
 
 impl Reason {
+    /// Of an error receipt that cannot be read. The sweep deletes it, and has the frame drawn again.
+    pub const UNREADABLE: &str =
+        "the error receipt cannot be read: the frame is drawn again at the next sweep";
+
+    /// What an error receipt says.
+    pub(crate) fn of_receipt(body: &[u8]) -> Self {
+        serde_json::from_slice(body).unwrap_or_else(|_| Reason::new(Reason::UNREADABLE))
+    }
+
     /// A reason without diagnostics.
     pub fn new(message: impl Into<String>) -> Self {
         Reason { message: message.into(), diagnostics: Vec::new(), omitted: 0 }
@@ -375,4 +406,37 @@ pub fn part(number: u64) -> Part {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
 fn is_zero(number: &usize) -> bool {
     *number == 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reconcile::{Results, ScriptFound, Scripts, reconcile};
+
+    fn manifest(names: &[&str], removed_at: Option<u64>) -> Manifest {
+        let found = names.iter().map(|name| ScriptFound {
+            name: ScriptName::new(name).unwrap(),
+            version: ETag::new("v"),
+            modified: Timestamp(0),
+        });
+        let scripts = Scripts { found: found.collect(), rejected: Vec::new() };
+        let animation = Animation::new("film").unwrap();
+        let mut manifest = reconcile(&animation, &scripts, &Results::default(), &Settings::absent());
+        manifest.head.removed_at = removed_at.map(Timestamp);
+        manifest
+    }
+
+    #[test]
+    fn a_manifest_remembers_when_a_script_was_last_gone() {
+        let check = |before: Option<&Manifest>, names: &[&str], expected: Option<u64>| {
+            let next = manifest(names, None);
+            assert_eq!(next.removed_at(before, Timestamp(9)), expected.map(Timestamp), "{names:?}");
+        };
+        check(None, &["1"], None);
+        check(Some(&manifest(&["1", "2"], None)), &["1", "2", "3"], None);
+        check(Some(&manifest(&["1", "2"], None)), &["2", "3"], Some(9));
+        check(Some(&manifest(&["1", "2"], Some(4))), &["1", "2", "3"], Some(4));
+        check(Some(&manifest(&["1"], Some(4))), &[], Some(9));
+        assert!(manifest(&["1"], Some(4)).agrees_with(&manifest(&["1"], None)));
+    }
 }

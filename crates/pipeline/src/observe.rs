@@ -9,9 +9,9 @@ use futures_util::stream::{self, StreamExt, TryStreamExt};
 
 use crate::invocation::{Invocation, Known};
 use crate::keys::{Animation, Key, Part, Receipt, ScriptName, Tag};
-use crate::manifest::{Fault, FrameState, Manifest, Reason, Rejected, Settings};
+use crate::manifest::{Fault, FrameState, MOST_SETTINGS_BYTES, Manifest, Reason, Rejected, Settings};
 use crate::reconcile::{MARK_EVERY, ReceiptFound, Results, ScriptFound, Scripts, reconcile};
-use crate::store::{ETag, ListRequest, Listed, Listing, Store};
+use crate::store::{ETag, ListRequest, Listed, Listing, Object, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
 /// A listing of an animation and what it amounts to.
@@ -20,6 +20,8 @@ pub(crate) struct Observation {
     pub(crate) scripts: Scripts,
     pub(crate) results: Results,
     pub(crate) manifest: Manifest,
+    /// An assembler waits or builds, or died in it.
+    pub(crate) has_lease: bool,
 }
 
 impl Observation {
@@ -35,7 +37,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     pub(crate) async fn observe(&self, animation: &Animation, known: Option<&Known>) -> Result<Observation> {
         loop {
             let marks = known.map_or(&[][..], |known| &known.manifest.head.marks);
-            let (scripts, receipts) =
+            let (scripts, (receipts, has_lease)) =
                 try_join(self.list_scripts(animation, marks), self.list_receipts(animation, marks)).await?;
             let (scripts, settings) = scripts;
             let settings = self.settings(animation, settings, known).await?;
@@ -43,7 +45,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             self.add_parts(animation, &scripts, &mut results).await?;
             let mut manifest = reconcile(animation, &scripts, &results, &settings);
             if self.add_reasons(animation, &results, known, &mut manifest).await? {
-                return Ok(Observation { scripts, results, manifest });
+                return Ok(Observation { scripts, results, manifest, has_lease });
             }
         }
     }
@@ -71,10 +73,19 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok((scripts, settings))
     }
 
-    async fn list_receipts(&self, animation: &Animation, marks: &[ScriptName]) -> Result<Vec<ReceiptFound>> {
+    /// The receipts, and whether there is a lease among them.
+    async fn list_receipts(
+        &self,
+        animation: &Animation,
+        marks: &[ScriptName],
+    ) -> Result<(Vec<ReceiptFound>, bool)> {
         let prefix = animation.frames();
         let bounds = marks.iter().map(|name| format!("{prefix}{name}@")).collect();
-        Ok(self.list_level(prefix, bounds).await?.into_iter().filter_map(receipt).collect())
+        let listed = self.list_level(prefix, bounds).await?;
+        let lease = Key::Lease { animation: animation.clone() }.to_string();
+        let has_lease = listed.iter().any(|listed| listed.key == lease);
+        let receipts = listed.into_iter().filter_map(|listed| receipt(animation, listed)).collect();
+        Ok((receipts, has_lease))
     }
 
     /// The objects right below a prefix, the ranges between the bounds side by side.
@@ -112,8 +123,11 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         if let Some(known) = known.filter(|known| known.manifest.head.settings.version == Some(version)) {
             return Ok(known.manifest.head.settings.clone());
         }
-        Ok(match self.get(&animation.settings()).await? {
+        Ok(match self.get_start(&animation.settings(), MOST_SETTINGS_BYTES).await? {
             None => Settings::absent(),
+            Some(Object { info, .. }) if info.size > MOST_SETTINGS_BYTES => {
+                Settings::too_large(info.etag, info.size)
+            }
             Some(object) => Settings::parse(object.info.etag, &object.body),
         })
     }
@@ -145,7 +159,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let listings: Vec<_> = listings.collect();
         let listed: Vec<Vec<Listed>> =
             stream::iter(listings).buffered(self.policy.concurrency).try_collect().await?;
-        let parts = listed.into_iter().flatten().filter_map(receipt);
+        let parts = listed.into_iter().flatten().filter_map(|listed| receipt(animation, listed));
         results.receipts.extend(parts.filter(|found| match &found.receipt {
             Receipt::Frame { part, .. } | Receipt::Fault { part, .. } => part.is_some(),
             _ => false,
@@ -165,7 +179,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let listed = self.list_ranges(ListRequest::all(prefix), Vec::new()).await?;
         let there: BTreeSet<NonZeroU64> = listed
             .into_iter()
-            .filter_map(receipt)
+            .filter_map(|listed| receipt(animation, listed))
+            .filter(|found| found.receipt.is_of(name, version))
             .filter_map(|found| match found.receipt {
                 Receipt::Frame { part, .. } | Receipt::Fault { part, .. } => part,
                 _ => None,
@@ -210,7 +225,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         missing.dedup();
         let reads = missing.iter().filter_map(|etag| keys.get(etag)).map(|key| async move {
             let object = self.get(key).await?;
-            object.map(|object| Ok((object.info.etag, reason(key, &object.body)?))).transpose()
+            Ok::<_, Error>(object.map(|object| (object.info.etag, Reason::of_receipt(&object.body))))
         });
         let reads: Vec<_> = reads.collect();
         let read: Vec<Option<(ETag, Reason)>> =
@@ -226,18 +241,14 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 }
 
-fn receipt(listed: Listed) -> Option<ReceiptFound> {
+/// What an object in a listing of the animation's frames is a receipt of.
+fn receipt(animation: &Animation, listed: Listed) -> Option<ReceiptFound> {
     match listed.key.parse() {
-        Ok(Key::Receipt { receipt, .. }) => {
+        Ok(Key::Receipt { animation: of, receipt }) if of == *animation => {
             Some(ReceiptFound { receipt, etag: listed.etag, modified: listed.modified })
         }
         _ => None,
     }
-}
-
-fn reason(key: &str, body: &[u8]) -> Result<Reason> {
-    serde_json::from_slice(body)
-        .map_err(|source| Error::Malformed { key: key.to_owned(), source: source.into() })
 }
 
 fn faults(manifest: &Manifest) -> impl Iterator<Item = (&ETag, &Reason)> {
@@ -306,8 +317,10 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 ListRequest::all(format!("{frames}{name}@{tag}/{number}."))
             }
         };
-        let page = self.list(request).await?;
-        let receipts: Vec<ReceiptFound> = page.objects.into_iter().filter_map(receipt).collect();
+        let listed = self.list_ranges(request, Vec::new()).await?;
+        let receipts = listed.into_iter().filter_map(|listed| receipt(animation, listed));
+        // The receipts of a script that is called like this one's receipts start the same.
+        let receipts: Vec<_> = receipts.filter(|found| found.receipt.is_of(name, version)).collect();
         Ok(standing(&receipts, part))
     }
 }

@@ -24,6 +24,9 @@ use crate::{Clock, Error, Result, Timestamp};
 
 /// What draws. The render function brings a ray tracer, the simulation something smaller.
 pub trait Renderer: Send + Sync {
+    /// How large a script may be. Of a larger one no more than the first bytes are read, one more than these.
+    fn most_bytes(&self) -> u64;
+
     /// Draws the script's one frame (`part` is `None`) or one of several.
     ///
     /// # Errors
@@ -157,7 +160,9 @@ impl Subject {
             }
             Key::Settings { .. }
             | Key::Receipt { .. }
+            | Key::Lease { .. }
             | Key::Manifest { .. }
+            | Key::SetAside { .. }
             | Key::Claim { .. }
             | Key::Gif { .. } => None,
         }
@@ -199,7 +204,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     async fn render<R: Renderer>(&self, renderer: &R, subject: Subject) -> Result<Rendered> {
         let mut stages = Stages::default();
         let start = self.clock.now();
-        let script = self.get(&subject.animation.script(&subject.name)).await?;
+        let key = subject.animation.script(&subject.name);
+        let script = self.get_start(&key, renderer.most_bytes()).await?;
         let (outcome, fact) = match subject.due(script) {
             Due::Nothing(outcome, fact) => (outcome, fact),
             Due::Version(script) => match self.standing_of(&subject, &script.version).await? {
@@ -351,7 +357,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             self.wake_lost_parts(&animation, &name, &tag, count, uploaded).await?;
         }
         let fact = Fact::Split(name.clone(), tag.version);
-        let glimpse = known.map_or(Glimpse::Nothing, Glimpse::Whole);
+        let glimpse = Glimpse::from(known);
         let folded = self.fold_from(&animation, &fact, Age::Old, glimpse).await?;
         stages.fold = self.clock.now().since(start);
         Ok(Rendered { animation, script: Some(name), outcome: Outcome::Present, folded, stages })

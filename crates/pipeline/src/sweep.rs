@@ -14,7 +14,7 @@ use futures_util::stream::{self, StreamExt, TryStreamExt};
 use crate::assemble::{Due, due};
 use crate::invocation::{Invocation, Known};
 use crate::keys::{Animation, Key, MANIFESTS, Part, Receipt, SCRIPTS, ScriptName, Tag};
-use crate::manifest::{Frame, FrameState, Manifest, Reason, Status};
+use crate::manifest::{Fault, Frame, FrameState, Manifest, Reason, Status};
 use crate::observe::Observation;
 use crate::reconcile::ReceiptFound;
 use crate::store::{ETag, ListRequest, Listed, Store};
@@ -129,12 +129,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let observation = self.observe(animation, known.as_ref()).await?;
         let mut visit = Visit::default();
         self.wake(animation, &observation, &mut visit).await?;
+        let is_healed = self.heal_receipts(animation, &observation, &mut visit).await?;
         let head = &observation.manifest.head;
         let manifest_differs =
             !known.as_ref().is_some_and(|known| known.manifest.agrees_with(&observation.manifest));
         let gif_differs = due(head, gif.as_ref()) != Due::Nothing;
         let nothing_at_all = known.is_none() && head.status == Status::Empty && gif.is_none();
-        if (manifest_differs || gif_differs || visit.given_up > 0) && !nothing_at_all {
+        if (manifest_differs || gif_differs || is_healed || visit.given_up > 0) && !nothing_at_all {
             self.claim(&claimable(&observation.manifest, known.as_ref())).await?;
             visit.claimed = true;
         }
@@ -193,6 +194,44 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
         self.put_retry(animation, &frame.script, tag, frame.part, attempts + 1).await?;
         Ok(Step::Woken)
+    }
+
+    /// Deletes error receipts that cannot be read, and has their frames drawn again; says whether there were any.
+    async fn heal_receipts(
+        &self,
+        animation: &Animation,
+        observation: &Observation,
+        visit: &mut Visit,
+    ) -> Result<bool> {
+        let manifest = &observation.manifest;
+        let is_unreadable =
+            |fault: &Fault| fault.reason.as_ref().is_some_and(|reason| reason.message == Reason::UNREADABLE);
+        let faults = manifest.frames.iter().filter_map(|frame| match &frame.state {
+            FrameState::Failed(fault) if is_unreadable(fault) => Some((Some(frame), fault)),
+            FrameState::Failed(_) | FrameState::Pending | FrameState::Done { .. } => None,
+        });
+        let refusal = manifest.head.refusal.iter().filter(|fault| is_unreadable(fault));
+        let faults: Vec<_> = faults.chain(refusal.map(|fault| (None, fault))).collect();
+        for (frame, fault) in &faults {
+            let is_it = |found: &&ReceiptFound| match (&found.receipt, frame) {
+                (Receipt::Fault { name, tag, part }, Some(frame)) => {
+                    (name, &tag.version, part) == (&frame.script, &frame.version, &frame.part)
+                }
+                (Receipt::Refusal { generation }, None) => *generation == manifest.head.generation,
+                _ => false,
+            };
+            let receipts = observation.results.receipts.iter().filter(is_it);
+            for found in receipts.filter(|found| found.etag == fault.receipt) {
+                self.delete(&animation.receipt(&found.receipt)).await?;
+                visit.deleted += 1;
+            }
+            if let Some(frame) = frame {
+                let tag = Tag { version: frame.version.clone(), pixels: self.policy.pixels };
+                self.put_retry(animation, &frame.script, tag, frame.part, 1).await?;
+                visit.woken += 1;
+            }
+        }
+        Ok(!faults.is_empty())
     }
 
     /// Wakes an invocation for a frame.
@@ -272,7 +311,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 }
             }
         }
-        visit.deleted = doomed.len() as u64;
+        visit.deleted += doomed.len() as u64;
         let deletions: Vec<_> =
             doomed.iter().map(|key| async { self.delete(&key.to_string()).await }).collect();
         stream::iter(deletions).buffer_unordered(self.policy.concurrency).try_collect::<Vec<()>>().await?;

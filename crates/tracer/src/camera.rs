@@ -1,11 +1,12 @@
 //! From pixel to ray.
 //!
-//! The only place that knows how the language numbers its pixels (i from the left, j from the bottom, samples on the
-//! window's corners) and where their rays start.
+//! How the language numbers its pixels (i from the left, j from the bottom, samples on the window's corners) is written
+//! here, once: for the plain tracer, for the packets and for whoever asks where the ray of a pixel goes. Between two
+//! pixels lies a fraction: column `i + dx` and row `j + dy` have a ray like any other.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayfold_scene::model::unit;
-use rayfold_scene::{Camera, Screen};
+use rayfold_scene::{Camera, Scene, Screen};
 
 use crate::scale::below_inverse;
 
@@ -14,6 +15,51 @@ use crate::scale::below_inverse;
 pub(crate) struct Ray {
     pub(crate) origin: DVec3,
     pub(crate) direction: DVec3,
+}
+
+/// Where the samples of an image lie along one of its axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Axis {
+    pub(crate) start: f64,
+    /// From one sample to the next; 0 if there is only one.
+    pub(crate) step: f64,
+}
+
+impl Axis {
+    /// From the first of so many samples to the last; a single one lies in the middle.
+    fn between(from: f64, to: f64, samples: u32) -> Self {
+        if samples == 1 {
+            Self { start: 0.5 * from + 0.5 * to, step: 0.0 }
+        } else {
+            Self { start: from, step: (to - from) / f64::from(samples - 1) }
+        }
+    }
+
+    /// Where a sample lies; `index` counts from the first and may be a fraction.
+    pub(crate) fn at(self, index: f64) -> f64 {
+        self.start + self.step * index
+    }
+
+    /// The same counted from the other end of so many samples.
+    pub(crate) fn reversed(self, samples: u32) -> Self {
+        Self { start: self.at(f64::from(samples - 1)), step: -self.step }
+    }
+}
+
+/// The samples of an image in a window from its lower left to its upper right corner: the columns from the left, the rows
+/// from the bottom.
+pub(crate) fn grid(lower_left: DVec2, upper_right: DVec2, screen: Screen) -> (Axis, Axis) {
+    (
+        Axis::between(lower_left.x, upper_right.x, screen.width()),
+        Axis::between(lower_left.y, upper_right.y, screen.height()),
+    )
+}
+
+/// The ray of column `i` from the left and row `j` from the bottom, which may be fractions: its origin, and its direction
+/// of length 1.
+pub fn pixel_ray(scene: &Scene, i: f64, j: f64) -> (DVec3, DVec3) {
+    let Ray { origin, direction } = Rays::new(&scene.camera, scene.screen).ray(i, j);
+    (origin, direction)
 }
 
 /// The rays of a camera's pixels.
@@ -37,26 +83,17 @@ impl Rays {
         let (a, b, distance) = (pinhole.lower_left(), pinhole.upper_right(), pinhole.distance());
         let scale = below_inverse(a.abs().max(b.abs()).max_element().max(distance));
         let (a, b, distance) = (a * scale, b * scale, (distance * scale).max(f64::MIN_POSITIVE));
-        let axis = |from: f64, to: f64, samples: u32| {
-            if samples == 1 {
-                (0.5 * from + 0.5 * to, 0.0)
-            } else {
-                (from, (to - from) / f64::from(samples - 1))
-            }
-        };
-        let (u0, du) = axis(a.x, b.x, screen.width());
-        let (v0, dv) = axis(a.y, b.y, screen.height());
+        let (x, y) = grid(a, b, screen);
         Self::Pinhole {
             eye: pinhole.eye(),
-            corner: u0 * u + v0 * v - distance * w,
-            right: du * u,
-            up: dv * v,
+            corner: x.start * u + y.start * v - distance * w,
+            right: x.step * u,
+            up: y.step * v,
         }
     }
 
-    /// The ray of column `i` from the left and row `j` from the bottom.
-    pub(crate) fn ray(&self, i: u32, j: u32) -> Ray {
-        let (i, j) = (f64::from(i), f64::from(j));
+    /// The ray of column `i` from the left and row `j` from the bottom, which may be fractions.
+    pub(crate) fn ray(&self, i: f64, j: f64) -> Ray {
         match *self {
             Self::Parallel => Ray { origin: DVec3::new(i, j, 0.0), direction: DVec3::NEG_Z },
             Self::Pinhole { eye, corner, right, up } => {
@@ -82,16 +119,26 @@ mod tests {
     fn samples_sit_on_the_corners_of_the_window() {
         let screen = Screen::new(3, 2).unwrap();
         let rays = Rays::new(&pinhole(DVec2::new(-1.0, -2.0), DVec2::new(1.0, 2.0)), screen);
-        assert_eq!(rays.ray(0, 0).direction, unit(DVec3::new(-1.0, -2.0, -1.0)));
-        assert_eq!(rays.ray(2, 1).direction, unit(DVec3::new(1.0, 2.0, -1.0)));
-        assert_eq!(rays.ray(1, 1).direction, unit(DVec3::new(0.0, 2.0, -1.0)));
+        assert_eq!(rays.ray(0.0, 0.0).direction, unit(DVec3::new(-1.0, -2.0, -1.0)));
+        assert_eq!(rays.ray(2.0, 1.0).direction, unit(DVec3::new(1.0, 2.0, -1.0)));
+        assert_eq!(rays.ray(1.0, 1.0).direction, unit(DVec3::new(0.0, 2.0, -1.0)));
+    }
+
+    #[test]
+    fn between_two_pixels_lie_fractions() {
+        let screen = Screen::new(3, 2).unwrap();
+        let rays = Rays::new(&pinhole(DVec2::new(-1.0, -2.0), DVec2::new(1.0, 2.0)), screen);
+        assert_eq!(rays.ray(1.5, 0.25).direction, unit(DVec3::new(0.5, -1.0, -1.0)));
+        assert_eq!(rays.ray(-0.5, 1.5).direction, unit(DVec3::new(-1.5, 4.0, -1.0)));
+        let parallel = Rays::new(&Camera::Orthographic, screen);
+        assert_eq!(parallel.ray(1.5, 0.25).origin, DVec3::new(1.5, 0.25, 0.0));
     }
 
     #[test]
     fn a_single_sample_is_the_middle() {
         let rays =
             Rays::new(&pinhole(DVec2::new(1.0, 3.0), DVec2::new(2.0, 5.0)), Screen::new(1, 1).unwrap());
-        assert_eq!(rays.ray(0, 0).direction, unit(DVec3::new(1.5, 4.0, -1.0)));
+        assert_eq!(rays.ray(0.0, 0.0).direction, unit(DVec3::new(1.5, 4.0, -1.0)));
     }
 
     #[test]
@@ -101,8 +148,8 @@ mod tests {
             let half = DVec2::splat(half);
             let camera = Pinhole::new(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, distance, -half, half).unwrap();
             let rays = Rays::new(&Camera::Pinhole(camera), screen);
-            assert_eq!(rays.ray(1, 1).direction, DVec3::NEG_Z);
-            let corner = rays.ray(2, 2).direction;
+            assert_eq!(rays.ray(1.0, 1.0).direction, DVec3::NEG_Z);
+            let corner = rays.ray(2.0, 2.0).direction;
             assert!((corner.truncate() - expected.normalize_or_zero()).length() < 1e-15, "{corner}");
         }
     }
@@ -111,6 +158,6 @@ mod tests {
     fn swapped_corners_mirror_the_image() {
         let screen = Screen::new(2, 2).unwrap();
         let rays = Rays::new(&pinhole(DVec2::new(1.0, -1.0), DVec2::new(-1.0, 1.0)), screen);
-        assert!(rays.ray(0, 0).direction.x > 0.0 && rays.ray(1, 0).direction.x < 0.0);
+        assert!(rays.ray(0.0, 0.0).direction.x > 0.0 && rays.ray(1.0, 0.0).direction.x < 0.0);
     }
 }

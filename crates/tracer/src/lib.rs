@@ -24,6 +24,7 @@ mod parallel;
 pub mod reference;
 mod scale;
 
+pub use camera::pixel_ray;
 pub use fast::{Drawing, probe};
 #[cfg(feature = "accuracy")]
 pub use nans::take as take_nans;

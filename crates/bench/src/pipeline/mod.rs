@@ -1,8 +1,8 @@
-//! `rayfold-bench pipeline`: the paper's table on MinIO and the local invoker.
+//! `rayfold-bench pipeline`: the paper's table on the local invoker and the store built in, or MinIO.
 //!
 //! For each scene and each number of invocations at once: the GIF made by the assemble function, with cold and with warm
 //! processes, and the GIF made here from fetched frames; and every frame drawn one after the other, without a GIF.
-//! Uploads go through the store, events through MinIO's webhook, and the function binaries are the ones that ship.
+//! Uploads go through the store, events through its webhook, and the function binaries are the ones that ship.
 
 mod report;
 mod run;
@@ -12,7 +12,8 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow};
-use rayfold_local::{Functions, Plan, Platform};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use rayfold_local::{Functions, Plan, Platform, StoreKind};
 use rayfold_scene::{Limits, parse};
 use rayfold_tracer::{RenderOptions, render};
 
@@ -21,7 +22,10 @@ use run::{Compiled, Folder, Run};
 /// What to measure.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that receives pipeline.md and its plot
+    /// What keeps the bucket
+    #[arg(long, value_name = "STORE", default_value = StoreKind::BuiltIn.name(), value_parser = stores())]
+    store: StoreKind,
+    /// The folder that receives pipeline.md and its plot, or pipeline-minio.md
     #[arg(long, default_value = "docs/reports")]
     output: PathBuf,
     /// The folder with the scenes
@@ -30,6 +34,11 @@ pub struct Args {
     /// Only these scenes
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
+}
+
+fn stores() -> impl TypedValueParser<Value = StoreKind> {
+    PossibleValuesParser::new(StoreKind::ALL.map(StoreKind::name))
+        .map(|name| StoreKind::named(&name).unwrap_or_default())
 }
 
 /// As the paper names them, in its order, with its seconds: at 10 invocations compiled locally and in the cloud, at 5
@@ -65,21 +74,27 @@ pub(crate) struct Runs {
 /// Measures and writes the report.
 ///
 /// # Errors
-/// When MinIO or the functions cannot be started, an animation fails, or the report cannot be written.
+/// When the store or the functions cannot be started, an animation fails, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     std::fs::create_dir_all(&args.output)?;
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let scenes = runtime.block_on(measure(args))?;
-    timeline::plot(&args.output.join("pipeline-timeline.svg"), scenes.last().context("no scene")?)?;
-    let path = args.output.join("pipeline.md");
-    std::fs::write(&path, report::text(&scenes, load.trim())?).with_context(|| path.display().to_string())
+    let name = match args.store {
+        StoreKind::BuiltIn => "pipeline",
+        StoreKind::Minio => "pipeline-minio",
+    };
+    let plot = format!("{name}-timeline.svg");
+    timeline::plot(&args.output.join(&plot), scenes.last().context("no scene")?)?;
+    let path = args.output.join(format!("{name}.md"));
+    std::fs::write(&path, report::text(args.store, &scenes, load.trim(), &plot)?)
+        .with_context(|| path.display().to_string())
 }
 
 async fn measure(args: &Args) -> Result<Vec<Scene>> {
     let functions = Functions::locate(&mut |line| eprintln!("{line}"))?;
     let data = tempfile::tempdir()?;
-    let plan = Plan::new(data.path(), functions);
+    let plan = Plan::new(args.store, data.path(), functions);
     let settings = |settings: &mut rayfold_local::invoker::Settings| settings.sweep_every = None;
     let mut platform = Platform::start(&plan, settings, &mut |line| eprintln!("{line}")).await?;
     let mut scenes = Vec::new();
@@ -109,7 +124,7 @@ async fn measure(args: &Args) -> Result<Vec<Scene>> {
         let sequential = sequential(&folder)?;
         scenes.push(Scene { folder, paper, runs, sequential });
     }
-    platform.stop_invoker().await;
+    platform.stop().await;
     Ok(scenes)
 }
 

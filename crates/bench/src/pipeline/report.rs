@@ -3,20 +3,25 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
+use rayfold_local::StoreKind;
 use rayfold_local::routes::Function;
 
 use super::{AT_ONCE, Run, Scene};
 
-pub(super) fn text(scenes: &[Scene], load: &str) -> Result<String> {
+pub(super) fn text(store: StoreKind, scenes: &[Scene], load: &str, plot: &str) -> Result<String> {
     let mut page = String::new();
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let (flag, other, of_store) = match store {
+        StoreKind::BuiltIn => ("", " ([on MinIO](pipeline-minio.md))", "The store"),
+        StoreKind::Minio => (" --store minio", " ([on the store built in](pipeline.md))", "MinIO"),
+    };
     writeln!(
         page,
-        "# Pipeline\n\n\
-         Written by `cargo run --release -p rayfold-bench -- pipeline`; all figures are of one run, on {threads} \
-         processors and with a load of {load} (`/proc/loadavg`) when it began: what else runs on the machine counts in \
-         every time below.\n\n\
-         MinIO, the local invoker, the uploads and the functions share the machine. The paper's seconds are of its \
+        "# Pipeline on {store}\n\n\
+         Written by `cargo run --release -p rayfold-bench -- pipeline{flag}`{other}; all figures are of one run, on \
+         {threads} processors and with a load of {load} (`/proc/loadavg`) when it began: what else runs on the machine \
+         counts in every time below.\n\n\
+         {of_store}, the local invoker, the uploads and the functions share the machine. The paper's seconds are of its \
          figure 4: up to ten ray tracers on machines of their own, images of 1024 x 1024, another renderer; our scenes \
          are drawn after its names, object counts and frame counts, so the rows can be read side by side, not divided.\n\n\
          ## Seconds from the first upload to the GIF\n\n\
@@ -84,7 +89,7 @@ pub(super) fn text(scenes: &[Scene], load: &str) -> Result<String> {
         writeln!(page, "| {scene} | {at_once} | {label} | {cells} | {billed:.2} | {starts} | {init:.1} |")
             .map_err(Into::into)
     })?;
-    writeln!(page, "\n## Who worked when\n\n![a row a process, a bar an invocation](pipeline-timeline.svg)")?;
+    writeln!(page, "\n## Who worked when\n\n![a row a process, a bar an invocation]({plot})")?;
     writeln!(page, "\nBlue is the render function, orange the assemble function.")?;
     Ok(page)
 }

@@ -2,9 +2,11 @@
 //!
 //! Everything but a copy's source and the keys of a multi-delete is known before the operation's input is read.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 use std::time::SystemTime;
 
+use hyper::http::Extensions;
 use s3s::access::{S3Access, S3AccessContext};
 use s3s::dto::{CopyObjectInput, CopySource, DeleteObjectsInput, UploadPartCopyInput};
 use s3s::path::S3Path;
@@ -20,22 +22,23 @@ const TOKEN: &str = "x-amz-security-token";
 /// Asks the identities at each request.
 pub(crate) struct Access(pub(crate) Identities);
 
-/// The keys of a multi-delete that the caller may not delete; they were taken out of the request.
+/// The keys of a multi-delete that the caller may not delete.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct DeniedKeys(pub(crate) Vec<String>);
+pub(crate) struct DeniedKeys(pub(crate) HashSet<String>);
 
-/// What to answer where there is no object: whoever may not list the bucket is not told that it is absent.
-pub(crate) fn absent(extensions: &hyper::http::Extensions, bucket: &str) -> S3Error {
-    let may_list = extensions.get::<Arc<Session>>().is_none_or(|session| {
-        let resource = arn(bucket, None);
-        let list =
-            policy::Access { action: "s3:ListBucket", resource: &resource, prefix: None, delimiter: None };
-        session.policy.verdict(&list) == Verdict::Allowed
-    });
-    if may_list {
-        s3_error!(NoSuchKey, "The specified key does not exist.")
-    } else {
-        s3_error!(AccessDenied, "Access Denied")
+/// The caller may not list the bucket that is read from.
+#[derive(Clone, Copy)]
+struct MayNotList;
+
+/// Whoever may not list a bucket is not told that an object is absent, but what S3 says of one that is there: no.
+pub(crate) fn discreetly(extensions: &Extensions) -> impl Fn(S3Error) -> S3Error + use<> {
+    let may_list = extensions.get::<MayNotList>().is_none();
+    move |error| {
+        if may_list || *error.code() != S3ErrorCode::NoSuchKey {
+            error
+        } else {
+            s3_error!(AccessDenied, "Access Denied")
+        }
     }
 }
 
@@ -71,45 +74,54 @@ impl S3Access for Access {
             }
             // A canned list of who may do what is a right of its own.
             if cx.headers().contains_key("x-amz-acl") && scope == Scope::Object {
-                ask(&session, &on_object("s3:PutObjectAcl", &resource))?;
+                ask(&session, &plainly("s3:PutObjectAcl", &resource))?;
             }
+        }
+        if let Some(bucket) = cx.s3_path().get_bucket_name().map(str::to_owned) {
+            note_listing(&session, &bucket, cx.extensions_mut());
         }
         cx.extensions_mut().insert(session);
         Ok(())
     }
 
     async fn copy_object(&self, req: &mut S3Request<CopyObjectInput>) -> S3Result<()> {
-        may_read(&req.extensions, &req.input.copy_source)
+        may_read(&mut req.extensions, &req.input.copy_source)
     }
 
     async fn upload_part_copy(&self, req: &mut S3Request<UploadPartCopyInput>) -> S3Result<()> {
-        may_read(&req.extensions, &req.input.copy_source)
+        may_read(&mut req.extensions, &req.input.copy_source)
     }
 
     async fn delete_objects(&self, req: &mut S3Request<DeleteObjectsInput>) -> S3Result<()> {
         let Some(session) = req.extensions.get::<Arc<Session>>().cloned() else { return Ok(()) };
-        let mut denied = DeniedKeys::default();
-        let bucket = req.input.bucket.clone();
-        req.input.delete.objects.retain(|object| {
-            let resource = arn(&bucket, Some(&object.key));
-            let may = session.policy.verdict(&on_object("s3:DeleteObject", &resource)) == Verdict::Allowed;
-            if !may {
-                denied.0.push(object.key.clone());
-            }
-            may
-        });
+        let is_denied = |key: &&str| {
+            let resource = arn(&req.input.bucket, Some(key));
+            session.policy.verdict(&plainly("s3:DeleteObject", &resource)) != Verdict::Allowed
+        };
+        let keys = req.input.delete.objects.iter().map(|object| object.key.as_str());
+        let denied = DeniedKeys(keys.filter(is_denied).map(str::to_owned).collect());
         req.extensions.insert(denied);
         Ok(())
     }
 }
 
-fn may_read(extensions: &hyper::http::Extensions, source: &CopySource) -> S3Result<()> {
-    let Some(session) = extensions.get::<Arc<Session>>() else { return Ok(()) };
+fn may_read(extensions: &mut Extensions, source: &CopySource) -> S3Result<()> {
+    let Some(session) = extensions.get::<Arc<Session>>().cloned() else { return Ok(()) };
     match source {
         CopySource::Bucket { bucket, key, .. } => {
-            ask(session, &on_object("s3:GetObject", &arn(bucket, Some(key))))
+            note_listing(&session, bucket, extensions);
+            ask(&session, &plainly("s3:GetObject", &arn(bucket, Some(key))))
         }
-        _ => Err(denied(session, "s3:GetObject", "its source is no bucket of this store")),
+        _ => Err(denied(&session, "s3:GetObject", "its source is no bucket of this store")),
+    }
+}
+
+/// For [`discreetly`].
+fn note_listing(session: &Session, bucket: &str, extensions: &mut Extensions) {
+    let resource = arn(bucket, None);
+    match session.policy.verdict(&plainly("s3:ListBucket", &resource)) {
+        Verdict::Allowed => drop(extensions.remove::<MayNotList>()),
+        Verdict::Denied | Verdict::NotAllowed => drop(extensions.insert(MayNotList)),
     }
 }
 
@@ -126,7 +138,8 @@ fn denied(session: &Session, action: &str, why: &str) -> S3Error {
     S3Error::with_message(S3ErrorCode::AccessDenied, message)
 }
 
-fn on_object<'a>(action: &'a str, resource: &'a str) -> policy::Access<'a> {
+/// Without what only a listing asks for.
+fn plainly<'a>(action: &'a str, resource: &'a str) -> policy::Access<'a> {
     policy::Access { action, resource, prefix: None, delimiter: None }
 }
 

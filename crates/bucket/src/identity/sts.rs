@@ -2,16 +2,14 @@
 //!
 //! There are no roles with policies of their own here, so the request's `Policy` alone says what the session may do, and it
 //! is required. Answers and errors have STS's shape (the Query protocol of 2011-06-15), also for requests whose signature
-//! is wrong, which are refused before they come here ([`StsErrors`]).
+//! is wrong, which are refused before they come here ([`in_sts_shape`]).
 
 use std::time::{Duration, SystemTime};
 
 use http_body_util::{BodyExt, Limited};
-use hyper::body::Incoming;
 use hyper::header::{CONTENT_LENGTH, CONTENT_TYPE, HeaderValue};
 use hyper::http::Extensions;
-use hyper::service::Service;
-use hyper::{HeaderMap, Method, Request, Response, StatusCode, Uri};
+use hyper::{HeaderMap, Method, Response, StatusCode, Uri};
 use s3s::dto::{Timestamp, TimestampFormat};
 use s3s::route::S3Route;
 use s3s::{Body, HttpError, S3Request, S3Response, S3Result};
@@ -229,7 +227,8 @@ impl S3Route for AssumeRole {
     }
 }
 
-fn is_for_sts(method: &Method, uri: &Uri, headers: &HeaderMap) -> bool {
+/// Is this a form for STS, and no request of S3?
+pub(crate) fn is_for_sts(method: &Method, uri: &Uri, headers: &HeaderMap) -> bool {
     let is_form = |value: &HeaderValue| {
         value.to_str().is_ok_and(|text| text.split(';').next().is_some_and(|kind| kind.trim() == FORM))
     };
@@ -276,30 +275,14 @@ fn code_of(of_s3: &str) -> &str {
     }
 }
 
-/// Around the S3 service: requests that are meant for STS and fail before they reach it get errors in its shape.
-#[derive(Clone)]
-pub(crate) struct StsErrors<S>(pub(crate) S);
-
-impl<S> Service<Request<Incoming>> for StsErrors<S>
-where
-    S: Service<Request<Incoming>, Response = Response<Body>, Error = HttpError>,
-    S::Future: Send + 'static,
-{
-    type Response = Response<Body>;
-    type Error = HttpError;
-    type Future = std::pin::Pin<Box<dyn Future<Output = Result<Self::Response, Self::Error>> + Send>>;
-
-    fn call(&self, request: Request<Incoming>) -> Self::Future {
-        let for_sts = is_for_sts(request.method(), request.uri(), request.headers());
-        let answer = self.0.call(request);
-        Box::pin(async move {
-            let answer = answer.await?;
-            if for_sts && answer.status().is_client_error() { reshaped(answer).await } else { Ok(answer) }
-        })
+/// An answer to a request that is meant for STS: when it was refused before it came here, in S3's words, in STS's.
+///
+/// # Errors
+/// When the answer's body cannot be read.
+pub(crate) async fn in_sts_shape(answer: Response<Body>) -> Result<Response<Body>, HttpError> {
+    if !answer.status().is_client_error() {
+        return Ok(answer);
     }
-}
-
-async fn reshaped(answer: Response<Body>) -> Result<Response<Body>, HttpError> {
     let (mut parts, body) = answer.into_parts();
     let text = body.collect().await.map_err(HttpError::new)?.to_bytes();
     let text = String::from_utf8_lossy(&text);

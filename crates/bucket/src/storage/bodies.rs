@@ -1,13 +1,15 @@
 //! Bodies that are files: too large for the database, each under an id that is never used again.
 //!
 //! A body is written and synced before any row refers to it, and its file goes after the last row that did. A kill in
-//! between leaves files that belong to nobody; [`Bodies::collect`] removes those of earlier runs.
+//! between leaves files that belong to nobody; [`Bodies::collect`] removes those of earlier runs. Whoever reads a body pins
+//! it first: a pinned file outlives its row until the reading ends.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +37,21 @@ pub(crate) struct Bodies {
     folder: PathBuf,
     run: u64,
     next: AtomicU64,
+    pins: Mutex<BTreeMap<BodyId, Pinned>>,
+}
+
+/// How many read a body, and whether its row is gone.
+#[derive(Debug, Default)]
+struct Pinned {
+    readers: usize,
+    doomed: bool,
+}
+
+/// Bodies that stay while this lives.
+#[derive(Debug)]
+pub(crate) struct Pins {
+    bodies: Arc<Bodies>,
+    ids: Vec<BodyId>,
 }
 
 /// A body's file until a row refers to it: it goes when dropped.
@@ -48,7 +65,7 @@ pub(crate) struct NewBody {
 
 impl Bodies {
     pub(super) fn new(folder: PathBuf, run: u64) -> Self {
-        Self { folder, run, next: AtomicU64::new(0) }
+        Self { folder, run, next: AtomicU64::new(0), pins: Mutex::default() }
     }
 
     /// A fresh id.
@@ -82,8 +99,28 @@ impl Bodies {
         Ok(NewBody { id, path, file: Some(file), kept: false })
     }
 
-    /// Removes a file that no row refers to. One that cannot be removed now is found at the next start.
+    /// Keeps these files, if they are still there, while the pins live. Rows that are read after this and refer to them
+    /// prove that they are.
+    pub(crate) fn pin(self: &Arc<Self>, ids: Vec<BodyId>) -> Pins {
+        let mut pins = self.pins();
+        for id in &ids {
+            pins.entry(*id).or_default().readers += 1;
+        }
+        drop(pins);
+        Pins { bodies: self.clone(), ids }
+    }
+
+    fn pins(&self) -> MutexGuard<'_, BTreeMap<BodyId, Pinned>> {
+        self.pins.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Removes a file that no row refers to, when nobody reads it any more. One that cannot be removed now is found at the
+    /// next start.
     pub(super) fn remove(&self, id: BodyId) {
+        if let Some(pinned) = self.pins().get_mut(&id) {
+            pinned.doomed = true;
+            return;
+        }
         let _ = fs::remove_file(self.path(id));
     }
 
@@ -153,6 +190,19 @@ impl NewBody {
     }
 }
 
+impl Drop for Pins {
+    fn drop(&mut self) {
+        let mut pins = self.bodies.pins();
+        for id in &self.ids {
+            let Some(pinned) = pins.get_mut(id) else { continue };
+            pinned.readers -= 1;
+            if pinned.readers == 0 && pins.remove(id).is_some_and(|pinned| pinned.doomed) {
+                let _ = fs::remove_file(self.bodies.path(*id));
+            }
+        }
+    }
+}
+
 impl Drop for NewBody {
     fn drop(&mut self) {
         if !self.kept {
@@ -199,6 +249,22 @@ mod tests {
         assert!(path.exists());
         drop(body);
         assert!(!path.exists());
+    }
+
+    #[test]
+    fn a_body_that_is_read_outlives_its_row() {
+        let folder = tempfile::tempdir().unwrap();
+        let bodies = Arc::new(Bodies::new(folder.path().to_owned(), 1));
+        let id = written(&bodies);
+        let (first, second) = (bodies.pin(vec![id]), bodies.pin(vec![id]));
+        drop(first);
+        bodies.remove(id);
+        assert!(bodies.path(id).exists());
+        drop(second);
+        assert!(!bodies.path(id).exists());
+        let kept = written(&bodies);
+        drop(bodies.pin(vec![kept]));
+        assert!(bodies.path(kept).exists());
     }
 
     #[test]

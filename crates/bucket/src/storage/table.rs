@@ -77,7 +77,7 @@ impl Table {
 /// Rows, wherever they are read.
 pub(crate) trait View {
     #[doc(hidden)]
-    type Opened: ReadableTable<&'static [u8], &'static [u8]>;
+    type Opened: ReadableTable<&'static [u8], &'static [u8]> + redb::ReadableTableMetadata;
 
     #[doc(hidden)]
     fn opened(&self, table: Table) -> &Self::Opened;
@@ -107,10 +107,10 @@ pub(crate) trait View {
         Ok(rows.take_while(move |row| row.as_ref().map_or(true, |(key, _)| key.starts_with(prefix))))
     }
 
-    /// The row with the last key.
-    fn last(&self, table: Table) -> Result<Option<Row>, StorageError> {
-        let last = self.opened(table).last()?;
-        Ok(last.map(|(key, value)| (key.value().to_vec(), value.value().to_vec())))
+    /// How many rows there are.
+    fn count(&self, table: Table) -> Result<u64, StorageError> {
+        use redb::ReadableTableMetadata;
+        self.opened(table).len()
     }
 }
 
@@ -233,7 +233,10 @@ fn note(changes: &mut Vec<u8>, table: Table, key: &[u8], value: Option<&[u8]>) {
     changes.extend(value.unwrap_or_default());
 }
 
-fn noted<'a>(changes: &mut &'a [u8]) -> Option<(Table, &'a [u8], Option<&'a [u8]>)> {
+/// Table, key, and the value of a row that was not removed.
+type Noted<'a> = (Table, &'a [u8], Option<&'a [u8]>);
+
+fn noted<'a>(changes: &mut &'a [u8]) -> Option<Noted<'a>> {
     let table = Table::of(*changes.split_off_first()?)?;
     let key_length = u32::from_le_bytes(*changes.split_off(..4)?.as_array()?);
     let value_length = u32::from_le_bytes(*changes.split_off(..4)?.as_array()?);

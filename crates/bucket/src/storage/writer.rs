@@ -258,6 +258,7 @@ impl Writer {
         }
     }
 
+    #[allow(clippy::useless_conversion, reason = "the width differs between systems")]
     fn is_nearly_full(&self) -> bool {
         statvfs(self.folder.path()).is_ok_and(|disk| {
             let free = u64::from(disk.blocks_available()).saturating_mul(disk.fragment_size());

@@ -50,6 +50,10 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         let watch = client.look(std::slice::from_ref(animation)).await?.remove(0);
         let Some(manifest) = watch.manifest() else {
             client.must_exist(animation).await?;
+            anyhow::ensure!(
+                !watch.is_unreadable(),
+                "the manifest of {animation} cannot be read: the next sweep makes it anew"
+            );
             anyhow::bail!("no function has looked at {animation} yet");
         };
         match &target {

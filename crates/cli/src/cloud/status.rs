@@ -8,7 +8,7 @@ use rayfold_pipeline::manifest::{Head, Reason};
 use serde::Serialize;
 
 use super::{BucketArgs, Watch, parse_animation, report, with_bucket};
-use crate::console::{Console, Format};
+use crate::console::{Console, Format, visible};
 use crate::outcome::Outcome;
 use crate::wording::Size;
 
@@ -54,7 +54,7 @@ struct Entry<'a> {
 #[serde(untagged)]
 enum Known<'a> {
     Seen(&'a Head),
-    /// No function has looked at it yet.
+    /// No function has looked at it yet, or what it wrote cannot be read.
     New {
         animation: &'a Animation,
         status: &'static str,
@@ -118,12 +118,14 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
 }
 
 fn table(watches: &[Watch<'_>]) -> String {
-    let names = || watches.iter().map(|watch| watch.animation().as_str());
-    let width = names().map(|name| name.chars().count()).max().unwrap_or(0);
+    let names: Vec<String> =
+        watches.iter().map(|watch| visible(watch.animation().as_str()).replace('\n', "\\u{a}")).collect();
+    let width = names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
     let mut text = String::new();
-    for (name, watch) in names().zip(watches) {
+    for (name, watch) in names.iter().zip(watches) {
         let Some(manifest) = watch.manifest() else {
-            let _ = writeln!(text, "{name:width$}  new        no function has looked at it yet");
+            let (status, why) = unknown(watch);
+            let _ = writeln!(text, "{name:width$}  {status:9}  {why}");
             continue;
         };
         let status = report::word(manifest.head.status);
@@ -137,11 +139,20 @@ fn table(watches: &[Watch<'_>]) -> String {
     text
 }
 
+/// Why there is no manifest to show, in a word and in a sentence.
+fn unknown(watch: &Watch<'_>) -> (&'static str, &'static str) {
+    if watch.is_unreadable() {
+        ("unreadable", "its manifest cannot be read: the next sweep makes it anew")
+    } else {
+        ("new", "no function has looked at it yet")
+    }
+}
+
 fn document(watches: &[Watch<'_>], one_line: bool) -> anyhow::Result<String> {
     let entries = watches.iter().map(|watch| Entry {
         known: match watch.manifest() {
             Some(manifest) => Known::Seen(&manifest.head),
-            None => Known::New { animation: watch.animation(), status: "new" },
+            None => Known::New { animation: watch.animation(), status: unknown(watch).0 },
         },
         gif: watch.gif().map(|gif| Gif {
             key: watch.animation().gif(),

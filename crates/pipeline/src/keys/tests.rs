@@ -60,6 +60,42 @@ fn every_kind_of_key_reads_back() {
     check("animations/films/ä+b.gif", Key::Gif { animation: a() });
 }
 
+/// An error receipt of a script whose name starts with `@` was taken for a refusal, and the script was pending for ever.
+#[test]
+fn names_that_start_with_an_at_sign_have_receipts_like_all_others() {
+    let generation = "0a".repeat(16);
+    for name in ["@", "@1", "@@", &format!("@{generation}"), &format!("{generation}.error.json")] {
+        let (name, tag) = (ScriptName::new(name).unwrap(), tag("v", 1));
+        for part in [None, NonZeroU64::new(2)] {
+            let receipts = [
+                Receipt::Frame { name: name.clone(), tag: tag.clone(), part },
+                Receipt::Fault { name: name.clone(), tag: tag.clone(), part },
+                Receipt::Split { name: name.clone(), tag: tag.clone(), count: NonZeroU64::MIN },
+            ];
+            for receipt in receipts {
+                check(&animation("a").receipt(&receipt), Key::Receipt { animation: animation("a"), receipt });
+            }
+        }
+    }
+    let receipt = Receipt::Refusal { generation: Generation::new(&generation).unwrap() };
+    check(&format!("frames/a/@{generation}.error.json"), Key::Receipt { animation: animation("a"), receipt });
+}
+
+#[test]
+fn leases_are_no_receipts() {
+    check("frames/a/b/@assembler.json", Key::Lease { animation: animation("a/b") });
+    rejects("frames/@assembler.json", "not a key of the pipeline");
+    rejects("frames/a/x@assembler.json", "not a key of the pipeline");
+}
+
+#[test]
+fn manifests_that_are_set_aside_are_told_from_manifests() {
+    let version = ETag::new("d41.8~c");
+    check("manifests/a.json~d41~2e8~7ec", Key::SetAside { animation: animation("a"), version });
+    check("manifests/a.json~x.json", Key::Manifest { animation: animation("a.json~x") });
+    rejects("manifests/a.json~", "not a key of the pipeline");
+}
+
 #[test]
 fn tags_may_hold_anything() {
     for version in ["a", "a-p1", "ü/ä.png", "~", "x@y", "a b\n"] {

@@ -19,6 +19,9 @@ const FRAMES: &str = "\"frames\":[\n";
 /// The most places that a manifest tells: with them its head does not grow with the number of frames.
 const MOST_PLACES: usize = 200;
 
+/// The last revision that every reader of JSON counts to. At a thousand a second it is 285,000 years away.
+const LAST_REVISION: u64 = 1 << 53;
+
 /// Where the lines of a frame begin.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Place {
@@ -132,7 +135,13 @@ impl Beginning {
         if schema > SCHEMA {
             return Err(malformed(format!("schema {schema} is newer than {SCHEMA}").into()));
         }
-        let head = serde_json::from_slice(&line).map_err(|source| malformed(source.into()))?;
+        let head: Head = serde_json::from_slice(&line).map_err(|source| malformed(source.into()))?;
+        if head.animation != *animation {
+            return Err(malformed(format!("it is that of {}", head.animation).into()));
+        }
+        if head.revision > LAST_REVISION {
+            return Err(malformed(format!("revision {} is beyond {LAST_REVISION}", head.revision).into()));
+        }
         Ok(Some(Beginning { head, places, frames_at: frames_at as u64 }))
     }
 
@@ -242,6 +251,22 @@ mod tests {
         }
         assert!(Beginning::decode(animation, &body[..head]).unwrap().is_some());
         assert!(Beginning::decode(animation, b"[]\n\"frames\":[\n").is_err());
+    }
+
+    #[test]
+    fn what_is_no_manifest_of_the_animation_is_refused() {
+        let manifest = manifest(1);
+        let refused = |manifest: &Manifest, animation: &str| {
+            let body = manifest.encode(100).unwrap();
+            let error = Manifest::decode(&Animation::new(animation).unwrap(), &body).unwrap_err();
+            std::error::Error::source(&error).unwrap().to_string()
+        };
+        assert_eq!(refused(&manifest, "other"), "it is that of film");
+        let mut last = manifest.clone();
+        last.head.revision = LAST_REVISION;
+        Manifest::decode(&manifest.head.animation, &last.encode(100).unwrap()).unwrap();
+        last.head.revision += 1;
+        assert!(refused(&last, "film").contains("beyond"));
     }
 
     #[test]

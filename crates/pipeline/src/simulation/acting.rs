@@ -74,6 +74,10 @@ pub(super) struct Actress {
 }
 
 impl Renderer for Actress {
+    fn most_bytes(&self) -> u64 {
+        1_000
+    }
+
     async fn draw(&self, name: &ScriptName, script: Bytes, part: Part) -> Result<Drawing> {
         let engine = &self.grounds.engine;
         engine.sleep(self.grounds.between_ms(self.draw_ms.0..self.draw_ms.1)).await;

@@ -26,9 +26,11 @@ mod engine;
 mod expected;
 mod platform;
 mod scale;
+mod slow;
 mod story;
 
 pub use scale::{Scale, ScaleReport, measure};
+pub use slow::{Slow, SlowReport, slowly};
 
 /// The pixel version of what is drawn here.
 const PIXELS: u32 = 1;

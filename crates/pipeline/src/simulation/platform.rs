@@ -76,6 +76,25 @@ pub(super) struct Diary {
     pub(super) invocations: [u64; 2],
     /// Time of the render function's invocations that was not drawing.
     pub(super) beyond_drawing: Duration,
+    /// Time of assemblers that came to their end, and the most assemblers at once.
+    pub(super) assembling: Duration,
+    pub(super) assemblers_at_once: u64,
+    assemblers: u64,
+    /// When an invocation last ended, in microseconds.
+    pub(super) last_end_us: u64,
+}
+
+impl Diary {
+    fn assembler_begins(&mut self) {
+        self.invocations[1] += 1;
+        self.assemblers += 1;
+        self.assemblers_at_once = self.assemblers_at_once.max(self.assemblers);
+    }
+
+    fn assembler_ends(&mut self, took_us: u64) {
+        self.assemblers -= 1;
+        self.assembling += Duration::from_micros(took_us);
+    }
 }
 
 struct State {
@@ -263,9 +282,11 @@ impl Platform {
                 }
             }
             Work::Assemble(key) => {
-                lock(&self.diary).invocations[1] += 1;
                 let lister = Lister { engine: grounds.engine.clone(), push: self.push };
+                let start_us = grounds.engine.now_us();
+                lock(&self.diary).assembler_begins();
                 assemble(&invocation, &lister, key).await?;
+                lock(&self.diary).assembler_ends(grounds.engine.now_us() - start_us);
             }
             Work::Sweep => {
                 let swept = sweep(&invocation).await?;
@@ -303,6 +324,7 @@ impl Platform {
             return;
         }
         self.grounds.note(|| format!("{:.6} ends: {result:?}", job.request_id));
+        lock(&self.diary).last_end_us = self.grounds.engine.now_us();
         let chaos = *lock(&self.chaos);
         let backoff = self.grounds.between_ms(200..3_000);
         match (result, &job.work) {

@@ -101,11 +101,12 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
             }
         }));
     }
-    put(&grounds, animation.settings(), format!(r#"{{"frames": {}}}"#, scale.frames), Duration::ZERO);
+    let settings = format!(r#"{{"frames": {}}}"#, scale.frames);
+    change(&grounds, animation.settings(), Some(settings), Duration::ZERO);
     for number in 1..=scale.frames {
         let key = format!("{}{number}.txt", animation.scripts());
         let delay = Duration::from_millis(random.below(scale.upload_ms + 1));
-        put(&grounds, key, format!("frame {number}"), delay);
+        change(&grounds, key, Some(format!("frame {number}")), delay);
     }
     engine.run(Duration::from_secs(24 * 3600));
     if let Some(bug) = &lock(&platform.diary).bug {
@@ -126,7 +127,7 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
     lock(&platform.diary).idle.clear();
     for number in [1, scale.frames / 2 + 1, scale.frames] {
         let key = format!("{}{number}.txt", animation.scripts());
-        put(&grounds, key, format!("frame {number}"), Duration::ZERO);
+        change(&grounds, key, Some(format!("frame {number}")), Duration::ZERO);
     }
     engine.run(Duration::from_secs(48 * 3600));
     let idle = lock(&platform.diary).idle.clone();
@@ -166,15 +167,19 @@ impl Moments {
     }
 }
 
-/// The user puts an object.
-fn put(grounds: &Arc<Grounds>, key: String, text: String, delay: Duration) {
+/// The user puts an object, or deletes it.
+pub(super) fn change(grounds: &Arc<Grounds>, key: String, text: Option<String>, delay: Duration) {
     let world = grounds.clone();
     grounds.engine.after(delay, move || {
         let now = WorldClock::exact(&world.engine).now();
-        let done = lock(&world.bucket).put(now, &key, Bytes::from(text), PutOptions::always());
+        let there = text.is_some();
+        let is_done = match text {
+            Some(text) => lock(&world.bucket).put(now, &key, Bytes::from(text), PutOptions::always()).is_ok(),
+            None => lock(&world.bucket).delete(&key),
+        };
         let notify = lock(&world.notify).clone();
-        if let Some(notify) = notify.filter(|_| done.is_ok()) {
-            notify(Actor::User, &key, true, &lock(&world.bucket));
+        if let Some(notify) = notify.filter(|_| is_done) {
+            notify(Actor::User, &key, there, &lock(&world.bucket));
         }
     });
 }

@@ -26,6 +26,9 @@ const TIMEOUT: Duration = Duration::from_secs(30);
 /// For how long things happen and go wrong.
 const TROUBLES: Duration = Duration::from_secs(45);
 
+/// Sets apart what strangers do from the rest of a story.
+const STRANGERS: u64 = 0x0067_6172_626c_6572;
+
 /// How many sweeps a run may need.
 const MOST_SWEEPS: u32 = 24;
 
@@ -40,6 +43,10 @@ pub(super) fn run(
 ) -> Result<Run, String> {
     let random = Randomness::seeded(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x5eed);
     let judge = begin(&random, mutation, log.is_some())?;
+    let strangers = Randomness::seeded(seed ^ STRANGERS);
+    if strangers.one_in(8) {
+        judge.garble(&strangers);
+    }
     judge.engine.run(TROUBLES);
     judge.calm_down();
     let outcome = judge.judge();
@@ -276,6 +283,11 @@ impl Watch {
         };
         let body = bucket.get(key).map(|object| object.body).unwrap_or_default();
         match parsed {
+            Key::Manifest { animation }
+                if actor == Actor::User && Manifest::decode(&animation, &body).is_err() =>
+            {
+                self.revision = 0;
+            }
             Key::Manifest { animation } => {
                 let manifest = Manifest::decode(&animation, &body).map_err(|error| error.to_string())?;
                 let before = std::mem::replace(&mut self.revision, manifest.head.revision);
@@ -317,6 +329,14 @@ struct Judge {
 }
 
 impl Judge {
+    /// Someone overwrites the manifest with what is none. No function is woken by that.
+    fn garble(&self, random: &Randomness) {
+        let delay = Duration::from_micros(random.below(TROUBLES.as_micros() as u64));
+        let text = ["", "garbage\n", "{\"schema\":9},\n\"frames\":[\n\n]}\n"][pick(random, 3)];
+        act(&self.grounds, delay, self.animation.manifest(), Some(text.to_owned()));
+        self.platform.only_the_sweep_heals("the manifest was garbled");
+    }
+
     /// From now on nothing goes wrong.
     fn calm_down(&self) {
         *lock(&self.platform.chaos) = Chaos { delay_ms: 10, ..Chaos::default() };

@@ -34,12 +34,12 @@ fn notices(rule: Mutation, seed: u64) {
 
 #[test]
 fn a_missing_second_listing_is_noticed() {
-    notices(Mutation::SkipSecondListing, 919);
+    notices(Mutation::SkipSecondListing, 14_057);
 }
 
 #[test]
 fn claims_before_their_commit_are_noticed() {
-    notices(Mutation::ClaimBeforeCommit, 47_457);
+    notices(Mutation::ClaimBeforeCommit, 6_559);
 }
 
 #[test]
@@ -59,7 +59,7 @@ fn missing_claims_are_noticed() {
 
 #[test]
 fn assemblers_that_leave_early_are_noticed() {
-    notices(Mutation::AssemblerLeavesEarly, 8_218);
+    notices(Mutation::AssemblerLeavesEarly, 25_271);
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn assemblers_that_do_not_look_again_are_noticed() {
 
 #[test]
 fn unconditional_gifs_are_noticed() {
-    notices(Mutation::DropGifCondition, 28);
+    notices(Mutation::DropGifCondition, 3_653);
 }
 
 /// A user flickered a script while the sweep deleted what was superseded: the deleted frame was current again, and
@@ -116,6 +116,39 @@ fn functions_do_only_what_their_permissions_say() {
         }
     }
     assert_eq!(seen, expected);
+}
+
+/// Each finished moment woke an assembler that waited until the upload was quiet: 56 at once, and 20 GIFs of 20 frames.
+#[test]
+fn a_slow_upload_has_one_assembler_that_waits() {
+    for (scripts, apart_ms) in [(60, 1_000), (20, 4_000), (300, 80)] {
+        let slow = Slow { scripts, apart_ms, removed: 0, timeout: None, seed: 1 };
+        let report = slowly(slow).unwrap();
+        println!("{slow:?}: {report:?}");
+        assert!(report.gifs <= 2, "{report:?}");
+        // Others look, find the lease, and leave within a few requests.
+        let upload = Duration::from_millis(scripts * apart_ms + 10_000);
+        assert!(report.assembling < upload + Duration::from_millis(250) * report.claims as u32, "{report:?}");
+        assert!(report.requests < 8 * report.claims + 6 * scripts, "{report:?}");
+    }
+}
+
+/// 140 GIFs were built while 300 scripts were deleted.
+#[test]
+fn a_slow_removal_is_assembled_once_it_is_over() {
+    let slow = Slow { scripts: 310, apart_ms: 80, removed: 300, timeout: None, seed: 1 };
+    let report = slowly(slow).unwrap();
+    println!("{report:?}");
+    assert!(report.gifs <= 2 && report.whole < Duration::from_secs(24 + 10), "{report:?}");
+}
+
+/// An upload that lasts longer than an invocation may run is watched by one after the other.
+#[test]
+fn an_assembler_hands_over_before_its_time_is_up() {
+    let timeout = Some(Duration::from_secs(60));
+    let report = slowly(Slow { scripts: 200, apart_ms: 2_000, removed: 0, timeout, seed: 1 }).unwrap();
+    println!("{report:?}");
+    assert!(report.gifs <= 2, "{report:?}");
 }
 
 fn scaled(frames: u64, concurrency: usize, most_requests: f64) {

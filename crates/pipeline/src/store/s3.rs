@@ -30,12 +30,12 @@ use aws_sdk_s3::config::timeout::TimeoutConfig;
 use aws_sdk_s3::config::{
     Credentials, RequestChecksumCalculation, ResponseChecksumValidation, SharedHttpClient,
 };
-use aws_sdk_s3::primitives::{ByteStream, DateTime};
+use aws_sdk_s3::primitives::{ByteStream, ByteStreamError, DateTime};
 use aws_sdk_s3::types::EncodingType;
 use aws_smithy_http_client::Builder as HttpBuilder;
 use aws_smithy_http_client::tls::{Provider, rustls_provider::CryptoMode};
 use aws_types::service_config::ServiceConfigKey;
-use bytes::Bytes;
+use bytes::{Bytes, BytesMut};
 
 use super::{ETag, ListPage, ListRequest, Listed, Object, ObjectInfo, PAGE, PutOptions, Store};
 use crate::clock::Timestamp;
@@ -162,9 +162,16 @@ impl S3Store {
             modified: timestamp(answer.last_modified()),
             metadata: answer.metadata().cloned().unwrap_or_default().into_iter().collect(),
         };
-        let body = answer.body.collect().await;
-        let body = body.map_err(|error| Error::Ambiguous { key: key.to_owned(), source: error.into() })?;
-        Ok(Object { info, body: body.into_bytes() })
+        // Into one piece from the start: a large object must not be held twice.
+        let length = usize::try_from(length(answer.content_length())).unwrap_or(0);
+        let mut body = BytesMut::with_capacity(length);
+        let mut pieces = answer.body;
+        while let Some(piece) = pieces.next().await {
+            let lost =
+                |error: ByteStreamError| Error::Ambiguous { key: key.to_owned(), source: error.into() };
+            body.extend_from_slice(&piece.map_err(lost)?);
+        }
+        Ok(Object { info, body: body.freeze() })
     }
 }
 

@@ -3,7 +3,7 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
-use super::generation::{Columns, packet_shape};
+use super::bounce::{Columns, packet_shape};
 use super::real::{Lanes, Real, Vec3, constant};
 use crate::parallel::CHANNELS;
 
@@ -18,7 +18,7 @@ pub(super) struct Tile {
     pub(super) candidates: u64,
     /// Columns and rows of tiles before it.
     pub(super) place: (usize, usize),
-    /// Mirrorings that are followed.
+    /// Bounces that are followed.
     pub(super) bounces: u32,
 }
 
@@ -50,7 +50,7 @@ pub(super) fn fill(tile: Tile, band: &mut Band) {
 
 /// Colours to the bytes of the image.
 #[inline(never)]
-pub(super) fn develop<S: Simd, E: Real>(simd: S, tile: Tile, colors: &Columns<E>, band: &mut Band) {
+pub(super) fn write_pixels<S: Simd, E: Real>(simd: S, tile: Tile, colors: &Columns<E>, band: &mut Band) {
     simd.vectorize(
         #[inline(always)]
         || {

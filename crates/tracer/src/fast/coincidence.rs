@@ -10,8 +10,11 @@ use std::ops::Range;
 use glam::DVec3;
 use rayfold_scene::{Material, Object, Scene};
 
-use super::geometry::{Geometry, Shape, Solid, View};
+use super::bounds::Bounds;
+use super::geometry::{Geometry, View};
+use super::placed::{Face, Placed};
 use super::real::Real;
+use super::shapes::{Shape, Solid};
 use super::tree::{Branches, Part};
 
 /// Surfaces nearer than this to each other, in roundoffs of their coordinates, may be met at one distance.
@@ -51,9 +54,6 @@ struct Search<'a> {
     parallel: bool,
     mirrored: bool,
 }
-
-/// A box by two of its corners.
-type Bounds = (DVec3, DVec3);
 
 /// What two boxes have in common, or all but.
 struct Region {
@@ -168,64 +168,44 @@ impl Search<'_> {
 
     /// Whether two solids blur; flat ones do not if the square of the sine between them is over `steepest`.
     fn blur(&self, one: &Solid, other: &Solid, steepest: f64) -> bool {
-        if let (Shape::Triangle { normal, .. }, Shape::Triangle { normal: n, .. }) =
-            (&one.shape, &other.shape)
-            && normal.cross(*n).length_squared() > steepest
+        if let (Some(normal), Some(n)) = (one.shape.plane(), other.shape.plane())
+            && normal.cross(n).length_squared() > steepest
         {
             return false;
         }
-        let bounds = (one.bounds(), other.bounds());
+        let bounds = (one.shape.bounds(), other.shape.bounds());
         if !self.touch(bounds.0, bounds.1) {
             return false;
         }
         let region = self.region(bounds.0, bounds.1);
-        let is_near = match (one.shape, other.shape) {
-            (Shape::Sphere { .. }, Shape::Sphere { .. }) => spheres_blur(one, other, &region),
-            (Shape::Sphere { .. }, _) | (_, Shape::Sphere { .. }) => false,
-            _ => faces(one).any(|a| {
-                let slack = self.slack(a.normal.abs().dot(region.reach));
-                faces(other).any(|b| faces_blur(&a, &b, slack, region.pixel))
-            }),
+        let are_balls = || match (one.shape.ball(), other.shape.ball()) {
+            (Some(one), Some(other)) => spheres_blur(one, other, &region),
+            (Some(_), None) | (None, Some(_)) | (None, None) => false,
         };
+        let is_near = are_balls()
+            || faces(&one.shape).any(|a| {
+                let slack = self.slack(a.normal.abs().dot(region.reach));
+                faces(&other.shape).any(|b| faces_blur(&a, &b, slack, region.pixel))
+            });
         is_near && self.material(one) != self.material(other)
     }
 }
 
 /// The distance between two spheres' surfaces along a direction is that of their radii and the part of that of their
 /// centres: within the slack it is on a strip around both.
-fn spheres_blur(one: &Solid, other: &Solid, &Region { slack, pixel, .. }: &Region) -> bool {
-    let (Shape::Sphere { center, radius, .. }, Shape::Sphere { center: c, radius: r, .. }) =
-        (one.shape, other.shape)
-    else {
-        return false;
-    };
+fn spheres_blur(
+    (center, radius): (DVec3, f64),
+    (c, r): (DVec3, f64),
+    &Region { slack, pixel, .. }: &Region,
+) -> bool {
     let (apart, thicker) = ((center - c).length(), (radius - r).abs());
     let is_one = apart + thicker <= MEANT * (center.abs().max_element() + radius);
     let strip = 2.0 * slack * radius;
     !is_one && thicker <= apart + slack && strip >= pixel * apart && 2.0 * radius > pixel
 }
 
-/// A flat face.
-struct Face {
-    /// Counterclockwise about the normal; a triangle's last comes twice.
-    corners: [DVec3; 4],
-    normal: DVec3,
-}
-
-fn faces(solid: &Solid) -> impl Iterator<Item = Face> {
-    let (count, shape) = (if matches!(solid.shape, Shape::Cuboid { .. }) { 6 } else { 1 }, solid.shape);
-    (0..count).filter_map(move |side| match shape {
-        Shape::Sphere { .. } => None,
-        Shape::Triangle { vertices: [a, b, c], normal } => Some(Face { corners: [a, b, c, c], normal }),
-        Shape::Cuboid { min, max } => {
-            let axis = side % 3;
-            let (u, v) = (DVec3::AXES[(axis + 1) % 3], DVec3::AXES[(axis + 2) % 3]);
-            let start = if side < 3 { min } else { min + (max - min) * DVec3::AXES[axis] };
-            let (u, v) = (u * (max - min), v * (max - min));
-            let corners = [start, start + u, start + u + v, start + v];
-            Some(Face { corners, normal: DVec3::AXES[axis] })
-        }
-    })
+fn faces(shape: &Shape) -> impl Iterator<Item = Face> {
+    shape.faces().map(|number| shape.face(number))
 }
 
 impl Face {

@@ -1,16 +1,20 @@
-//! What scenes have beyond spheres, and the kernels that are made for it.
+//! What scenes have beyond spheres, and the variants of steps that are made for it.
 //!
-//! The one place that knows the crate's cargo features: a constant here takes what is left out of a build out of every
-//! kernel, and a scene that needs it is refused.
+//! A step is compiled for a few sets of kinds, so that a tile does not pay for looking for what cannot be in it: see
+//! [`Variant`]. A constant here takes what is left out of a build (a cargo feature of this crate) out of every step, and a
+//! scene that needs it is refused.
 
-use super::intersect::Formulas;
+use core::marker::PhantomData;
+
+use super::kind::{ByKind, Kind};
+use super::real::Real;
+use super::shapes::Formulas;
 use crate::RenderError;
 
 /// What a scene has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Needs {
-    pub(super) cuboids: bool,
-    pub(super) triangles: bool,
+    pub(super) kinds: ByKind<bool>,
     pub(super) mirrors: bool,
     /// Lights, and something to stand in their way: all but an opaque sphere alone, seen from outside.
     pub(super) shadows: bool,
@@ -20,8 +24,7 @@ pub(super) struct Needs {
 
 /// What this build has.
 pub(super) const BUILT: Needs = Needs {
-    cuboids: cfg!(feature = "boxes"),
-    triangles: cfg!(feature = "triangles"),
+    kinds: ByKind { spheres: true, cuboids: cfg!(feature = "boxes"), triangles: cfg!(feature = "triangles") },
     mirrors: cfg!(feature = "mirrors"),
     shadows: cfg!(feature = "shadows"),
     tree: cfg!(feature = "tree"),
@@ -31,66 +34,128 @@ impl Needs {
     /// # Errors
     /// When the build lacks what the scene has.
     pub(super) fn check(self) -> Result<(), RenderError> {
+        let mut missing = None;
+        Kind::each(|kind| {
+            if *self.kinds.of(kind) && !*BUILT.kinds.of(kind) {
+                missing = missing.or(Some(feature(kind)));
+            }
+        });
         let lacks = [
-            (self.cuboids && !BUILT.cuboids, "boxes"),
-            (self.triangles && !BUILT.triangles, "triangles"),
             (self.mirrors && !BUILT.mirrors, "mirrors"),
             (self.shadows && !BUILT.shadows, "shadows"),
             (self.tree && !BUILT.tree, "tree"),
         ];
-        match lacks.into_iter().find(|(lacks, _)| *lacks) {
-            Some((_, feature)) => Err(RenderError::LeftOut { feature }),
-            None => Ok(()),
-        }
+        let missing = missing.or(lacks.into_iter().find(|(lacks, _)| *lacks).map(|(_, feature)| feature));
+        missing.map_or(Ok(()), |feature| Err(RenderError::LeftOut { feature }))
     }
 }
 
-/// What a kernel can draw; what it cannot is not compiled into its loops.
-pub(super) trait Features: Formulas + 'static {
-    const CUBOIDS: bool;
-    const TRIANGLES: bool;
-    const MIRRORS: bool;
-    const SHADOWS: bool;
+/// The cargo feature that a kind comes with.
+fn feature(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Sphere => unreachable!("spheres are in every build"),
+        Kind::Cuboid => "boxes",
+        Kind::Triangle => "triangles",
+    }
+}
+
+/// What a variant of a step can do; what it cannot is not compiled into its loops.
+pub(super) trait Features<E: Real>: 'static {
+    /// The tests by which rays meet shapes.
+    type By: Formulas<E>;
+
+    /// The kinds that it looks for.
+    const KINDS: ByKind<bool>;
+
+    /// Whether it looks on lists and down a tree, and not by masks.
     const TREE: bool;
 
-    /// The same with mirrors, for what mirrors make no difference to.
-    type WithMirrors: Features;
-
-    /// The same with a tree, for what a tree makes no difference to.
-    type WithTree: Features;
+    /// A kind that is one of [`Self::KINDS`], so that the compiler knows that it is.
+    #[inline(always)]
+    fn one_of_these(kind: Kind) -> Kind {
+        debug_assert!(*Self::KINDS.of(kind), "{kind:?} was not looked for");
+        if *Self::KINDS.of(kind) { kind } else { Kind::Sphere }
+    }
 }
 
-/// A kernel that can draw spheres and what it says.
-pub(super) struct Kernel<const CUBOIDS: bool, const TRIANGLES: bool, const MIRRORS: bool, const TREE: bool>;
+/// A variant of a step: one that looks for spheres and what it says.
+///
+/// The kinds that scenes have most have variants for each company that they come in. A kind that is rarer adds none: it
+/// goes with the one that looks for all.
+pub(super) struct Variant<By, const CUBOIDS: bool, const TRIANGLES: bool, const TREE: bool>(PhantomData<By>);
 
-impl<const CUBOIDS: bool, const TRIANGLES: bool, const MIRRORS: bool, const TREE: bool> Formulas
-    for Kernel<CUBOIDS, TRIANGLES, MIRRORS, TREE>
+impl<E: Real, By: Formulas<E>, const CUBOIDS: bool, const TRIANGLES: bool, const TREE: bool> Features<E>
+    for Variant<By, CUBOIDS, TRIANGLES, TREE>
 {
-}
+    type By = By;
 
-impl<const CUBOIDS: bool, const TRIANGLES: bool, const MIRRORS: bool, const TREE: bool> Features
-    for Kernel<CUBOIDS, TRIANGLES, MIRRORS, TREE>
-{
-    const CUBOIDS: bool = CUBOIDS && BUILT.cuboids;
-    const TRIANGLES: bool = TRIANGLES && BUILT.triangles;
-    const MIRRORS: bool = MIRRORS && BUILT.mirrors;
-    const SHADOWS: bool = BUILT.shadows;
+    const KINDS: ByKind<bool> = ByKind {
+        spheres: true,
+        cuboids: CUBOIDS && BUILT.kinds.cuboids,
+        triangles: TRIANGLES && BUILT.kinds.triangles,
+    };
     const TREE: bool = TREE && BUILT.tree;
-
-    type WithMirrors = Kernel<CUBOIDS, TRIANGLES, true, TREE>;
-    type WithTree = Kernel<CUBOIDS, TRIANGLES, MIRRORS, true>;
 }
-
-/// Spheres, as many as masks have bits.
-pub(super) type Spheres = Kernel<false, false, false, false>;
-
-/// All kinds, as many as masks have bits.
-#[cfg(feature = "accuracy")]
-pub(super) type Solids = Kernel<true, true, true, false>;
-
-/// Triangles and spheres that mirror nothing, any number.
-#[cfg(feature = "accuracy")]
-pub(super) type Mesh = Kernel<false, true, false, true>;
 
 /// All kinds, any number.
-pub(super) type Everything = Kernel<true, true, true, true>;
+pub(super) type Everything<By> = Variant<By, true, true, true>;
+
+/// What pictures are drawn with.
+pub(super) trait Kernel<E: Real>: 'static {
+    type By: Formulas<E>;
+
+    /// Whether each tile is drawn by the variants that fit it, and not all by [`Everything`].
+    const FITTED: bool;
+}
+
+/// The kernel of instruction sets that machines have today.
+pub(super) struct Fitted<By>(PhantomData<By>);
+
+impl<E: Real, By: Formulas<E>> Kernel<E> for Fitted<By> {
+    type By = By;
+    const FITTED: bool = true;
+}
+
+/// The kernel of those that only old machines are without: smaller, and somewhat slower.
+pub(super) struct Unfitted<By>(PhantomData<By>);
+
+impl<E: Real, By: Formulas<E>> Kernel<E> for Unfitted<By> {
+    type By = By;
+    const FITTED: bool = false;
+}
+
+/// Calls a step in the variant that fits the kinds that are looked for: `fitted!(N, kinds, C T => step::<Variant<By, C, T,
+/// false>>(...))` evaluates the last with the constants `C` and `T` of that variant, in the kernel `N`. A step that looks
+/// for objects itself also fits whether it does on lists and down a tree: `fitted!(N, kinds, tree, C T D => ...)`.
+macro_rules! fitted {
+    ($kernel:ident, $kinds:expr, $tree:expr, $c:ident $t:ident $d:ident => $step:expr) => {
+        if $kernel::FITTED && !$tree {
+            const $d: bool = false;
+            fitted!($kernel, $kinds, $c $t => $step)
+        } else {
+            const $d: bool = true;
+            fitted!($kernel, $kinds, $c $t => $step)
+        }
+    };
+    ($kernel:ident, $kinds:expr, $c:ident $t:ident => $step:expr) => {
+        if $kernel::FITTED {
+            // Kinds that are not named here are looked for by what looks for all.
+            let $crate::fast::kind::ByKind { spheres: _, cuboids, triangles } = $kinds;
+            match (cuboids, triangles) {
+                (false, false) => fitted!(@ $c false, $t false => $step),
+                (false, true) => fitted!(@ $c false, $t true => $step),
+                (true, false) => fitted!(@ $c true, $t false => $step),
+                (true, true) => fitted!(@ $c true, $t true => $step),
+            }
+        } else {
+            fitted!(@ $c true, $t true => $step)
+        }
+    };
+    (@ $c:ident $cuboids:literal, $t:ident $triangles:literal => $step:expr) => {{
+        const $c: bool = $cuboids;
+        const $t: bool = $triangles;
+        $step
+    }};
+}
+
+pub(super) use fitted;

@@ -4,63 +4,35 @@
 //! for bit for any tile size, number of threads and width of fused multiply-add. It knows the scene only as
 //! [`geometry`] has recentred and scaled it.
 
-/// Compiles an expression for every instruction set that has kernels, and evaluates the one for `level`.
-#[cfg(target_arch = "x86_64")]
-macro_rules! on {
-    (narrow $level:expr, $simd:ident => $work:expr) => {
-        if let Some($simd) = $level.as_sse4_2() {
-            fearless_simd::Simd::vectorize(
-                $simd,
-                #[inline(always)]
-                || $work,
-            )
-        } else {
-            unreachable!("asked for kernels that this machine has not")
-        }
-    };
-    ($level:expr, $simd:ident => $work:expr) => {
-        if let Some($simd) = $level.as_avx512() {
-            fearless_simd::Simd::vectorize(
-                $simd,
-                #[inline(always)]
-                || $work,
-            )
-        } else if let Some($simd) = $level.as_avx2() {
-            fearless_simd::Simd::vectorize(
-                $simd,
-                #[inline(always)]
-                || $work,
-            )
-        } else {
-            on!(narrow $level, $simd => $work)
-        }
-    };
-}
-
-#[cfg(not(target_arch = "x86_64"))]
-macro_rules! on {
-    ($level:expr, $simd:ident => $work:expr) => {
-        fearless_simd::dispatch!($level, $simd => $work)
-    };
-}
-
 mod band;
+mod bounce;
+mod bounds;
+mod candidates;
 mod coincidence;
-mod doubt;
+mod dispatch;
 mod exact;
 mod features;
-mod generation;
 mod geometry;
-mod intersect;
+mod kind;
 mod light;
+mod lights;
 mod lists;
+mod look;
 #[cfg(feature = "accuracy")]
 mod naive;
+mod packet;
+mod placed;
 mod precision;
+mod predicate;
 mod prepare;
 pub mod probe;
+mod rays;
 mod real;
+mod rounding;
 mod search;
+mod shape;
+mod shapes;
+mod sights;
 mod surfaces;
 mod tile;
 mod tree;
@@ -70,15 +42,20 @@ use fearless_simd::{Level, Simd};
 use image::RgbImage;
 use rayfold_scene::Scene;
 
+use self::band::{Band, Tile};
+use self::dispatch::on;
+#[cfg(target_arch = "x86_64")]
+use self::features::Unfitted;
+use self::features::{Fitted, Kernel};
+use self::geometry::Geometry;
+use self::prepare::Prepared;
+use self::real::Real;
+use self::shape::Robust;
+use self::shapes::{Formulas, Shape};
+use self::tile::Scratch;
+use self::window::Window;
 use crate::parallel::{CHANNELS, bands};
 use crate::{Precision, RenderError, RenderOptions};
-use band::{Band, Tile};
-use features::{BUILT, Everything, Features, Kernel};
-use geometry::{Geometry, Solid};
-use prepare::Prepared;
-use real::Real;
-use tile::Scratch;
-use window::Window;
 
 /// Columns and rows of a tile.
 const SIDE: (u32, u32) = (16, 16);
@@ -89,13 +66,14 @@ const MANY: usize = 512;
 
 /// The first half of [`crate::render`]: a scene with all that is worked out before its first pixel, a tree of its
 /// objects among it.
-pub struct Drawing<'a>(Way<'a>);
+pub struct Drawing<'a>(Backend<'a>);
 
-enum Way<'a> {
+/// What a scene is drawn by.
+enum Backend<'a> {
     Single(Setup<'a, f32>),
     Double(Setup<'a, f64>),
     /// Numbers that the kernels cannot hold are left to the tracer that takes them one by one.
-    Plain(&'a Scene, &'a RenderOptions<'a>),
+    Reference(&'a Scene, &'a RenderOptions<'a>),
 }
 
 impl<'a> Drawing<'a> {
@@ -107,9 +85,9 @@ impl<'a> Drawing<'a> {
         let geometry = if has_kernels(options) { Geometry::new(scene, options.tree).ok() } else { None };
         let precision = |geometry| Some((geometry, precision::resolve(options, geometry, scene)?));
         Ok(Self(match geometry.as_ref().and_then(precision) {
-            Some((geometry, Precision::F64)) => Way::Double(Setup::new(scene, geometry, options)?),
-            Some((geometry, _)) => Way::Single(Setup::new(scene, geometry, options)?),
-            None => Way::Plain(scene, options),
+            Some((geometry, Precision::F64)) => Backend::Double(Setup::new(scene, geometry, options)?),
+            Some((geometry, _)) => Backend::Single(Setup::new(scene, geometry, options)?),
+            None => Backend::Reference(scene, options),
         }))
     }
 
@@ -119,9 +97,9 @@ impl<'a> Drawing<'a> {
     /// Those of [`crate::render`].
     pub fn draw(&self) -> Result<RgbImage, RenderError> {
         match &self.0 {
-            Way::Single(setup) => setup.draw(kernel::<f32>),
-            Way::Double(setup) => setup.draw(kernel::<f64>),
-            Way::Plain(scene, options) => crate::reference::render(scene, options),
+            Backend::Single(setup) => setup.draw::<Robust>(),
+            Backend::Double(setup) => setup.draw::<Robust>(),
+            Backend::Reference(scene, options) => crate::reference::render(scene, options),
         }
     }
 }
@@ -151,7 +129,7 @@ pub(crate) fn precision(scene: &Scene) -> Precision {
 /// Those of [`crate::render`].
 #[cfg(feature = "accuracy")]
 pub(crate) fn render_naive(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    Setup::new(scene, &Geometry::new(scene, options.tree)?, options)?.draw(naive::draw)
+    Setup::<f32>::new(scene, &Geometry::new(scene, options.tree)?, options)?.draw::<naive::Naive>()
 }
 
 /// What a kernel needs to draw a scene.
@@ -174,19 +152,17 @@ impl<'a, E: Real> Setup<'a, E> {
         let many = geometry.solids.len() > MANY;
         let side = options.tile.unwrap_or(if many { SMALL_SIDE } else { SIDE });
         let prepared = Prepared::<E>::new(scene, geometry, options.tree, side)?;
-        let whole = geometry.whole();
-        let mut solids: Vec<&Solid> =
-            if prepared.tree.is_some() { vec![&whole] } else { geometry.solids.iter().collect() };
-        solids.sort_by_key(|solid| solid.kind_rank());
-        let window = Window::new(geometry, &solids, size, side, E::ROUNDOFF);
+        let mut shapes: Vec<Shape> = match &prepared.tree {
+            Some(_) => vec![Shape::of_box(geometry.whole())],
+            None => geometry.solids.iter().map(|solid| solid.shape).collect(),
+        };
+        shapes.sort_by_key(|shape| shape.kind().number());
+        let window = Window::new(geometry.view, &shapes, size, side, E::ROUNDOFF);
         Ok(Self { scene, options, prepared, window, side })
     }
 
-    /// Draws bands of tiles side by side, each by `kernel`.
-    fn draw(
-        &self,
-        kernel: impl Fn(&Job<E>, Level, Band, &mut Scratch<E>) + Sync,
-    ) -> Result<RgbImage, RenderError> {
+    /// Draws bands of tiles side by side.
+    fn draw<By: Formulas<E>>(&self) -> Result<RgbImage, RenderError> {
         let Self { scene, options, prepared, window, side } = self;
         let size = (scene.screen.width(), scene.screen.height());
         let background = crate::reference::levels(scene.background());
@@ -200,7 +176,7 @@ impl<'a, E: Real> Setup<'a, E> {
             || Box::new(Scratch::new()),
             |scratch, row, bytes| {
                 let band = Band { bytes, size, background };
-                kernel(&Job { prepared, window, side: *side, row, bounces }, level, band, scratch);
+                draw::<E, By>(&Job { prepared, window, side: *side, row, bounces }, level, band, scratch);
             },
         )
     }
@@ -214,99 +190,50 @@ struct Job<'a, E> {
     side: (u32, u32),
     /// The first row of pixels.
     row: u32,
-    /// Mirrorings that are followed.
+    /// Bounces that are followed.
     bounces: u32,
 }
 
 impl<E: Real> Job<'_, E> {
     #[inline(always)]
-    fn draw<S: Simd, F: Features>(&self, simd: S, mut band: Band, scratch: &mut Scratch<E>) {
-        let (width, _) = band.size;
-        let height = (band.bytes.len() / (width as usize * CHANNELS)) as u32;
-        for (column, left) in (0..width).step_by(self.side.0 as usize).enumerate() {
-            let place = (column, (self.row / self.side.1) as usize);
-            let tile = Tile {
-                left,
-                top: self.row,
-                width: self.side.0.min(width - left),
-                height,
-                candidates: self.window.candidates(place.0, place.1),
-                place,
-                bounces: self.bounces,
-            };
-            tile::draw::<S, E, F>(simd, self.prepared, tile, scratch, &mut band);
-        }
+    fn draw<S: Simd, N: Kernel<E>>(&self, simd: S, mut band: Band, scratch: &mut Scratch<E>) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let (width, _) = band.size;
+                let height = (band.bytes.len() / (width as usize * CHANNELS)) as u32;
+                for (column, left) in (0..width).step_by(self.side.0 as usize).enumerate() {
+                    let place = (column, (self.row / self.side.1) as usize);
+                    let tile = Tile {
+                        left,
+                        top: self.row,
+                        width: self.side.0.min(width - left),
+                        height,
+                        candidates: self.window.candidates(place.0, place.1),
+                        place,
+                        bounces: self.bounces,
+                    };
+                    tile::draw::<S, E, N>(simd, self.prepared, tile, scratch, &mut band);
+                }
+            },
+        );
     }
 }
 
-/// Draws with the kernel that has just what the scene has.
+/// Draws with the best kernel for the instructions.
 #[cfg(target_arch = "x86_64")]
-fn kernel<E: Real>(job: &Job<E>, level: Level, band: Band, scratch: &mut Scratch<E>) {
+fn draw<E: Real, By: Formulas<E>>(job: &Job<E>, level: Level, band: Band, scratch: &mut Scratch<E>) {
     if let Some(simd) = level.as_avx512() {
-        job.draw_by_kernel(simd, band, scratch);
+        job.draw::<_, Fitted<By>>(simd, band, scratch);
     } else if let Some(simd) = level.as_avx2() {
-        job.draw_by_kernel(simd, band, scratch);
+        job.draw::<_, Fitted<By>>(simd, band, scratch);
     } else {
-        // Such machines are old, and few: one kernel will do for them.
-        on!(narrow level, simd => job.draw::<_, Everything>(simd, band, scratch));
+        // Such machines are old, and few: one variant of each step will do for them.
+        on!(narrow level, simd => job.draw::<_, Unfitted<By>>(simd, band, scratch));
     }
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn kernel<E: Real>(job: &Job<E>, level: Level, band: Band, scratch: &mut Scratch<E>) {
-    on!(level, simd => job.draw_by_kernel(simd, band, scratch));
-}
-
-impl<E: Real> Job<'_, E> {
-    #[inline(always)]
-    fn draw_by_kernel<S: Simd>(&self, simd: S, band: Band, scratch: &mut Scratch<E>) {
-        if BUILT.cuboids && self.prepared.needs.cuboids {
-            self.by_triangles::<S, true>(simd, band, scratch);
-        } else {
-            self.by_triangles::<S, false>(simd, band, scratch);
-        }
-    }
-
-    #[inline(always)]
-    fn by_triangles<S: Simd, const C: bool>(&self, simd: S, band: Band, scratch: &mut Scratch<E>) {
-        if BUILT.triangles && self.prepared.needs.triangles {
-            self.by_mirrors::<S, C, true>(simd, band, scratch);
-        } else {
-            self.by_mirrors::<S, C, false>(simd, band, scratch);
-        }
-    }
-
-    #[inline(always)]
-    fn by_mirrors<S: Simd, const C: bool, const T: bool>(
-        &self,
-        simd: S,
-        band: Band,
-        scratch: &mut Scratch<E>,
-    ) {
-        if BUILT.mirrors && self.prepared.needs.mirrors {
-            self.by_tree::<S, C, T, true>(simd, band, scratch);
-        } else {
-            self.by_tree::<S, C, T, false>(simd, band, scratch);
-        }
-    }
-
-    #[inline(always)]
-    fn by_tree<S: Simd, const C: bool, const T: bool, const M: bool>(
-        &self,
-        simd: S,
-        band: Band,
-        scratch: &mut Scratch<E>,
-    ) {
-        if BUILT.tree && self.prepared.needs.tree {
-            simd.vectorize(
-                #[inline(always)]
-                || self.draw::<S, Kernel<C, T, M, true>>(simd, band, scratch),
-            );
-        } else {
-            simd.vectorize(
-                #[inline(always)]
-                || self.draw::<S, Kernel<C, T, M, false>>(simd, band, scratch),
-            );
-        }
-    }
+fn draw<E: Real, By: Formulas<E>>(job: &Job<E>, level: Level, band: Band, scratch: &mut Scratch<E>) {
+    on!(level, simd => job.draw::<_, Fitted<By>>(simd, band, scratch));
 }

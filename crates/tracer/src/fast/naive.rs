@@ -3,50 +3,38 @@
 //! Tiles, candidates, constants and shadows are those of the robust kernels; what differs is how a root is computed,
 //! that no error bound widens an edge or a slab, and that new rays start a fixed way off their surface.
 
+use fearless_simd::Simd;
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd};
 
-use super::Job;
-use super::band::Band;
-use super::doubt::Place;
-use super::features::{Everything, Features, Mesh, Solids};
-use super::intersect::{Formulas, Moment, Nearest, Ray, Slopes, Surface};
-use super::prepare::{Cuboid, Edge, Sphere, Triangle};
+use super::packet::{Nearest, Ray, Slopes, Surface};
+use super::predicate::Place;
 use super::real::{Lanes, Real, Vec3, constant, splat};
-use super::tile::Scratch;
+use super::shape::{Robust, Tests};
+use super::shapes::cuboid::Cuboid;
+use super::shapes::sphere::Sphere;
+use super::shapes::triangle::{Edge, Moment, Triangle};
 
 /// How far from a surface a ray starts; a scene has the size of 1.
 const EPSILON: f64 = 1e-4;
 
-/// With the kernels of scenes of all kinds, of meshes, and of any number of objects.
-pub(super) fn draw(job: &Job<f32>, level: Level, band: Band, scratch: &mut Scratch<f32>) {
-    let needs = job.prepared.needs;
-    if !needs.tree {
-        on!(level, simd => job.draw::<_, Naive<Solids>>(simd, band, scratch));
-    } else if needs.cuboids || needs.mirrors {
-        on!(level, simd => job.draw::<_, Naive<Everything>>(simd, band, scratch));
-    } else {
-        on!(level, simd => job.draw::<_, Naive<Mesh>>(simd, band, scratch));
-    }
-}
+/// Tests by the textbook.
+pub(super) struct Naive;
 
-/// What `F` can draw, by the textbook.
-struct Naive<F>(core::marker::PhantomData<F>);
-
-impl<F: Features> Features for Naive<F> {
-    const CUBOIDS: bool = F::CUBOIDS;
-    const TRIANGLES: bool = F::TRIANGLES;
-    const MIRRORS: bool = F::MIRRORS;
-    const SHADOWS: bool = F::SHADOWS;
-    const TREE: bool = F::TREE;
-
-    type WithMirrors = Naive<F::WithMirrors>;
-    type WithTree = Naive<F::WithTree>;
-}
-
-impl<F> Formulas for Naive<F> {
+impl<E: Real> Tests<Sphere<E>, E> for Naive {
     #[inline(always)]
-    fn sphere<S: Simd, E: Real>(simd: S, sphere: &Sphere<E>, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+    fn meet<S: Simd, const EYE: bool>(
+        simd: S,
+        sphere: &Sphere<E>,
+        _: Place,
+        ray: Ray<S, E>,
+        (): (),
+        nearest: &mut Nearest<S, E>,
+    ) {
+        if EYE {
+            let middle = Vec3::splat(simd, sphere.center).dot(ray.direction);
+            let rest = middle.mul_sub(middle, splat::<S, E>(simd, sphere.power));
+            return roots(simd, middle, rest, sphere.order, nearest);
+        }
         let from_center = ray.origin.sub(Vec3::splat(simd, sphere.center));
         let half = from_center.dot(ray.direction);
         let rest = half.mul_sub(half, from_center.dot(from_center) - splat::<S, E>(simd, sphere.square));
@@ -55,21 +43,26 @@ impl<F> Formulas for Naive<F> {
     }
 
     #[inline(always)]
-    fn sphere_from_eye<S: Simd, E: Real>(
+    fn surface<S: Simd, const EYE: bool>(
         simd: S,
         sphere: &Sphere<E>,
-        direction: Vec3<S, E>,
-        nearest: &mut Nearest<S, E>,
-    ) {
-        let middle = Vec3::splat(simd, sphere.center).dot(direction);
-        let rest = middle.mul_sub(middle, splat::<S, E>(simd, sphere.power));
-        roots(simd, middle, rest, sphere.order, nearest);
+        ray: Ray<S, E>,
+        distance: Lanes<S, E>,
+    ) -> Surface<S, E> {
+        let point = ray.direction.scale_add(distance, ray.origin);
+        let inverse = constant::<S, E>(simd, 1.0) / splat::<S, E>(simd, sphere.outer);
+        let outward = point.sub(Vec3::splat(simd, sphere.center)).scale(inverse);
+        let is_facing = EYE && sphere.is_outside_the_eye();
+        off(simd, point, if is_facing { outward } else { facing(simd, outward, ray) })
     }
+}
 
+impl<E: Real> Tests<Cuboid<E>, E> for Naive {
     #[inline(always)]
-    fn cuboid<S: Simd, E: Real>(
+    fn meet<S: Simd, const EYE: bool>(
         simd: S,
         cuboid: &Cuboid<E>,
+        _: Place,
         ray: Ray<S, E>,
         slopes: Slopes<S, E>,
         nearest: &mut Nearest<S, E>,
@@ -86,15 +79,31 @@ impl<F> Formulas for Naive<F> {
         }
     }
 
+    /// A face is where it is, by the textbook too.
     #[inline(always)]
-    fn triangle<S: Simd, E: Real>(
+    fn surface<S: Simd, const EYE: bool>(
+        simd: S,
+        cuboid: &Cuboid<E>,
+        ray: Ray<S, E>,
+        distance: Lanes<S, E>,
+    ) -> Surface<S, E> {
+        Robust::surface::<S, EYE>(simd, cuboid, ray, distance)
+    }
+}
+
+impl<E: Real> Tests<Triangle<E>, E> for Naive {
+    #[inline(always)]
+    fn meet<S: Simd, const EYE: bool>(
         simd: S,
         triangle: &Triangle<E>,
-        _: Place,
+        place: Place,
         ray: Ray<S, E>,
         moment: Moment<S, E>,
         nearest: &mut Nearest<S, E>,
     ) {
+        if EYE {
+            return Robust::meet::<S, EYE>(simd, triangle, place, ray, moment, nearest);
+        }
         let zero = constant::<S, E>(simd, 0.0);
         let [a, b, c] = &triangle.edges;
         let (a, b, c) = (side(simd, a, ray, moment), side(simd, b, ray, moment), side(simd, c, ray, moment));
@@ -108,29 +117,11 @@ impl<F> Formulas for Naive<F> {
     }
 
     #[inline(always)]
-    fn sphere_surface<S: Simd, E: Real, const EYE: bool>(
-        simd: S,
-        sphere: &Sphere<E>,
-        ray: Ray<S, E>,
-        distance: Lanes<S, E>,
-    ) -> Surface<S, E> {
-        let point = ray.direction.scale_add(distance, ray.origin);
-        let inverse = constant::<S, E>(simd, 1.0) / splat::<S, E>(simd, sphere.outer);
-        let outward = point.sub(Vec3::splat(simd, sphere.center)).scale(inverse);
-        off(
-            simd,
-            point,
-            if EYE && sphere.power > E::narrow(0.0) { outward } else { facing(simd, outward, ray) },
-        )
-    }
-
-    #[inline(always)]
-    fn triangle_surface<S: Simd, E: Real>(
+    fn surface<S: Simd, const EYE: bool>(
         simd: S,
         triangle: &Triangle<E>,
         ray: Ray<S, E>,
         distance: Lanes<S, E>,
-        _: f64,
     ) -> Surface<S, E> {
         let point = ray.direction.scale_add(distance, ray.origin);
         off(simd, point, facing(simd, Vec3::splat(simd, triangle.normal), ray))

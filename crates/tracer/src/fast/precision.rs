@@ -9,8 +9,11 @@
 use rayfold_scene::{Light, Scene};
 
 use super::coincidence::surfaces_blur;
-use super::geometry::{Geometry, Shape, Solid, View};
+use super::geometry::{Geometry, View};
+use super::placed::{Placed, Sight};
 use super::real::Real;
+use super::shapes::Solid;
+use crate::camera::Axis;
 use crate::{Precision, RenderOptions};
 
 /// Rounding errors that add up in a ray's direction, in roundoffs.
@@ -71,7 +74,7 @@ impl Range {
             }
         };
         let is_held = |solid: &Solid| {
-            let (min, max) = solid.bounds();
+            let (min, max) = solid.shape.bounds();
             let size = (max - min).max_element();
             size == 0.0 || size > self.least
         };
@@ -117,11 +120,8 @@ impl Colors {
 }
 
 /// The largest slopes across and along the window.
-fn widest((x, y): ((f64, f64), (f64, f64)), size: (u32, u32)) -> (f64, f64) {
-    let of = |(start, step): (f64, f64), samples: u32| {
-        let end = start + step * f64::from(samples - 1);
-        start.abs().max(end.abs())
-    };
+fn widest((x, y): (Axis, Axis), size: (u32, u32)) -> (f64, f64) {
+    let of = |axis: Axis, samples: u32| axis.start.abs().max(axis.at(f64::from(samples - 1)).abs());
     (of(x, size.0), of(y, size.1))
 }
 
@@ -139,7 +139,7 @@ fn is_enough(geometry: &Geometry, scene: &Scene, colors: &Colors) -> bool {
             let size = (scene.screen.width(), scene.screen.height());
             let (across, along) = widest((x, y), size);
             let farthest = 1.0 + across * across + along * along;
-            let steps = [x.1, y.1].map(f64::abs).into_iter().filter(|step| *step > 0.0);
+            let steps = [x.step, y.step].map(f64::abs).into_iter().filter(|step| *step > 0.0);
             // Pixels at the window's corners are the smallest from the eye.
             steps.reduce(f64::min).unwrap_or(ONE_PIXEL) / farthest
         }
@@ -148,17 +148,14 @@ fn is_enough(geometry: &Geometry, scene: &Scene, colors: &Colors) -> bool {
     if !parallel && DIRECTION * roundoff > INVISIBLE * pixel {
         return false;
     }
-    let shade = SHADE / colors.scattered.max(1.0);
-    let is_fine = |solid: &Solid| match solid.shape {
-        Shape::Sphere { center, radius, .. } => {
-            let away = center.length();
-            let error = POINT * roundoff * (away + radius);
-            let nearest = if parallel { 1.0 } else { (away - radius).abs() };
-            let seen = parallel || radius > 0.5 * pixel * away;
-            error <= HARDLY_VISIBLE * pixel * nearest && !(seen && error > shade * radius)
-        }
-        // Seen in parallel, what is far away is as large as what is near.
-        _ => !parallel || POINT * roundoff * solid.magnitude() <= INVISIBLE * pixel,
+    let sight = Sight {
+        roundoff,
+        pixel,
+        parallel,
+        normal: SHADE / colors.scattered.max(1.0),
+        invisible: INVISIBLE,
+        hardly_visible: HARDLY_VISIBLE,
+        point: POINT,
     };
-    geometry.solids.iter().all(is_fine) && !surfaces_blur(geometry, scene, pixel)
+    geometry.solids.iter().all(|solid| solid.shape.is_fine(&sight)) && !surfaces_blur(geometry, scene, pixel)
 }

@@ -7,13 +7,15 @@ use fearless_simd::{Level, Simd};
 use glam::DVec3;
 use rayfold_scene::Scene;
 
+use super::dispatch::on;
 use super::features::Everything;
 use super::geometry::Geometry;
-use super::intersect::Ray;
+use super::packet::Ray;
 use super::precision::resolve;
 use super::prepare::Prepared;
 use super::real::{Lanes, Real, Vec3};
-use super::search::{Candidates, nearest};
+use super::search::nearest;
+use super::shape::Robust;
 use super::surfaces::surface;
 use crate::{Precision, RenderError, RenderOptions};
 
@@ -58,6 +60,9 @@ fn one_by_one(scene: &Scene, origin: DVec3, direction: DVec3) -> Option<Found> {
     Some(Found { object: hit.object, distance: hit.distance, normal: hit.surface.normal })
 }
 
+/// Columns and rows of a tile, where there is none.
+const TILE: (u32, u32) = (16, 16);
+
 struct Batch<'a, E> {
     scene: &'a Prepared<E>,
     geometry: &'a Geometry,
@@ -71,7 +76,7 @@ fn probe<E: Real>(
     options: &RenderOptions,
     run: impl Fn(&Batch<E>, Level, &mut Vec<Option<Found>>),
 ) -> Result<Vec<Option<Found>>, RenderError> {
-    let prepared = Prepared::<E>::new(scene, geometry, options.tree, super::SIDE)?;
+    let prepared = Prepared::<E>::new(scene, geometry, options.tree, TILE)?;
     let mut out = Vec::with_capacity(rays.len());
     run(&Batch { scene: &prepared, geometry, rays }, options.level.unwrap_or_else(Level::new), &mut out);
     Ok(out)
@@ -106,9 +111,9 @@ impl<E: Real> Batch<'_, E> {
             #[inline(always)]
             |ray, from_eye, count| {
                 let found = if from_eye {
-                    nearest::<S, E, Everything, true>(simd, self.scene, ray, Candidates::all(self.scene))
+                    nearest::<S, E, Everything<Robust>, true>(simd, self.scene, ray, self.scene.all())
                 } else {
-                    nearest::<S, E, Everything, false>(simd, self.scene, ray, Candidates::all(self.scene))
+                    nearest::<S, E, Everything<Robust>, false>(simd, self.scene, ray, self.scene.all())
                 };
                 let hit = found.hit(simd).to_bitmask();
                 let mut normals = [DVec3::ZERO; 16];
@@ -117,10 +122,23 @@ impl<E: Real> Batch<'_, E> {
                     let order = found.order[remaining.trailing_zeros() as usize];
                     let entry = &self.scene.entries[order.to_index()];
                     let normal = if from_eye {
-                        surface::<S, E, Everything, true>(simd, self.scene, entry, ray, found.distance).normal
+                        surface::<S, E, Everything<Robust>, true>(
+                            simd,
+                            self.scene,
+                            entry,
+                            ray,
+                            found.distance,
+                        )
+                        .normal
                     } else {
-                        surface::<S, E, Everything, false>(simd, self.scene, entry, ray, found.distance)
-                            .normal
+                        surface::<S, E, Everything<Robust>, false>(
+                            simd,
+                            self.scene,
+                            entry,
+                            ray,
+                            found.distance,
+                        )
+                        .normal
                     };
                     for (lane, known) in normals.iter_mut().enumerate().take(Lanes::<S, E>::LEN) {
                         if found.order[lane] == order {

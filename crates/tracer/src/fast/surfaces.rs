@@ -1,12 +1,12 @@
-//! What a generation's rays have met: colours without light, surfaces, and the rays that mirrors send on.
+//! What rays have met: colours without light, surfaces, and the rays that mirrors send on.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
+use super::bounce::{Column, Columns, Hits, Queue, lanes, weigh};
 use super::features::Features;
-use super::generation::{Column, Columns, Hits, Queue, lanes, weigh};
-use super::intersect::{Nearest, Ray, Slopes, Surface};
-use super::prepare::{Entry, Kind, OFFSET, Prepared};
+use super::packet::{Nearest, Ray, Surface};
+use super::prepare::{Entry, Prepared};
 use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
 
 /// The colour of hits that neither light nor mirrors change.
@@ -97,9 +97,17 @@ impl<S: Simd, E: Real> Share<S, E> {
     }
 }
 
-/// The colour of hits without light, and for light (if `LIT`) and mirrors how their surfaces lie.
+/// The colour of hits without light, and how their surfaces lie: those of all, if light is to fall on them (`LIT`), or
+/// those alone that send rays on. Which lanes do is noted if any can (`MIRRORS`).
 #[inline(never)]
-pub(super) fn surfaces<S: Simd, E: Real, F: Features, const EYE: bool, const LIT: bool>(
+pub(super) fn surfaces<
+    S: Simd,
+    E: Real,
+    F: Features<E>,
+    const EYE: bool,
+    const LIT: bool,
+    const MIRRORS: bool,
+>(
     simd: S,
     scene: &Prepared<E>,
     background: [E; 3],
@@ -125,7 +133,7 @@ pub(super) fn surfaces<S: Simd, E: Real, F: Features, const EYE: bool, const LIT
                         let bits = same.to_bitmask();
                         let behind = weigh::<S, E, EYE>(simd, background, queue, at);
                         share.put(simd, weigh::<S, E, EYE>(simd, entry.ambient, queue, at), behind, color);
-                        if F::MIRRORS && entry.mirrors {
+                        if MIRRORS && entry.mirrors {
                             mirror_bits |= bits;
                         } else if !LIT {
                             return;
@@ -150,7 +158,7 @@ pub(super) fn surfaces<S: Simd, E: Real, F: Features, const EYE: bool, const LIT
                         share.put(simd, surface.start, Vec3::splat(simd, [x[lane], y[lane], z[lane]]), start);
                     },
                 );
-                if F::MIRRORS && mirror_bits != 0 {
+                if MIRRORS && mirror_bits != 0 {
                     mirrors.push((at, mirror_bits));
                 }
             }
@@ -213,30 +221,22 @@ fn compress<S: Simd, E: Real>(v: Vec3<S, E>, lanes: Mask<S, E>, into: &mut Colum
     Vec3::<S, E>::new(v.x.compress(lanes), v.y.compress(lanes), v.z.compress(lanes)).store(into, at);
 }
 
-/// All candidates but the object itself, where it cannot be in its own light: a convex one, seen from outside.
+/// All spheres but the object itself, where it is one that cannot be in its own light.
 #[inline(always)]
 fn own_shadow<E: Real, const EYE: bool>(scene: &Prepared<E>, entry: &Entry<E>) -> u64 {
-    let outside =
-        EYE && entry.kind == Kind::Sphere && scene.spheres[entry.index as usize].power > E::narrow(0.0);
+    let outside = EYE && scene.shapes.is_seen_from_outside(entry.kind, entry.index as usize);
     if outside && scene.tree.is_none() { !(1 << entry.index) } else { u64::MAX }
 }
 
 /// An object's surface where the rays meet it.
 #[inline(always)]
-pub(super) fn surface<S: Simd, E: Real, F: Features, const EYE: bool>(
+pub(super) fn surface<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
     entry: &Entry<E>,
     ray: Ray<S, E>,
     distance: Lanes<S, E>,
 ) -> Surface<S, E> {
-    let at = entry.index as usize;
-    if F::CUBOIDS && entry.kind == Kind::Cuboid {
-        let slopes = Slopes::new(simd, ray.direction);
-        return F::cuboid_surface(simd, &scene.cuboids[at], ray, slopes, distance, OFFSET);
-    }
-    if F::TRIANGLES && entry.kind == Kind::Triangle {
-        return F::triangle_surface(simd, &scene.triangles[at], ray, distance, OFFSET);
-    }
-    F::sphere_surface::<S, E, EYE>(simd, &scene.spheres[at], ray, distance)
+    let object = (F::one_of_these(entry.kind), entry.index as usize);
+    scene.shapes.surface::<S, F::By, EYE>(simd, object, ray, distance)
 }

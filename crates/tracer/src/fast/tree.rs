@@ -1,23 +1,22 @@
 //! A bounding volume hierarchy for scenes of many objects.
 //!
 //! `obvhs` groups the objects; the bounds are our own, of the kernels' precision and wide enough for every rounding
-//! error of [`Tree`]'s tests, so that the tree never hides what testing all objects would hit (Ize, "Robust BVH ray
-//! traversal", JCGT 2(2), 2013).
+//! error of their tests ([`padded`]), so that the tree never hides what testing all objects would hit.
 
 use std::ops::Range;
 
-use glam::{DVec3, Vec3A};
+use glam::Vec3A;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
 
-use super::geometry::Solid;
-use super::prepare::{Entry, Kind, MASKED};
+use super::bounds::{Bounds, NOTHING, join, padded};
+use super::candidates::MASKED;
+use super::kind::Kind;
+use super::placed::Placed;
 use super::real::Real;
+use super::shapes::Solid;
 use crate::parallel::map;
-
-/// Rounding errors of boxes and of rays against them, in roundoffs of the scene's size.
-const BOX: f64 = 32.0;
 
 /// Objects of a leaf at most.
 const LEAF: u32 = 4;
@@ -29,8 +28,8 @@ pub(super) struct Node<E> {
     pub(super) high: [E; 3],
     /// The first child, next to which stands the second, or the first of the leaf's objects in the array of their kind.
     first: u32,
-    /// Four times the number of a leaf's objects, and their kind; for an inner node the axis along which the first child
-    /// comes first.
+    /// The number of a leaf's objects above [`Kind::BITS`] bits with the number of their kind; for an inner node zero
+    /// above the axis along which the first child comes first.
     content: u32,
 }
 
@@ -46,16 +45,11 @@ impl<E> Node<E> {
     #[inline(always)]
     pub(super) fn content(&self) -> Content {
         let first = self.first as usize;
-        let (count, low) = (self.content >> 2, self.content & 3);
+        let (count, low) = (self.content >> Kind::BITS, self.content & ((1 << Kind::BITS) - 1));
         if count == 0 {
             return Content::Children(self.first, low as usize);
         }
-        let kind = match low {
-            0 => Kind::Sphere,
-            1 => Kind::Cuboid,
-            _ => Kind::Triangle,
-        };
-        Content::Leaf(kind, first..first + count as usize)
+        Content::Leaf(Kind::numbered(low), first..first + count as usize)
     }
 }
 
@@ -77,7 +71,7 @@ struct Branch {
     /// Solids, which are of one kind; 0 for a node with children.
     count: u32,
     /// The box around all that is in it.
-    bounds: (DVec3, DVec3),
+    bounds: Bounds,
 }
 
 /// What is in a branch.
@@ -101,14 +95,14 @@ impl Branches {
         }
     }
 
-    pub(super) fn bounds(&self, at: usize) -> (DVec3, DVec3) {
+    pub(super) fn bounds(&self, at: usize) -> Bounds {
         self.0[at].bounds
     }
 }
 
-struct Bounds(Aabb);
+struct Item(Aabb);
 
-impl Boundable for Bounds {
+impl Boundable for Item {
     fn aabb(&self) -> Aabb {
         self.0
     }
@@ -124,7 +118,7 @@ pub(super) fn group(solids: &mut Vec<Solid>, tree: Option<bool>) -> Option<Branc
 /// All solids in one leaf a kind.
 pub(super) fn stump(solids: &[Solid]) -> (Vec<Solid>, Branches) {
     let mut solids = solids.to_vec();
-    solids.sort_by_key(Solid::kind_rank);
+    solids.sort_by_key(|solid| solid.shape.kind().number());
     let mut branches = vec![Branch::EMPTY];
     leaf(&mut branches, 0, &solids, 0);
     let branches = Branches::bounded(branches, &solids);
@@ -133,8 +127,8 @@ pub(super) fn stump(solids: &[Solid]) -> (Vec<Solid>, Branches) {
 
 fn plant(solids: &mut Vec<Solid>) -> Branches {
     let bounds = map(solids, |solid| {
-        let (min, max) = solid.bounds();
-        Bounds(Aabb { min: Vec3A::from(min.as_vec3()), max: Vec3A::from(max.as_vec3()) })
+        let (min, max) = solid.shape.bounds();
+        Item(Aabb { min: Vec3A::from(min.as_vec3()), max: Vec3A::from(max.as_vec3()) })
     });
     let params = BvhBuildParams { max_prims_per_leaf: LEAF, ..BvhBuildParams::fast_build() };
     let grown = build_bvh2(&bounds, params, &mut Default::default());
@@ -155,7 +149,7 @@ fn plant(solids: &mut Vec<Solid>) -> Branches {
             let from = order.len();
             let items = &grown.primitive_indices[first..first + node.prim_count as usize];
             order.extend(items.iter().map(|&item| solids[item as usize]));
-            order[from..].sort_by_key(Solid::kind_rank);
+            order[from..].sort_by_key(|solid| solid.shape.kind().number());
             leaf(&mut branches, at, &order[from..], from);
         }
     }
@@ -164,7 +158,7 @@ fn plant(solids: &mut Vec<Solid>) -> Branches {
 }
 
 impl Branch {
-    const EMPTY: Self = Self { first: 0, count: 0, bounds: (DVec3::INFINITY, DVec3::NEG_INFINITY) };
+    const EMPTY: Self = Self { first: 0, count: 0, bounds: NOTHING };
 }
 
 impl Branches {
@@ -176,7 +170,10 @@ impl Branches {
             branches[at].bounds = if count == 0 {
                 [branches[first].bounds, branches[first + 1].bounds].into_iter().fold(bounds, join)
             } else {
-                solids[first..first + count as usize].iter().map(Solid::bounds).fold(bounds, join)
+                solids[first..first + count as usize]
+                    .iter()
+                    .map(|solid| solid.shape.bounds())
+                    .fold(bounds, join)
             };
         }
         Self(branches)
@@ -185,8 +182,8 @@ impl Branches {
 
 /// Makes a leaf of solids that are sorted by kind, and more where they are of several; `from` is the place of the first.
 fn leaf(branches: &mut Vec<Branch>, at: usize, solids: &[Solid], from: usize) {
-    let kind = solids[0].kind_rank();
-    let alike = solids.partition_point(|solid| solid.kind_rank() == kind);
+    let kind = solids[0].shape.kind();
+    let alike = solids.partition_point(|solid| solid.shape.kind() == kind);
     if alike == solids.len() {
         branches[at] = Branch { first: from as u32, count: alike as u32, ..Branch::EMPTY };
         return;
@@ -199,8 +196,9 @@ fn leaf(branches: &mut Vec<Branch>, at: usize, solids: &[Solid], from: usize) {
 }
 
 impl<E: Real> Tree<E> {
-    /// `solids` are in the order of [`group`].
-    pub(super) fn new(branches: &Branches, solids: &[Solid], entries: &[Entry<E>]) -> Self {
+    /// `solids` are in the order of [`group`]; `index` is the position of each in the array of its kind, by its order in
+    /// the script.
+    pub(super) fn new(branches: &Branches, solids: &[Solid], index: impl Fn(u32) -> u32) -> Self {
         let branches = &branches.0;
         // Children change places so that the first comes first along the axis on which they lie farthest apart.
         let mut place: Vec<u32> = (0..branches.len() as u32).collect();
@@ -221,24 +219,12 @@ impl<E: Real> Tree<E> {
             let (first, content) = if count == 0 {
                 (first, axes[from as usize])
             } else {
-                let entry = &entries[solids[first as usize].order as usize];
-                (entry.index, count << 2 | entry.kind as u32)
+                let solid = &solids[first as usize];
+                (index(solid.order), count << Kind::BITS | solid.shape.kind().number())
             };
             let (low, high) = padded(bounds);
             Node { low, high, first, content }
         };
         Self { nodes: place.iter().map(node).collect() }
     }
-}
-
-/// A box as the tree's tests have it. One that lies within another is within that one here too.
-pub(super) fn padded<E: Real>((min, max): (DVec3, DVec3)) -> ([E; 3], [E; 3]) {
-    // A ray's origin is rounded relative to the scene's size, which is 1, wherever the box lies.
-    let slack = BOX * E::ROUNDOFF;
-    ((min - slack).to_array().map(E::narrow), (max + slack).to_array().map(E::narrow))
-}
-
-/// The box around two.
-pub(super) fn join(a: (DVec3, DVec3), b: (DVec3, DVec3)) -> (DVec3, DVec3) {
-    (a.0.min(b.0), a.1.max(b.1))
 }

@@ -6,11 +6,11 @@
 
 use glam::DVec3;
 
-use super::geometry::{Geometry, Shape, Solid, View};
-use super::prepare::BOUNDS;
-
-/// Part of a pixel by which tiles are widened.
-pub(super) const MARGIN: f64 = 1.0 / 32.0;
+use super::geometry::View;
+use super::placed::Placed;
+use super::rounding::{BOUNDS, MARGIN};
+use super::shapes::Shape;
+use crate::camera::Axis;
 
 /// A sphere as the eye sees it.
 #[derive(Clone, Copy, Debug)]
@@ -39,29 +39,28 @@ struct Span {
 }
 
 impl Window {
-    /// `solids` in the order of the bits, at most 64; `width` and `height` are the pixels of the image, `side` those
+    /// `shapes` in the order of the bits, at most 64; `width` and `height` are the pixels of the image, `side` those
     /// of a tile. `roundoff` is that of the kernels. Rows of tiles count from the top.
     pub(super) fn new(
-        geometry: &Geometry,
-        solids: &[&Solid],
+        view: View,
+        shapes: &[Shape],
         (width, height): (u32, u32),
         side: (u32, u32),
         roundoff: f64,
     ) -> Self {
-        let view = geometry.view;
-        let slack = |solid: &Solid| BOUNDS * roundoff * solid.magnitude();
+        let slack = |shape: &Shape| BOUNDS * roundoff * shape.magnitude();
         // Behind the eye nothing is seen.
         let ahead = match view {
             View::Pinhole { back, .. } => -back,
             View::Parallel { .. } => DVec3::NEG_Z,
         };
-        let visible = mask(solids, |solid| solid.support(ahead) >= -2.0 * slack(solid));
+        let visible = mask(shapes, |shape| shape.support(ahead) >= -2.0 * slack(shape));
         let span = |from: f64, to: f64, axis: fn(&View) -> DVec3| {
             let (from, to) = (from.min(to), from.max(to));
             let (along, back) = (axis(&view), back(&view));
-            let candidates = mask(solids, |solid| {
+            let candidates = mask(shapes, |shape| {
                 let beyond = |normal: DVec3, distance: f64| {
-                    solid.support(normal) >= distance - slack(solid) * (1.0 + normal.length())
+                    shape.support(normal) >= distance - slack(shape) * (1.0 + normal.length())
                 };
                 match back {
                     Some(back) => beyond(along + from * back, 0.0) && beyond(-along - to * back, 0.0),
@@ -70,20 +69,19 @@ impl Window {
             });
             Span { from, to, candidates: candidates & visible }
         };
-        let (x, y) = steps(&view);
+        let (x, y) = axes(&view);
         let tiles = |pixels: u32, side: u32| {
             (0..pixels).step_by(side as usize).map(move |i| (i, (i + side).min(pixels) - 1))
         };
-        let at = |(start, step): (f64, f64), pixel: f64| start + step * pixel;
         let columns = tiles(width, side.0).map(|(first, last)| {
-            span(at(x, f64::from(first) - MARGIN), at(x, f64::from(last) + MARGIN), right)
+            span(x.at(f64::from(first) - MARGIN), x.at(f64::from(last) + MARGIN), right)
         });
         let rows = tiles(height, side.1).map(|(first, last)| {
             let (first, last) = (height - 1 - first, height - 1 - last);
-            span(at(y, f64::from(first) + MARGIN), at(y, f64::from(last) - MARGIN), up)
+            span(y.at(f64::from(first) + MARGIN), y.at(f64::from(last) - MARGIN), up)
         });
         let caps = match view {
-            View::Pinhole { .. } => caps(solids, slack),
+            View::Pinhole { .. } => caps(shapes, slack),
             View::Parallel { .. } => vec![],
         };
         Self { columns: columns.collect(), rows: rows.collect(), caps, view }
@@ -136,31 +134,33 @@ fn up(view: &View) -> DVec3 {
     }
 }
 
-/// Start and step of the pixels' coordinates along both axes.
-pub(super) fn steps(view: &View) -> ((f64, f64), (f64, f64)) {
+/// The pixels' coordinates along both axes.
+pub(super) fn axes(view: &View) -> (Axis, Axis) {
     match *view {
         View::Pinhole { x, y, .. } => (widened(x), widened(y)),
-        View::Parallel { corner, pixel } => ((corner.x, pixel), (corner.y, pixel)),
+        View::Parallel { corner, pixel } => {
+            (Axis { start: corner.x, step: pixel }, Axis { start: corner.y, step: pixel })
+        }
     }
 }
 
 /// A single sample has no step; its tile is given a little width all the same.
-fn widened((start, step): (f64, f64)) -> (f64, f64) {
-    (start, if step == 0.0 { 1e-3 * start.abs().max(1.0) } else { step })
+fn widened(Axis { start, step }: Axis) -> Axis {
+    Axis { start, step: if step == 0.0 { 1e-3 * start.abs().max(1.0) } else { step } }
 }
 
-fn mask(solids: &[&Solid], is_candidate: impl Fn(&Solid) -> bool) -> u64 {
-    solids.iter().enumerate().fold(0, |mask, (bit, solid)| mask | u64::from(is_candidate(solid)) << bit)
+fn mask(shapes: &[Shape], is_candidate: impl Fn(&Shape) -> bool) -> u64 {
+    shapes.iter().enumerate().fold(0, |mask, (bit, shape)| mask | u64::from(is_candidate(shape)) << bit)
 }
 
-fn caps(solids: &[&Solid], slack: impl Fn(&Solid) -> f64) -> Vec<Cap> {
-    let cap = |(bit, solid): (usize, &&Solid)| {
-        let Shape::Sphere { center, radius, .. } = solid.shape else { return None };
-        let (away, radius) = (center.length(), radius + 2.0 * slack(solid));
+fn caps(shapes: &[Shape], slack: impl Fn(&Shape) -> f64) -> Vec<Cap> {
+    let cap = |(bit, shape): (usize, &Shape)| {
+        let (center, radius) = shape.ball()?;
+        let (away, radius) = (center.length(), radius + 2.0 * slack(shape));
         let sine = radius / away;
         let cosine = (1.0 - sine * sine).sqrt();
         // From within, a sphere is everywhere.
         (away > radius).then(|| Cap { bit: bit as u32, towards: center / away, sine, cosine })
     };
-    solids.iter().enumerate().filter_map(cap).collect()
+    shapes.iter().enumerate().filter_map(cap).collect()
 }

@@ -56,7 +56,11 @@ pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, Render
         |(), row, band| {
             let j = scene.screen.height() - 1 - row;
             for (pixel, i) in band.chunks_exact_mut(CHANNELS).zip(0u32..) {
-                pixel.copy_from_slice(&levels(color_along(scene, rays.ray(i, j), options.bounces())));
+                pixel.copy_from_slice(&levels(color_along(
+                    scene,
+                    rays.ray(f64::from(i), f64::from(j)),
+                    options.bounces(),
+                )));
             }
         },
     )
@@ -65,7 +69,7 @@ pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, Render
 /// The colour of a pixel, unclamped; `i` counts from the left, `j` from the bottom.
 pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
     let scene = &*recentred(scene);
-    color_along(scene, Rays::new(&scene.camera, scene.screen).ray(i, j), MAX_BOUNCES)
+    color_along(scene, Rays::new(&scene.camera, scene.screen).ray(f64::from(i), f64::from(j)), MAX_BOUNCES)
 }
 
 /// The nearest hit of a ray; of hits at the same distance, that of the object which comes first.

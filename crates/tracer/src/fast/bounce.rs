@@ -1,9 +1,9 @@
-//! A generation of rays: what the steps of drawing a tile hand to each other.
+//! The rays of a tile between two bounces: what the steps of drawing it hand to each other.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
-use super::intersect::Nearest;
+use super::packet::Nearest;
 use super::real::{Lanes, Real, Vec3};
 
 /// Pixels of a tile at most.
@@ -59,7 +59,7 @@ impl<E: Real> Queue<E> {
     }
 }
 
-/// What a generation's rays meet.
+/// What the rays of a tile meet.
 pub(super) struct Hits<E> {
     /// How far they go.
     pub(super) distance: Column<E>,
@@ -70,7 +70,7 @@ pub(super) struct Hits<E> {
     /// Diffuse coefficient times the ray's weight.
     pub(super) diffuse: Columns<E>,
     pub(super) color: Columns<E>,
-    /// For each packet with hits: where it begins, and the objects that can be in its way, as bits.
+    /// For each packet with hits: where it begins, and the spheres that can be in its light, as bits.
     pub(super) packets: Vec<(usize, u64)>,
     /// For each packet with mirrors: where it begins, and the lanes that meet them, as bits.
     pub(super) mirrors: Vec<(usize, u64)>,

@@ -1,4 +1,4 @@
-//! What rounding leaves open about rays and triangles, decided once and for all.
+//! A filtered predicate: whether a ray meets a triangle, where rounding leaves that open.
 //!
 //! The kernels take a ray for one that meets a triangle if it passes the edges on their inner sides within a bound on
 //! the rounding errors, so that edges belong to it and are straight. Beyond the tip of a thin triangle there are such
@@ -7,26 +7,14 @@
 //! are wide, and where it is met is within the box that the tree has for it, by the tree's own test. So nothing that is
 //! found depends on how it was searched.
 
-use std::sync::Arc;
-
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::DVec3;
 
+use super::bounds::{Crossing, padded};
 use super::exact::passes;
-use super::geometry::{Shape, Solid};
-use super::intersect::{Ray, triangle_shades};
-use super::prepare::Light;
+use super::packet::Ray;
 use super::real::{Lanes, Mask, Real, Vec3, constant};
-use super::search::Descent;
-use super::tree::padded;
-
-/// A bound on the rounding errors of all other distances, as a part of 1 and of the distance: the kernels' of the height
-/// above the plane (9 roundoffs) and of the slope (4) by [`Beside::flat`], with room, and what a normal is off that was
-/// worked out in `f64` from corners before they were rounded. Nearer than that a ray may start beyond the plane.
-pub(super) const fn distance_error<E: Real>() -> f64 {
-    512.0 * E::ROUNDOFF + 2048.0 * f64::EPSILON
-}
 
 /// How far beside a triangle a ray may pass and meet it, in roundoffs.
 ///
@@ -64,29 +52,14 @@ impl Beside {
     }
 }
 
-/// The triangles' corners before rounding.
-#[derive(Debug)]
-pub(super) struct Corners {
-    solids: Arc<Vec<Solid>>,
-    /// The triangles among the solids.
-    places: Vec<u32>,
+/// The corners of triangles before they were rounded.
+pub(super) trait Corners {
+    /// Those of the triangle at this position in the array of triangles.
+    fn of(&self, at: usize) -> [DVec3; 3];
 }
 
-/// A triangle's corners, by its position in the array of triangles.
-pub(super) type Place<'a> = (&'a Corners, usize);
-
-impl Corners {
-    pub(super) fn new(solids: Arc<Vec<Solid>>, places: Vec<u32>) -> Self {
-        Self { solids, places }
-    }
-
-    fn of(&self, at: usize) -> [DVec3; 3] {
-        match self.solids[self.places[at] as usize].shape {
-            Shape::Triangle { vertices, .. } => vertices,
-            _ => unreachable!("the places are those of triangles"),
-        }
-    }
-}
+/// Where a shape stands among those of its kind, and where to look up the corners of one that is a triangle.
+pub(super) type Place<'a> = (&'a dyn Corners, usize);
 
 /// Which of the doubtful lanes meet the triangle, and where: the distance, brought into the triangle's box. Lanes that
 /// are `clear` of the edges are within them.
@@ -121,39 +94,9 @@ pub(super) fn settle<S: Simd, E: Real>(
             let met = Lanes::<S, E>::from_slice(simd, &met[..Lanes::<S, E>::LEN]);
             let [a, b, c] = corners;
             let (low, high) = padded::<E>((a.min(b).min(c), a.max(b).max(c)));
-            let (enter, leave) = Descent::new(simd, ray.origin, ray.direction).span(simd, low, high);
+            let (enter, leave) = Crossing::new(simd, ray).span(simd, low, high);
             let met = clear | met.simd_gt(constant::<S, E>(simd, 0.0));
             (met & enter.simd_le(leave), distance.min(leave).max(enter))
-        },
-    )
-}
-
-/// Which of the doubtful points lie in the shadow of one of the triangles at these positions.
-#[cold]
-#[inline(never)]
-pub(super) fn settle_shadows<S: Simd, E: Real>(
-    simd: S,
-    corners: &Corners,
-    light: &Light<E>,
-    point: Vec3<S, E>,
-    doubtful: Mask<S, E>,
-    triangles: impl Iterator<Item = usize>,
-) -> Mask<S, E> {
-    simd.vectorize(
-        #[inline(always)]
-        || {
-            let zero = constant::<S, E>(simd, 0.0);
-            let ray = Ray { origin: point, direction: Vec3::splat(simd, light.axes[2]) };
-            let none = zero.simd_lt(zero);
-            let mut dark = none;
-            for at in triangles {
-                let over = triangle_shades(simd, &light.shades[at], point).simd_ge(zero);
-                let open = doubtful & over & !dark;
-                if open.any_true() {
-                    dark |= settle(simd, (corners, at), ray, Beside::Light, (open, none), zero).0;
-                }
-            }
-            dark
         },
     )
 }

@@ -1,0 +1,57 @@
+//! What stands before S3's protocol: each request gets an id and is told where it came from, and every answer names the id.
+
+use std::net::IpAddr;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use hyper::body::Incoming;
+use hyper::header::{HeaderName, HeaderValue};
+use hyper::service::Service;
+use hyper::{Request, Response};
+use s3s::service::S3Service;
+use s3s::{Body, HttpError};
+
+use crate::identity::{in_sts_shape, is_for_sts};
+
+const REQUEST_ID: HeaderName = HeaderName::from_static("x-amz-request-id");
+
+static NEXT: AtomicU64 = AtomicU64::new(1);
+
+/// Where a request came from.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Origin {
+    /// The client's address.
+    pub(crate) source: String,
+    /// The request's id.
+    pub(crate) request: String,
+}
+
+/// The service of one connection.
+#[derive(Clone)]
+pub(crate) struct Front {
+    pub(crate) service: S3Service,
+    pub(crate) peer: IpAddr,
+}
+
+impl Service<Request<Incoming>> for Front {
+    type Response = Response<Body>;
+    type Error = HttpError;
+    type Future = std::pin::Pin<Box<dyn Future<Output = Result<Self::Response, Self::Error>> + Send>>;
+
+    fn call(&self, mut request: Request<Incoming>) -> Self::Future {
+        let id = format!("{:016X}", NEXT.fetch_add(1, Ordering::Relaxed));
+        let header = HeaderValue::from_str(&id);
+        request.extensions_mut().insert(Origin { source: self.peer.to_string(), request: id });
+        let for_sts = is_for_sts(request.method(), request.uri(), request.headers());
+        let service = self.service.clone();
+        Box::pin(async move {
+            let mut response = service.call(request.map(Body::from)).await?;
+            if for_sts {
+                response = in_sts_shape(response).await?;
+            }
+            if let Ok(header) = header {
+                response.headers_mut().insert(REQUEST_ID, header);
+            }
+            Ok(response)
+        })
+    }
+}

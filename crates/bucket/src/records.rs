@@ -1,0 +1,261 @@
+//! What the rows mean: buckets, objects, uploads, parts and waiting events, as JSON under ordered keys.
+//!
+//! JSON, because a row that a later version writes with a field more is still read. Knows no protocol.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, SystemTime};
+
+use redb::StorageError;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::checksum::Checksum;
+use crate::storage::{Batch, BodyId, Row, Table, View};
+
+/// Milliseconds since 1970.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(transparent)]
+pub(crate) struct Moment(pub(crate) u64);
+
+impl Moment {
+    pub(crate) fn now() -> Self {
+        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        Self(u64::try_from(since.as_millis()).unwrap_or(u64::MAX))
+    }
+
+    pub(crate) fn system_time(self) -> SystemTime {
+        SystemTime::UNIX_EPOCH + Duration::from_millis(self.0)
+    }
+
+    /// What HTTP's dates can say.
+    pub(crate) fn whole_seconds(self) -> SystemTime {
+        SystemTime::UNIX_EPOCH + Duration::from_secs(self.0 / 1000)
+    }
+}
+
+/// A bucket.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Bucket {
+    pub(crate) created: Moment,
+    /// Which changes are told.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) notifications: Vec<Notification>,
+}
+
+/// A rule of which changes are told.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Notification {
+    pub(crate) id: String,
+    pub(crate) queue: String,
+    /// S3's names of events, `*` at the end standing for any.
+    pub(crate) events: Vec<String>,
+    pub(crate) prefix: String,
+    pub(crate) suffix: String,
+}
+
+/// What an object's headers say of its content.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Headers {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) content_type: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) cache_control: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) content_disposition: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) content_encoding: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) content_language: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) expires: Option<String>,
+    /// The user's.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) metadata: BTreeMap<String, String>,
+}
+
+/// Where a body is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Body {
+    /// In a row.
+    Row(BodyId),
+    /// In a file.
+    File(BodyId),
+    /// In the parts that it was uploaded in.
+    Parts(BodyId),
+}
+
+/// An object.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Object {
+    pub(crate) size: u64,
+    /// Without quotes.
+    pub(crate) etag: String,
+    pub(crate) modified: Moment,
+    pub(crate) headers: Headers,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) checksum: Option<Checksum>,
+    pub(crate) body: Body,
+}
+
+/// One of the parts that an object was uploaded in.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct LayoutPart {
+    pub(crate) number: u16,
+    pub(crate) size: u64,
+    pub(crate) body: Body,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) checksum: Option<Checksum>,
+}
+
+/// The parts of an object, in order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Layout {
+    pub(crate) parts: Vec<LayoutPart>,
+}
+
+/// An unfinished upload.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Upload {
+    pub(crate) initiated: Moment,
+    pub(crate) headers: Headers,
+    /// Of each part, and of the whole.
+    pub(crate) algorithm: crate::checksum::Algorithm,
+    pub(crate) kind: crate::checksum::Kind,
+    /// The client named the algorithm.
+    pub(crate) asked: bool,
+}
+
+/// An uploaded part.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Part {
+    pub(crate) size: u64,
+    pub(crate) etag: String,
+    pub(crate) modified: Moment,
+    pub(crate) body: Body,
+    pub(crate) checksum: Checksum,
+}
+
+/// A change that is still to be told.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Event {
+    pub(crate) bucket: String,
+    pub(crate) key: String,
+    /// `ObjectCreated:Put`.
+    pub(crate) name: String,
+    pub(crate) time: Moment,
+    /// The rule's.
+    pub(crate) configuration: String,
+    /// Of what was created.
+    pub(crate) size: Option<u64>,
+    pub(crate) etag: Option<String>,
+    /// Who did it.
+    pub(crate) principal: String,
+    pub(crate) request: String,
+    pub(crate) source: String,
+}
+
+/// The keys of rows.
+pub(crate) mod key {
+    /// Of an object; with an empty key, of where a bucket's objects begin.
+    pub(crate) fn object(bucket: &str, key: &[u8]) -> Vec<u8> {
+        [bucket.as_bytes(), b"\0", key].concat()
+    }
+
+    /// Of an upload. The id has no zero byte, so that uploads are in the order of key and id.
+    pub(crate) fn upload(bucket: &str, key: &str, id: &str) -> Vec<u8> {
+        [bucket.as_bytes(), b"\0", key.as_bytes(), b"\0", id.as_bytes()].concat()
+    }
+
+    /// Of a part.
+    pub(crate) fn part(upload: &str, number: u16) -> Vec<u8> {
+        [upload.as_bytes(), b"\0", &number.to_be_bytes()].concat()
+    }
+
+    /// The object's key in an object's row's key.
+    pub(crate) fn of_object<'a>(row: &'a [u8], bucket: &str) -> &'a [u8] {
+        row.get(bucket.len() + 1..).unwrap_or_default()
+    }
+
+    /// Key and id in an upload's row's key.
+    pub(crate) fn of_upload<'a>(row: &'a [u8], bucket: &str) -> (&'a [u8], &'a [u8]) {
+        let rest = of_object(row, bucket);
+        let end = rest.iter().rposition(|byte| *byte == 0).unwrap_or(rest.len());
+        (&rest[..end], rest.get(end + 1..).unwrap_or_default())
+    }
+
+    /// The number in a part's row's key.
+    pub(crate) fn of_part(row: &[u8]) -> u16 {
+        row.last_chunk().map_or(0, |bytes| u16::from_be_bytes(*bytes))
+    }
+}
+
+/// A row's value.
+pub(crate) fn encode<T: Serialize>(record: &T) -> Result<Vec<u8>, StorageError> {
+    serde_json::to_vec(record).map_err(|error| StorageError::Corrupted(error.to_string()))
+}
+
+/// What a row's value means.
+pub(crate) fn decode<T: DeserializeOwned>(value: &[u8]) -> Result<T, StorageError> {
+    serde_json::from_slice(value)
+        .map_err(|error| StorageError::Corrupted(format!("a row is damaged: {error}")))
+}
+
+/// The record at a key.
+pub(crate) fn find<T: DeserializeOwned>(
+    view: &impl View,
+    table: Table,
+    key: &[u8],
+) -> Result<Option<T>, StorageError> {
+    view.get(table, key)?.map(|value| decode(&value)).transpose()
+}
+
+/// Sets the record at a key.
+pub(crate) fn set<T: Serialize>(
+    batch: &mut Batch<'_>,
+    table: Table,
+    key: &[u8],
+    record: &T,
+) -> Result<(), StorageError> {
+    batch.put(table, key, &encode(record)?)
+}
+
+/// The rows that begin with a prefix, all at once: of what is bounded.
+pub(crate) fn all(view: &impl View, table: Table, prefix: &[u8]) -> Result<Vec<Row>, StorageError> {
+    view.beginning_with(table, prefix)?.collect()
+}
+
+/// Removes a body that its record no longer refers to, wherever it is.
+pub(crate) fn release(batch: &mut Batch<'_>, body: Body) -> Result<(), StorageError> {
+    match body {
+        Body::Row(id) => drop(batch.remove(Table::Bodies, &id.key())?),
+        Body::File(id) => {
+            batch.remove(Table::Files, &id.key())?;
+            batch.discard(id);
+        }
+        Body::Parts(id) => {
+            let layout: Option<Layout> = find(batch, Table::Layouts, &id.key())?;
+            batch.remove(Table::Layouts, &id.key())?;
+            for part in layout.into_iter().flat_map(|layout| layout.parts) {
+                release(batch, part.body)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_taken_apart_again() {
+        let row = key::object("films", "a/ü".as_bytes());
+        assert_eq!(key::of_object(&row, "films"), "a/ü".as_bytes());
+        let row = key::upload("films", "a\0b", "0123");
+        assert_eq!(key::of_upload(&row, "films"), (&b"a\0b"[..], &b"0123"[..]));
+        assert_eq!(key::of_part(&key::part("0123", 10_000)), 10_000);
+        assert!(key::part("0123", 9) < key::part("0123", 10), "parts are in order of their numbers");
+        assert!(key::object("film", b"~") < key::object("films", b"a"), "a bucket's objects are together");
+    }
+}

@@ -1,0 +1,93 @@
+//! S3's errors, in its words.
+
+use hyper::StatusCode;
+use redb::StorageError;
+use s3s::{S3Error, S3ErrorCode, StdError, s3_error};
+
+use crate::storage::Unavailable;
+
+/// What a request ends with: what was asked for, or S3's error.
+pub(crate) type Answer<T> = Result<T, S3Error>;
+
+pub(crate) fn no_such_bucket() -> S3Error {
+    s3_error!(NoSuchBucket, "The specified bucket does not exist")
+}
+
+pub(crate) fn no_such_key() -> S3Error {
+    s3_error!(NoSuchKey, "The specified key does not exist.")
+}
+
+pub(crate) fn no_such_upload() -> S3Error {
+    s3_error!(
+        NoSuchUpload,
+        "The specified upload does not exist. The upload ID may be invalid, or the upload may have been aborted or completed."
+    )
+}
+
+pub(crate) fn precondition_failed() -> S3Error {
+    s3_error!(PreconditionFailed, "At least one of the pre-conditions you specified did not hold")
+}
+
+pub(crate) fn invalid_argument(message: impl Into<String>) -> S3Error {
+    S3Error::with_message(S3ErrorCode::InvalidArgument, message.into())
+}
+
+pub(crate) fn invalid_request(message: impl Into<String>) -> S3Error {
+    S3Error::with_message(S3ErrorCode::InvalidRequest, message.into())
+}
+
+pub(crate) fn not_implemented(what: &str) -> S3Error {
+    S3Error::with_message(S3ErrorCode::NotImplemented, format!("{what} is not implemented"))
+}
+
+/// A code that s3s does not know.
+pub(crate) fn coded(code: &'static str, status: StatusCode, message: impl Into<String>) -> S3Error {
+    let mut error = S3Error::with_message(S3ErrorCode::Custom(code.into()), message.into());
+    error.set_status_code(status);
+    error
+}
+
+/// What the storage's failures are to a client: a full disk is told apart, as trying again is of no use.
+pub(crate) fn unavailable(reason: &Unavailable) -> S3Error {
+    match reason {
+        Unavailable::Full => disk_full(),
+        Unavailable::Failed(_) => S3Error::with_message(S3ErrorCode::InternalError, reason.to_string()),
+        Unavailable::Ending => S3Error::with_message(S3ErrorCode::ServiceUnavailable, reason.to_string()),
+    }
+}
+
+pub(crate) fn disk_full() -> S3Error {
+    coded("InsufficientStorage", StatusCode::INSUFFICIENT_STORAGE, "the disk is full")
+}
+
+/// A file of a body failed.
+pub(crate) fn file_failed(error: std::io::Error) -> S3Error {
+    use std::io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+    match error.kind() {
+        StorageFull | QuotaExceeded | FileTooLarge => disk_full(),
+        _ => s3_error!(error, InternalError, "a file of the store failed"),
+    }
+}
+
+/// A snapshot could not be read.
+pub(crate) fn unreadable(error: StorageError) -> S3Error {
+    s3_error!(error, InternalError, "the store could not be read")
+}
+
+/// A request's body ended with an error. s3s tells what was wrong with it in words alone.
+pub(crate) fn body_failed(error: &StdError) -> S3Error {
+    let text = error.to_string();
+    if text.contains("Sha256Mismatch") {
+        coded(
+            "XAmzContentSHA256Mismatch",
+            StatusCode::BAD_REQUEST,
+            "The provided 'x-amz-content-sha256' header does not match what was computed.",
+        )
+    } else if text.contains("SignatureMismatch") {
+        s3_error!(SignatureDoesNotMatch, "The signature of a chunk does not match what was computed.")
+    } else if text.contains("FormatError") || text.contains("TooLarge") || text.contains("TooMany") {
+        invalid_request("The chunks of the body are not well formed.")
+    } else {
+        s3_error!(IncompleteBody, "The body ended before the number of bytes that Content-Length says.")
+    }
+}

@@ -1,0 +1,161 @@
+//! Buckets: made, found, listed, deleted; and what can be asked of one that has no such thing.
+
+use s3s::dto::*;
+use s3s::{S3Error, S3ErrorCode, S3Request, S3Response, S3Result, s3_error};
+
+use super::answer::{Answer, invalid_argument, not_implemented, unreadable};
+use super::meaning::OWNER;
+use super::objects::bucket;
+use super::{Service, check, time};
+use crate::records::{self, Moment, all, decode, find, key, release, set};
+use crate::storage::{Kind, Table, View};
+
+/// What a page of buckets holds when the client does not say.
+const PAGE: usize = 10_000;
+
+impl Service {
+    pub(super) fn buckets_listed(&self, input: &ListBucketsInput) -> Answer<ListBucketsOutput> {
+        let most = match input.max_buckets {
+            None => PAGE,
+            Some(most @ 1..=10_000) => usize::try_from(most).unwrap_or(PAGE),
+            Some(_) => return Err(invalid_argument("max-buckets is between 1 and 10000")),
+        };
+        let prefix = input.prefix.as_deref().unwrap_or_default();
+        let elsewhere = input.bucket_region.as_deref().is_some_and(|region| region != &*self.region);
+        let mut buckets = Vec::new();
+        let mut next = None;
+        // The token is the name of the last bucket told.
+        let after = input.continuation_token.as_deref().unwrap_or_default();
+        let rows = all(&self.snapshot()?, Table::Buckets, prefix.as_bytes()).map_err(unreadable)?;
+        for (name, value) in rows {
+            let name = String::from_utf8_lossy(&name).into_owned();
+            if elsewhere || *name <= *after {
+                continue;
+            }
+            if buckets.len() == most {
+                next = buckets.last().and_then(|last: &Bucket| last.name.clone());
+                break;
+            }
+            let record: records::Bucket = decode(&value).map_err(unreadable)?;
+            buckets.push(Bucket {
+                name: Some(name),
+                creation_date: Some(time(record.created)),
+                bucket_region: Some(self.region.to_string()),
+            });
+        }
+        Ok(ListBucketsOutput {
+            buckets: Some(buckets),
+            continuation_token: next,
+            owner: Some(owner()),
+            prefix: input.prefix.clone(),
+        })
+    }
+
+    pub(super) async fn bucket_created(&self, input: CreateBucketInput) -> Answer<CreateBucketOutput> {
+        if input.object_lock_enabled_for_bucket == Some(true) {
+            return Err(not_implemented("object lock"));
+        }
+        let configuration = input.create_bucket_configuration.unwrap_or_default();
+        if configuration.bucket.is_some() || configuration.location.is_some() {
+            return Err(not_implemented("a directory bucket"));
+        }
+        let place = configuration.location_constraint.as_ref().map(BucketLocationConstraint::as_str);
+        if place.is_some_and(|place| !place.is_empty() && place != &*self.region) {
+            return Err(s3_error!(
+                IllegalLocationConstraintException,
+                "The buckets of this store are in {}.",
+                self.region
+            ));
+        }
+        let name = input.bucket;
+        let location = format!("/{name}");
+        let create = self.change(Kind::Grows, move |batch| {
+            if batch.get(Table::Buckets, name.as_bytes())?.is_some() {
+                return Err(S3Error::with_message(
+                    S3ErrorCode::BucketAlreadyOwnedByYou,
+                    "Your previous request to create the named bucket succeeded and you already own it.",
+                )
+                .into());
+            }
+            let record = records::Bucket { created: Moment::now(), notifications: Vec::new() };
+            Ok(set(batch, Table::Buckets, name.as_bytes(), &record)?)
+        });
+        create.await?;
+        Ok(CreateBucketOutput { location: Some(location) })
+    }
+
+    pub(super) fn bucket_exists(&self, name: &str) -> Answer<()> {
+        self.bucket(&self.snapshot()?, name).map(drop)
+    }
+
+    pub(super) fn bucket_found(&self, input: &HeadBucketInput) -> Answer<HeadBucketOutput> {
+        self.bucket_exists(&input.bucket)?;
+        Ok(HeadBucketOutput { bucket_region: Some(self.region.to_string()), ..HeadBucketOutput::default() })
+    }
+
+    /// An empty location is us-east-1, as ever.
+    pub(super) fn bucket_location(&self, input: &GetBucketLocationInput) -> Answer<GetBucketLocationOutput> {
+        self.bucket_exists(&input.bucket)?;
+        let elsewhere = &*self.region != "us-east-1";
+        let location_constraint = elsewhere.then(|| self.region.to_string().into());
+        Ok(GetBucketLocationOutput { location_constraint })
+    }
+
+    /// Deletes an empty bucket, with its unfinished uploads.
+    pub(super) async fn bucket_deleted(&self, input: DeleteBucketInput) -> Answer<DeleteBucketOutput> {
+        let name = input.bucket;
+        let delete = self.change(Kind::Shrinks, move |batch| {
+            bucket(batch, &name)?;
+            let inside = key::object(&name, b"");
+            if batch.beginning_with(Table::Objects, &inside)?.next().transpose()?.is_some() {
+                return Err(s3_error!(BucketNotEmpty, "The bucket you tried to delete is not empty").into());
+            }
+            for (row, _) in all(batch, Table::Uploads, &inside)? {
+                let (_, id) = key::of_upload(&row, &name);
+                let parts = all(batch, Table::Parts, &[id, b"\0"].concat())?;
+                for (part, value) in parts {
+                    let record: records::Part = decode(&value)?;
+                    release(batch, record.body)?;
+                    batch.remove(Table::Parts, &part)?;
+                }
+                batch.remove(Table::Uploads, &row)?;
+            }
+            batch.remove(Table::Buckets, name.as_bytes())?;
+            Ok(())
+        });
+        delete.await?;
+        Ok(DeleteBucketOutput {})
+    }
+
+    /// What is asked for is no thing that a bucket here can have.
+    pub(super) fn no_configuration<I, O>(
+        &self,
+        req: &S3Request<I>,
+        bucket: &str,
+        code: S3ErrorCode,
+    ) -> S3Result<S3Response<O>> {
+        check(req)?;
+        let _: records::Bucket = find(&self.snapshot()?, Table::Buckets, bucket.as_bytes())
+            .map_err(unreadable)?
+            .ok_or_else(super::answer::no_such_bucket)?;
+        Err(S3Error::with_message(code, "The bucket has no such configuration"))
+    }
+}
+
+pub(super) fn owner() -> Owner {
+    Owner { display_name: Some("owner".to_owned()), id: Some(OWNER.to_owned()) }
+}
+
+/// The access list of everything.
+pub(super) fn owners_alone() -> GetBucketAclOutput {
+    let grantee = Grantee {
+        display_name: Some("owner".to_owned()),
+        email_address: None,
+        id: Some(OWNER.to_owned()),
+        type_: Type::from_static(Type::CANONICAL_USER),
+        uri: None,
+    };
+    let grant =
+        Grant { grantee: Some(grantee), permission: Some(Permission::from_static(Permission::FULL_CONTROL)) };
+    GetBucketAclOutput { grants: Some(vec![grant]), owner: Some(owner()) }
+}

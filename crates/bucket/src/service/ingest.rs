@@ -1,0 +1,225 @@
+//! A body on its way in: counted, digested and kept, with memory that does not grow with it.
+//!
+//! A small body stays in memory and becomes a row; a larger one goes to a file, a block at a time, while the next block
+//! is read. What the client said of it (length, MD5, checksum) is compared at the end, before anything refers to it.
+
+use bytes::Bytes;
+use futures_util::{Stream, StreamExt};
+use hyper::HeaderMap;
+use s3s::{S3Error, StdError, TrailingHeaders, s3_error};
+use tokio::task::JoinHandle;
+
+use super::answer::{Answer, body_failed, file_failed, invalid_request};
+use crate::checksum::{Algorithm, Checksum, Digests, bytes_of};
+use crate::storage::{NewBody, Storage};
+
+/// A body up to this size is a row: one sync for everything. Beyond it, writing it twice would cost more than its own.
+const ROW_BYTES: usize = 128 * 1024;
+
+/// What is digested and written at a time.
+const BLOCK_BYTES: usize = 1024 * 1024;
+
+/// Of one request: S3's.
+pub(crate) const LARGEST_BODY: u64 = 5 * 1024 * 1024 * 1024;
+
+/// What the client says of a body.
+pub(crate) struct Claims {
+    length: Option<u64>,
+    md5: Option<Vec<u8>>,
+    algorithm: Algorithm,
+    /// In a header.
+    checksum: Option<String>,
+    /// Behind the body.
+    trailer: Option<TrailingHeaders>,
+}
+
+/// A body that is all there, and as the client said.
+pub(crate) struct Ingested {
+    pub(crate) size: u64,
+    pub(crate) md5: [u8; 16],
+    pub(crate) checksum: Checksum,
+    pub(crate) content: Content,
+}
+
+/// Where it is until a row refers to it.
+pub(crate) enum Content {
+    Row(Vec<u8>),
+    File(NewBody),
+}
+
+impl Claims {
+    /// Those of a request with a body. `otherwise` is the checksum's algorithm where the client names none.
+    pub(crate) fn of_request(
+        headers: &HeaderMap,
+        trailer: Option<TrailingHeaders>,
+        otherwise: Algorithm,
+    ) -> Answer<Self> {
+        let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok()).map(str::trim);
+        let length = text("content-length").and_then(|text| text.parse().ok());
+        if length.is_none() {
+            return Err(s3_error!(MissingContentLength, "You must provide the Content-Length HTTP header."));
+        }
+        if length > Some(LARGEST_BODY) {
+            return Err(s3_error!(EntityTooLarge, "Your proposed upload exceeds the maximum allowed size"));
+        }
+        let md5 = match text("content-md5").map(bytes_of) {
+            None => None,
+            Some(Some(md5)) if md5.len() == 16 => Some(md5),
+            Some(_) => return Err(s3_error!(InvalidDigest, "The Content-MD5 you specified is not valid.")),
+        };
+        let mut named =
+            Algorithm::ALL.into_iter().filter(|algorithm| headers.contains_key(algorithm.header()));
+        let in_header = named.next();
+        let in_trailer = text("x-amz-trailer").and_then(|name| {
+            Algorithm::ALL.into_iter().find(|algorithm| algorithm.header().eq_ignore_ascii_case(name))
+        });
+        if named.next().is_some() || (in_header.is_some() && in_trailer.is_some()) {
+            let message =
+                "Expecting a single x-amz-checksum- header. Multiple checksum Types are not allowed.";
+            return Err(invalid_request(message));
+        }
+        if let (Some(name), None, None) = (text("x-amz-sdk-checksum-algorithm"), in_header, in_trailer) {
+            return Err(invalid_request(format!(
+                "x-amz-sdk-checksum-algorithm specified ({name}), but no corresponding x-amz-checksum-* or x-amz-trailer headers were found."
+            )));
+        }
+        let checksum = in_header.map(|algorithm| valid(algorithm, text(algorithm.header()))).transpose()?;
+        let algorithm = in_header.or(in_trailer).unwrap_or(otherwise);
+        let trailer = in_trailer.and(trailer);
+        Ok(Self { length, md5, algorithm, checksum, trailer })
+    }
+
+    /// None: a body that comes from the store itself.
+    pub(crate) fn none(algorithm: Algorithm) -> Self {
+        Self { length: None, md5: None, algorithm, checksum: None, trailer: None }
+    }
+}
+
+/// A checksum that has the right form.
+pub(crate) fn valid(algorithm: Algorithm, value: Option<&str>) -> Answer<String> {
+    value
+        .filter(|value| bytes_of(value).is_some_and(|bytes| bytes.len() == algorithm.bytes()))
+        .map(str::to_owned)
+        .ok_or_else(|| invalid_request(format!("Value for {} header is invalid.", algorithm.header())))
+}
+
+/// Takes a body in.
+pub(crate) async fn ingest<S>(storage: &Storage, claims: Claims, mut body: S) -> Answer<Ingested>
+where
+    S: Stream<Item = Result<Bytes, StdError>> + Unpin,
+{
+    let mut sink = Sink::new(storage.clone(), claims.algorithm);
+    while let Some(bytes) = body.next().await {
+        sink.take(&bytes.map_err(|error| body_failed(&error))?).await?;
+        if sink.size > claims.length.unwrap_or(LARGEST_BODY) {
+            return Err(s3_error!(
+                EntityTooLarge,
+                "The body is longer than Content-Length says, or than 5 GiB."
+            ));
+        }
+    }
+    let ingested = sink.end().await?;
+    if claims.length.is_some_and(|length| length != ingested.size) {
+        return Err(s3_error!(IncompleteBody, "The body is shorter than Content-Length says."));
+    }
+    if claims.md5.is_some_and(|md5| md5 != ingested.md5) {
+        return Err(s3_error!(BadDigest, "The Content-MD5 you specified did not match what we received."));
+    }
+    let header = claims.algorithm.header();
+    let claimed = match claims.trailer {
+        None => claims.checksum,
+        Some(trailer) => {
+            let value =
+                trailer.read(|headers| headers.get(header).and_then(|v| v.to_str().ok()).map(str::to_owned));
+            Some(valid(claims.algorithm, value.flatten().as_deref())?)
+        }
+    };
+    if claimed.is_some_and(|claimed| claimed != ingested.checksum.value) {
+        let name = claims.algorithm.name();
+        return Err(s3_error!(BadDigest, "The {name} you specified did not match the calculated checksum."));
+    }
+    Ok(ingested)
+}
+
+/// The ETag of a body.
+pub(crate) fn etag(md5: [u8; 16]) -> String {
+    md5.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+struct Sink {
+    storage: Storage,
+    size: u64,
+    block: Vec<u8>,
+    state: Option<State>,
+    writing: Option<JoinHandle<std::io::Result<State>>>,
+}
+
+struct State {
+    digests: Digests,
+    file: Option<NewBody>,
+}
+
+impl Sink {
+    fn new(storage: Storage, algorithm: Algorithm) -> Self {
+        let state = Some(State { digests: Digests::new(algorithm), file: None });
+        Self { storage, size: 0, block: Vec::new(), state, writing: None }
+    }
+
+    async fn take(&mut self, mut bytes: &[u8]) -> Answer<()> {
+        self.size += bytes.len() as u64;
+        while !bytes.is_empty() {
+            let (now, later) = bytes.split_at(bytes.len().min(BLOCK_BYTES - self.block.len()));
+            self.block.extend_from_slice(now);
+            bytes = later;
+            if self.block.len() == BLOCK_BYTES {
+                self.write().await?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits for the block before, and hands this one on.
+    async fn write(&mut self) -> Answer<()> {
+        let mut state = self.state().await?;
+        let block = std::mem::take(&mut self.block);
+        let bodies = self.storage.bodies().clone();
+        self.writing = Some(tokio::task::spawn_blocking(move || {
+            let mut file = match state.file.take() {
+                Some(file) => file,
+                None => bodies.create()?,
+            };
+            state.digests.update(&block);
+            file.write(&block)?;
+            state.file = Some(file);
+            Ok(state)
+        }));
+        Ok(())
+    }
+
+    async fn state(&mut self) -> Answer<State> {
+        match self.writing.take() {
+            Some(writing) => writing.await.map_err(S3Error::internal_error)?.map_err(file_failed),
+            None => self.state.take().ok_or_else(|| s3_error!(InternalError, "a body was taken in twice")),
+        }
+    }
+
+    async fn end(mut self) -> Answer<Ingested> {
+        let size = self.size;
+        let is_row = self.writing.is_none() && self.block.len() <= ROW_BYTES;
+        if is_row {
+            let mut state = self.state().await?;
+            state.digests.update(&self.block);
+            let (md5, checksum) = state.digests.finish();
+            return Ok(Ingested { size, md5, checksum, content: Content::Row(self.block) });
+        }
+        if !self.block.is_empty() {
+            self.write().await?;
+        }
+        let State { digests, file } = self.state().await?;
+        let mut file = file.ok_or_else(|| s3_error!(InternalError, "a body without a file"))?;
+        let finished = tokio::task::spawn_blocking(move || file.finish().map(|()| file)).await;
+        let file = finished.map_err(S3Error::internal_error)?.map_err(file_failed)?;
+        let (md5, checksum) = digests.finish();
+        Ok(Ingested { size, md5, checksum, content: Content::File(file) })
+    }
+}

@@ -1,0 +1,285 @@
+//! GetObject, HeadObject, GetObjectAttributes.
+
+use std::ops::Range as Bytes;
+
+use hyper::StatusCode;
+use hyper::header::{CONTENT_RANGE, ETAG, HeaderMap, HeaderValue, LAST_MODIFIED};
+use s3s::dto::*;
+use s3s::{S3Error, S3ErrorCode, S3Request, S3Response, S3Result, s3_error};
+
+use super::answer::{Answer, coded, invalid_argument, invalid_request};
+use super::conditions::ReadConditions;
+use super::writes::of;
+use super::{Service, time};
+use crate::checksum::Algorithm;
+use crate::records::{Layout, Object};
+
+/// What of an object is asked for.
+struct Selection {
+    bytes: Bytes<u64>,
+    /// Not the whole: answered 206 with its place.
+    partial: bool,
+    /// Of which part.
+    part: Option<usize>,
+}
+
+impl Service {
+    pub(super) async fn object_read(&self, input: GetObjectInput) -> S3Result<S3Response<GetObjectOutput>> {
+        let conditions = ReadConditions {
+            if_match: input.if_match,
+            if_none_match: input.if_none_match,
+            if_modified_since: input.if_modified_since,
+            if_unmodified_since: input.if_unmodified_since,
+        };
+        let held = self.held(&input.bucket, &input.key)?;
+        conditions.check(&held.object).map_err(|error| with_validators(error, &held.object))?;
+        let selection = select(&held.object, held.layout.as_ref(), input.range, input.part_number)?;
+        let whole = !selection.partial || selection.part.is_some();
+        let wanted =
+            whole && input.checksum_mode.as_ref().is_some_and(|mode| mode.as_str() == ChecksumMode::ENABLED);
+        let object = held.object.clone();
+        let sum = match (selection.part, &held.layout) {
+            (Some(part), Some(layout)) => layout.parts[part].checksum.clone(),
+            _ => object.checksum.clone(),
+        };
+        let sum = sum.as_ref().filter(|_| wanted);
+        let output = GetObjectOutput {
+            accept_ranges: Some("bytes".to_owned()),
+            cache_control: object.headers.cache_control,
+            checksum_crc32: of(sum, Algorithm::Crc32),
+            checksum_crc32c: of(sum, Algorithm::Crc32c),
+            checksum_crc64nvme: of(sum, Algorithm::Crc64nvme),
+            checksum_sha1: of(sum, Algorithm::Sha1),
+            checksum_sha256: of(sum, Algorithm::Sha256),
+            checksum_type: sum.map(|sum| ChecksumType::from_static(sum.kind.name())),
+            content_disposition: object.headers.content_disposition,
+            content_encoding: object.headers.content_encoding,
+            content_language: object.headers.content_language,
+            content_length: i64::try_from(selection.bytes.end - selection.bytes.start).ok(),
+            content_range: selection.partial.then(|| place(&selection.bytes, object.size)),
+            content_type: Some(object.headers.content_type.unwrap_or_else(default_type)),
+            e_tag: Some(ETag::Strong(object.etag)),
+            expires: object.headers.expires.as_deref().and_then(date),
+            last_modified: Some(object.modified.whole_seconds().into()),
+            metadata: Some(object.headers.metadata.into_iter().collect()),
+            parts_count: parts_count(input.part_number, held.layout.as_ref()),
+            body: Some(StreamingBlob::new(held.bytes(&self.storage, selection.bytes)?)),
+            ..GetObjectOutput::default()
+        };
+        Ok(S3Response::new(output))
+    }
+
+    pub(super) fn object_looked_at(
+        &self,
+        req: &S3Request<HeadObjectInput>,
+    ) -> S3Result<S3Response<HeadObjectOutput>> {
+        let input = &req.input;
+        let conditions = ReadConditions {
+            if_match: input.if_match.clone(),
+            if_none_match: input.if_none_match.clone(),
+            if_modified_since: input.if_modified_since.clone(),
+            if_unmodified_since: input.if_unmodified_since.clone(),
+        };
+        let snapshot = self.snapshot()?;
+        let object = self.object(&snapshot, &input.bucket, &input.key)?;
+        conditions.check(&object).map_err(|error| with_validators(error, &object))?;
+        let layout = match input.part_number {
+            Some(_) => self.layout(&snapshot, &object)?,
+            None => None,
+        };
+        let selection = select(&object, layout.as_ref(), input.range, input.part_number)?;
+        let whole = !selection.partial || selection.part.is_some();
+        let wanted =
+            whole && input.checksum_mode.as_ref().is_some_and(|mode| mode.as_str() == ChecksumMode::ENABLED);
+        let sum = match (selection.part, &layout) {
+            (Some(part), Some(layout)) => layout.parts[part].checksum.clone(),
+            _ => object.checksum.clone(),
+        };
+        let sum = sum.as_ref().filter(|_| wanted);
+        let output = HeadObjectOutput {
+            accept_ranges: Some("bytes".to_owned()),
+            cache_control: object.headers.cache_control,
+            checksum_crc32: of(sum, Algorithm::Crc32),
+            checksum_crc32c: of(sum, Algorithm::Crc32c),
+            checksum_crc64nvme: of(sum, Algorithm::Crc64nvme),
+            checksum_sha1: of(sum, Algorithm::Sha1),
+            checksum_sha256: of(sum, Algorithm::Sha256),
+            checksum_type: sum.map(|sum| ChecksumType::from_static(sum.kind.name())),
+            content_disposition: object.headers.content_disposition,
+            content_encoding: object.headers.content_encoding,
+            content_language: object.headers.content_language,
+            content_length: i64::try_from(selection.bytes.end - selection.bytes.start).ok(),
+            content_range: selection.partial.then(|| place(&selection.bytes, object.size)),
+            content_type: Some(object.headers.content_type.unwrap_or_else(default_type)),
+            e_tag: Some(ETag::Strong(object.etag)),
+            expires: object.headers.expires.as_deref().and_then(date),
+            last_modified: Some(object.modified.whole_seconds().into()),
+            metadata: Some(object.headers.metadata.into_iter().collect()),
+            parts_count: parts_count(input.part_number, layout.as_ref()),
+            ..HeadObjectOutput::default()
+        };
+        let mut response = S3Response::new(output);
+        response.status = selection.partial.then_some(StatusCode::PARTIAL_CONTENT);
+        Ok(response)
+    }
+
+    pub(super) fn object_attributes(
+        &self,
+        input: &GetObjectAttributesInput,
+    ) -> Answer<GetObjectAttributesOutput> {
+        let snapshot = self.snapshot()?;
+        let object = self.object(&snapshot, &input.bucket, &input.key)?;
+        let layout = self.layout(&snapshot, &object)?;
+        // One header may name several, with commas.
+        let asked = |name: &str| {
+            let mut named =
+                input.object_attributes.iter().flat_map(|attribute| attribute.as_str().split(','));
+            named.any(|attribute| attribute.trim() == name)
+        };
+        let sum = object.checksum.as_ref();
+        let checksum = Checksum {
+            checksum_crc32: of(sum, Algorithm::Crc32),
+            checksum_crc32c: of(sum, Algorithm::Crc32c),
+            checksum_crc64nvme: of(sum, Algorithm::Crc64nvme),
+            checksum_sha1: of(sum, Algorithm::Sha1),
+            checksum_sha256: of(sum, Algorithm::Sha256),
+            checksum_type: sum.map(|sum| ChecksumType::from_static(sum.kind.name())),
+        };
+        let parts = match layout.filter(|_| asked(ObjectAttributes::OBJECT_PARTS)) {
+            None => None,
+            Some(layout) => Some(parts_page(&layout, input.max_parts, input.part_number_marker)?),
+        };
+        Ok(GetObjectAttributesOutput {
+            checksum: asked(ObjectAttributes::CHECKSUM).then_some(checksum),
+            e_tag: asked(ObjectAttributes::ETAG).then(|| ETag::Strong(object.etag.clone())),
+            last_modified: Some(time(object.modified)),
+            object_parts: parts,
+            object_size: asked(ObjectAttributes::OBJECT_SIZE)
+                .then(|| i64::try_from(object.size).unwrap_or(i64::MAX)),
+            storage_class: asked(ObjectAttributes::STORAGE_CLASS)
+                .then(|| StorageClass::from_static(StorageClass::STANDARD)),
+            ..GetObjectAttributesOutput::default()
+        })
+    }
+}
+
+fn parts_page(layout: &Layout, most: Option<i32>, after: Option<i32>) -> Answer<GetObjectAttributesParts> {
+    let most = usize::try_from(most.unwrap_or(1000))
+        .map_err(|_| invalid_argument("max-parts is negative"))?
+        .min(1000);
+    let after = after.unwrap_or_default();
+    let mut rest = layout.parts.iter().filter(|part| i32::from(part.number) > after);
+    let parts: Vec<_> = rest
+        .by_ref()
+        .take(most)
+        .map(|part| {
+            let sum = part.checksum.as_ref();
+            ObjectPart {
+                checksum_crc32: of(sum, Algorithm::Crc32),
+                checksum_crc32c: of(sum, Algorithm::Crc32c),
+                checksum_crc64nvme: of(sum, Algorithm::Crc64nvme),
+                checksum_sha1: of(sum, Algorithm::Sha1),
+                checksum_sha256: of(sum, Algorithm::Sha256),
+                part_number: Some(i32::from(part.number)),
+                size: i64::try_from(part.size).ok(),
+            }
+        })
+        .collect();
+    Ok(GetObjectAttributesParts {
+        is_truncated: Some(rest.next().is_some()),
+        max_parts: i32::try_from(most).ok(),
+        next_part_number_marker: Some(parts.last().and_then(|part| part.part_number).unwrap_or_default()),
+        part_number_marker: Some(after),
+        parts: Some(parts),
+        total_parts_count: i32::try_from(layout.parts.len()).ok(),
+    })
+}
+
+fn select(
+    object: &Object,
+    layout: Option<&Layout>,
+    range: Option<Range>,
+    part: Option<i32>,
+) -> Answer<Selection> {
+    match (range, part) {
+        (None, None) => Ok(Selection { bytes: 0..object.size, partial: false, part: None }),
+        (Some(_), Some(_)) => {
+            Err(invalid_request("Cannot specify both Range header and partNumber query parameter."))
+        }
+        (Some(range), None) => {
+            let bytes = range.check(object.size).ok().filter(|bytes| bytes.start < bytes.end);
+            let bytes = bytes.ok_or_else(|| not_satisfiable(object.size))?;
+            Ok(Selection { bytes, partial: true, part: None })
+        }
+        (None, Some(number)) => {
+            if !(1..=10_000).contains(&number) {
+                return Err(invalid_argument(
+                    "Part number must be an integer between 1 and 10000, inclusive",
+                ));
+            }
+            // The n-th part of those that the object has, whatever numbers they were uploaded with.
+            let part = usize::try_from(number - 1).unwrap_or_default();
+            let Some(layout) = layout else {
+                return match part {
+                    0 => Ok(Selection { bytes: 0..object.size, partial: object.size > 0, part: Some(0) }),
+                    _ => Err(no_such_part()),
+                };
+            };
+            let size = layout.parts.get(part).ok_or_else(no_such_part)?.size;
+            let start = layout.parts[..part].iter().map(|part| part.size).sum();
+            Ok(Selection { bytes: start..start + size, partial: true, part: Some(part) })
+        }
+    }
+}
+
+fn no_such_part() -> S3Error {
+    coded(
+        "InvalidPartNumber",
+        StatusCode::RANGE_NOT_SATISFIABLE,
+        "The requested partnumber is not satisfiable",
+    )
+}
+
+fn not_satisfiable(size: u64) -> S3Error {
+    let mut error = s3_error!(InvalidRange, "The requested range is not satisfiable");
+    if let Ok(value) = HeaderValue::from_str(&format!("bytes */{size}")) {
+        error.set_headers(HeaderMap::from_iter([(CONTENT_RANGE, value)]));
+    }
+    error
+}
+
+/// What a 304 tells besides.
+fn with_validators(mut error: S3Error, object: &Object) -> S3Error {
+    if *error.code() == S3ErrorCode::NotModified {
+        let mut headers = HeaderMap::new();
+        if let Ok(etag) = HeaderValue::from_str(&format!("\"{}\"", object.etag)) {
+            headers.insert(ETAG, etag);
+        }
+        let mut date = Vec::new();
+        let modified = Timestamp::from(object.modified.whole_seconds());
+        if modified.format(TimestampFormat::HttpDate, &mut date).is_ok()
+            && let Ok(date) = HeaderValue::from_bytes(&date)
+        {
+            headers.insert(LAST_MODIFIED, date);
+        }
+        error.set_headers(headers);
+    }
+    error
+}
+
+fn place(bytes: &Bytes<u64>, size: u64) -> String {
+    format!("bytes {}-{}/{size}", bytes.start, bytes.end.saturating_sub(1))
+}
+
+fn parts_count(asked: Option<i32>, layout: Option<&Layout>) -> Option<i32> {
+    asked?;
+    layout.and_then(|layout| i32::try_from(layout.parts.len()).ok())
+}
+
+fn date(text: &str) -> Option<Timestamp> {
+    Timestamp::parse(TimestampFormat::HttpDate, text).ok()
+}
+
+fn default_type() -> String {
+    "binary/octet-stream".to_owned()
+}

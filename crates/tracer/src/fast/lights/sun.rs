@@ -1,0 +1,189 @@
+//! A sun: light from infinity, all of it in one direction.
+//!
+//! What is true of suns alone is here: axes of its own, along which a sphere is a circle; the outlines that objects have
+//! on its screen; the beam of shadow rays that start in a region, and which outlines it meets.
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+use glam::{DMat3, DVec3};
+
+use crate::fast::placed::Placed;
+use crate::fast::real::{Lanes, Real, Vec3, constant};
+use crate::fast::rounding::{BEAM, BOUNDS};
+
+/// A sun in the kernels' coordinates: the unit vector towards it, and its colour.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::fast) struct Direction {
+    pub(in crate::fast) towards: DVec3,
+    pub(in crate::fast) color: DVec3,
+}
+
+/// A sun as the kernels read it.
+#[derive(Clone, Debug)]
+pub(in crate::fast) struct Sun<E> {
+    /// Orthonormal; the last points towards the light.
+    pub(in crate::fast) axes: [[E; 3]; 3],
+    pub(in crate::fast) color: [E; 3],
+    /// 1 / direction for the axes where it is not zero.
+    pub(in crate::fast) inverse: [Option<E>; 3],
+}
+
+impl<E: Real> Sun<E> {
+    pub(in crate::fast) fn new(sun: &Direction) -> Self {
+        let (x, y) = sun.towards.any_orthonormal_pair();
+        Self {
+            axes: [x, y, sun.towards].map(|axis| axis.to_array().map(E::narrow)),
+            color: sun.color.to_array().map(E::narrow),
+            inverse: sun.towards.to_array().map(|d| (d != 0.0).then(|| E::narrow(1.0 / d))),
+        }
+    }
+
+    /// The axes as the kernels have them, a row each: so both sides of a test see the same map.
+    pub(in crate::fast) fn rounded(&self) -> DMat3 {
+        DMat3::from_cols_array_2d(&self.axes.map(|axis| axis.map(Real::widen))).transpose()
+    }
+
+    /// The unit vector towards it.
+    #[inline(always)]
+    pub(in crate::fast) fn towards<S: Simd>(&self, simd: S) -> Vec3<S, E> {
+        Vec3::splat(simd, self.axes[2])
+    }
+
+    /// A point in the sun's own axes.
+    #[inline(always)]
+    pub(in crate::fast) fn facing<S: Simd>(&self, simd: S, point: Vec3<S, E>) -> Vec3<S, E> {
+        let [x, y, z] = self.axes;
+        Vec3::<S, E>::new(
+            Vec3::splat(simd, x).dot(point),
+            Vec3::splat(simd, y).dot(point),
+            Vec3::splat(simd, z).dot(point),
+        )
+    }
+
+    /// The shadow rays that start in a box, wider by the rounding errors.
+    #[inline(always)]
+    pub(in crate::fast) fn beam(&self, low: [E; 3], high: [E; 3]) -> Beam {
+        let mut spans = [(0.0, 0.0); 3];
+        let mut starts = [0.0; 3];
+        for ((axis, (from, to)), nearest) in self.axes.iter().zip(&mut spans).zip(0..3) {
+            let mut slack = 0.0;
+            for ((direction, low), high) in axis.iter().zip(low).zip(high) {
+                let (a, b) = (direction.widen() * low.widen(), direction.widen() * high.widen());
+                *from += a.min(b);
+                *to += a.max(b);
+                // Of all coordinates: the light's axes are square to each other but for rounding.
+                slack += low.widen().abs().max(high.widen().abs());
+            }
+            *from -= BEAM * E::ROUNDOFF * slack;
+            *to += BEAM * E::ROUNDOFF * slack;
+            let backwards = self.axes[2][nearest] < E::narrow(0.0);
+            starts[nearest] = if backwards { -high[nearest].widen() } else { low[nearest].widen() };
+        }
+        let [x, y, z] = spans;
+        Beam { low: [x.0, y.0], high: [x.1, y.1], height: z.0, starts }
+    }
+}
+
+/// A region's shadow rays: the rectangle and the least height on a sun's screen, and where they start along the scene's
+/// axes, times the signs of the direction towards it.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::fast) struct Beam {
+    pub(in crate::fast) low: [f64; 2],
+    pub(in crate::fast) high: [f64; 2],
+    pub(in crate::fast) height: f64,
+    pub(in crate::fast) starts: [f64; 3],
+}
+
+/// An object as a sun sees it: a rectangle on its screen, how near to the light it reaches, and the farthest that it
+/// reaches along each scene axis in the light's direction, times the sign of that.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::fast) struct Outline {
+    pub(in crate::fast) low: [f64; 2],
+    pub(in crate::fast) high: [f64; 2],
+    pub(in crate::fast) top: f64,
+    pub(in crate::fast) exits: [f64; 3],
+}
+
+impl Outline {
+    /// `axes` are the sun's [rounded](Sun::rounded) ones.
+    pub(in crate::fast) fn new<E: Real>(shape: &impl Placed, axes: DMat3) -> Self {
+        let slack = BOUNDS * E::ROUNDOFF * shape.magnitude();
+        let reach = |axis: DVec3| shape.support(axis) + 2.0 * slack;
+        let [x, y] = [axes.row(0), axes.row(1)];
+        let (min, max) = shape.bounds();
+        // A face is exact: what starts beyond it, if only by its offset, is beyond it.
+        let is_exact = shape.is_its_box();
+        let rounded = |x: f64| if is_exact { E::narrow(x).widen() } else { x + slack };
+        let mut exits = [0.0; 3];
+        for (axis, limit) in exits.iter_mut().enumerate() {
+            let towards = axes.row(2)[axis];
+            // A light along the other two axes passes on both sides.
+            let exit = if towards > 0.0 {
+                max[axis]
+            } else if towards < 0.0 {
+                -min[axis]
+            } else {
+                E::FAR
+            };
+            *limit = rounded(exit);
+        }
+        Self { low: [-reach(-x), -reach(-y)], high: [reach(x), reach(y)], top: reach(axes.row(2)), exits }
+    }
+}
+
+/// The outlines of few objects, in columns, so that a packet of them is compared at once.
+///
+/// The columns are as long as a multiple of every packet's width; what is added overlaps nothing.
+#[derive(Clone, Debug, Default)]
+pub(in crate::fast) struct Outlines<E> {
+    low: [Vec<E>; 2],
+    high: [Vec<E>; 2],
+    exits: [Vec<E>; 3],
+    top: Vec<E>,
+}
+
+impl<E: Real> Outlines<E> {
+    /// In `room` rows.
+    pub(in crate::fast) fn new(of: &[Outline], room: usize) -> Self {
+        let column = |value: &dyn Fn(&Outline) -> f64, never: f64| {
+            let mut column: Vec<E> = of.iter().map(|outline| E::narrow(value(outline))).collect();
+            column.resize(room, E::narrow(never));
+            column
+        };
+        Self {
+            low: [0, 1].map(|axis| column(&|o| o.low[axis], E::FAR)),
+            high: [0, 1].map(|axis| column(&|o| o.high[axis], -E::FAR)),
+            exits: [0, 1, 2].map(|axis| column(&|o| o.exits[axis], -E::FAR)),
+            top: column(&|o| o.top, -E::FAR),
+        }
+    }
+
+    /// Those that can stand in a beam's way, by bits.
+    #[inline(always)]
+    pub(in crate::fast) fn in_the_way<S: Simd>(&self, simd: S, beam: Beam) -> u64 {
+        let (left, right) = (constant::<S, E>(simd, beam.low[0]), constant::<S, E>(simd, beam.high[0]));
+        let (bottom, top) = (constant::<S, E>(simd, beam.low[1]), constant::<S, E>(simd, beam.high[1]));
+        let near = constant::<S, E>(simd, beam.height);
+        let [x, y, z] = beam.starts;
+        let starts = Vec3::<S, E>::splat(simd, [E::narrow(x), E::narrow(y), E::narrow(z)]);
+        let mut candidates = 0;
+        let count = self.top.len();
+        for at in (0..count).step_by(Lanes::<S, E>::LEN) {
+            let overlap = load::<S, E>(simd, at, &self.low[0]).simd_le(right)
+                & load::<S, E>(simd, at, &self.high[0]).simd_ge(left)
+                & load::<S, E>(simd, at, &self.low[1]).simd_le(top)
+                & load::<S, E>(simd, at, &self.high[1]).simd_ge(bottom)
+                & load::<S, E>(simd, at, &self.top).simd_ge(near)
+                & load::<S, E>(simd, at, &self.exits[0]).simd_ge(starts.x)
+                & load::<S, E>(simd, at, &self.exits[1]).simd_ge(starts.y)
+                & load::<S, E>(simd, at, &self.exits[2]).simd_ge(starts.z);
+            candidates |= overlap.to_bitmask() << at;
+        }
+        candidates
+    }
+}
+
+#[inline(always)]
+fn load<S: Simd, E: Real>(simd: S, at: usize, from: &[E]) -> Lanes<S, E> {
+    Lanes::<S, E>::from_slice(simd, &from[at..at + Lanes::<S, E>::LEN])
+}

@@ -1,0 +1,146 @@
+//! The first step: the rays of a tile's pixels, or those that mirrors sent on, and what they meet.
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+
+use super::band::{Band, Tile};
+use super::bounce::{Hits, Queue, lanes, packet_shape, weigh};
+use super::candidates::Candidates;
+use super::features::Features;
+use super::packet::Ray;
+use super::prepare::Prepared;
+use super::rays::{AlongAxis, FromEye};
+use super::real::{Lanes, Real, Vec3, constant};
+use super::search::nearest;
+
+/// The numbers of the column and the row of each pixel of the tile, packet by packet; rows count from the bottom.
+#[inline(always)]
+fn each_packet<S: Simd, E: Real>(
+    simd: S,
+    (tile, band): (Tile, &Band),
+    mut each: impl FnMut(usize, Lanes<S, E>, Lanes<S, E>),
+) {
+    let (width, height) = packet_shape::<S, E>();
+    let columns = lanes::<S, E>(simd, 0, width);
+    let rows = (lanes::<S, E>(simd, 0, usize::MAX) - columns) * E::narrow(1.0 / width as f64);
+    let right = constant::<S, E>(simd, f64::from(tile.left + tile.width - 1));
+    let bottom = constant::<S, E>(simd, f64::from(tile.top + tile.height - 1));
+    let last_row = constant::<S, E>(simd, f64::from(band.size.1 - 1));
+    let mut at = 0;
+    for top in (0..tile.height as usize).step_by(height) {
+        for left in (0..tile.width as usize).step_by(width) {
+            // Lanes beyond the edge draw the pixel on the edge again.
+            let i = (columns + E::narrow((tile.left as usize + left) as f64)).min(right);
+            let row = (rows + E::narrow((tile.top as usize + top) as f64)).min(bottom);
+            each(at, i, last_row - row);
+            at += Lanes::<S, E>::LEN;
+        }
+    }
+}
+
+/// The rays of the tile's pixels from an eye, and what they meet.
+#[inline(never)]
+pub(super) fn look_from_eye<S: Simd, E: Real, F: Features<E>>(
+    simd: S,
+    scene: &Prepared<E>,
+    (tile, band): (Tile, &Band),
+    rays: FromEye<E>,
+    candidates: Candidates,
+    queue: &mut Queue<E>,
+    hits: &mut Hits<E>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let background: [E; 3] = band.background();
+            each_packet::<S, E>(
+                simd,
+                (tile, band),
+                #[inline(always)]
+                |at, i, j| {
+                    let direction = rays.direction(simd, i, j);
+                    direction.store(&mut queue.direction, at);
+                    let ray = Ray { origin: Vec3::zero(simd), direction };
+                    let found = nearest::<S, E, F, true>(simd, scene, ray, candidates);
+                    hits.add(
+                        simd,
+                        at,
+                        found,
+                        #[inline(always)]
+                        || Vec3::splat(simd, background),
+                    );
+                },
+            );
+        },
+    );
+}
+
+/// The rays of the tile's pixels along the axis.
+#[inline(never)]
+pub(super) fn aim_along_axis<S: Simd, E: Real>(
+    simd: S,
+    (tile, band): (Tile, &Band),
+    rays: AlongAxis<E>,
+    queue: &mut Queue<E>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let (zero, one) = (E::narrow(0.0), E::narrow(1.0));
+            each_packet::<S, E>(
+                simd,
+                (tile, band),
+                #[inline(always)]
+                |at, i, j| {
+                    let end = at + Lanes::<S, E>::LEN;
+                    rays.origin(simd, i, j).store(&mut queue.origin, at);
+                    Vec3::<S, E>::splat(simd, [zero, zero, E::narrow(-1.0)]).store(&mut queue.direction, at);
+                    Vec3::<S, E>::splat(simd, [one; 3]).store(&mut queue.weight, at);
+                    lanes::<S, E>(simd, at, usize::MAX).store_slice(&mut queue.pixel.0[at..end]);
+                    queue.count = end;
+                },
+            );
+        },
+    );
+}
+
+/// What the rays of a queue meet.
+#[inline(never)]
+pub(super) fn look<S: Simd, E: Real, F: Features<E>>(
+    simd: S,
+    scene: &Prepared<E>,
+    candidates: Candidates,
+    background: [E; 3],
+    queue: &mut Queue<E>,
+    hits: &mut Hits<E>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            // The last packet is filled up with the last ray.
+            let last = queue.count - 1;
+            let end = queue.count.next_multiple_of(Lanes::<S, E>::LEN);
+            for columns in [&mut queue.origin, &mut queue.direction, &mut queue.weight] {
+                for column in columns {
+                    let value = column.0[last];
+                    column.0[last + 1..end].fill(value);
+                }
+            }
+            queue.pixel.0[last + 1..end].fill(E::narrow(-1.0));
+            for at in (0..queue.count).step_by(Lanes::<S, E>::LEN) {
+                let ray = Ray {
+                    origin: Vec3::load(simd, &queue.origin, at),
+                    direction: Vec3::load(simd, &queue.direction, at),
+                };
+                let found = nearest::<S, E, F, false>(simd, scene, ray, candidates);
+                hits.add(
+                    simd,
+                    at,
+                    found,
+                    #[inline(always)]
+                    || weigh::<S, E, false>(simd, background, queue, at),
+                );
+            }
+        },
+    );
+}

@@ -1,0 +1,424 @@
+//! Triangles.
+
+use std::ops::Range;
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+use glam::{DMat3, DVec3};
+
+use crate::fast::bounds::Bounds;
+use crate::fast::lights::sun::Sun;
+use crate::fast::packet::{Nearest, Ray, Surface, affine, offset};
+use crate::fast::placed::{self, Face, Sight, across_corners};
+use crate::fast::predicate::{Beside, Corners, Place, settle};
+use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::rounding::{CONSTANT, EDGE_ON, GRAZING, OFFSET, SIDE, VOLUME, distance_error};
+use crate::fast::shape::{Aim, Items, Obstacles, Obstructs, Robust, Tests};
+
+/// A triangle in the kernels' coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::fast) struct Placed {
+    pub(in crate::fast) vertices: [DVec3; 3],
+    pub(in crate::fast) normal: DVec3,
+}
+
+impl placed::Placed for Placed {
+    fn bounds(&self) -> Bounds {
+        let [a, b, c] = self.vertices;
+        (a.min(b).min(c), a.max(b).max(c))
+    }
+
+    fn support(&self, direction: DVec3) -> f64 {
+        self.vertices.iter().map(|v| direction.dot(*v)).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    fn across(&self, axis: DVec3, back: DVec3, slack: f64) -> Option<(f64, f64)> {
+        across_corners(&self.vertices, axis, back, slack)
+    }
+
+    fn faces(&self) -> Range<usize> {
+        0..1
+    }
+
+    fn face(&self, _: usize) -> Face {
+        let [a, b, c] = self.vertices;
+        Face { corners: [a, b, c, c], normal: self.normal }
+    }
+
+    fn plane(&self) -> Option<DVec3> {
+        Some(self.normal)
+    }
+
+    fn is_fine(&self, sight: &Sight) -> bool {
+        sight.is_fine_if_flat(self.magnitude())
+    }
+}
+
+/// Plücker coordinates of an edge: its direction and its moment, the cross product of its ends.
+///
+/// `d · moment + direction · (o × d)` tells on which side of the edge the ray from `o` along `d` passes, with an error
+/// below `slack.0 + slack.1 · |o|₁`: what is within the error belongs to the triangle unless it lies beyond its tips, so
+/// that meshes have no cracks, neither along edges nor at vertices.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::fast) struct Edge<E> {
+    pub(in crate::fast) direction: [E; 3],
+    pub(in crate::fast) moment: [E; 3],
+    slack: (E, E),
+}
+
+impl<E: Real> Edge<E> {
+    /// The least and the most that the ray's side of the edge can be.
+    #[inline(always)]
+    fn side<S: Simd>(&self, simd: S, ray: Ray<S, E>, moment: Moment<S, E>) -> (Lanes<S, E>, Lanes<S, E>) {
+        let side = Vec3::splat(simd, self.moment).dot(ray.direction);
+        let side = Vec3::splat(simd, self.direction).dot_add(moment.moment, side);
+        let slack =
+            moment.reach.mul_add(splat::<S, E>(simd, self.slack.1), splat::<S, E>(simd, self.slack.0));
+        (side + slack, side - slack)
+    }
+}
+
+/// A triangle as the kernels read it.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::fast) struct Triangle<E> {
+    pub(in crate::fast) edges: [Edge<E>; 3],
+    /// The same edges for rays from the eye, in units of twice a bound on the error, turned so that what is visible is
+    /// not negative: below 0 is outside, from 0 to 1 in doubt. The last is a half, or less than zero where the eye lies in
+    /// the plane.
+    from_eye: [([E; 3], E); 3],
+    pub(in crate::fast) normal: [E; 3],
+    /// `normal · point` of its points.
+    pub(in crate::fast) height: E,
+    pub(in crate::fast) order: E,
+}
+
+impl<E: Real> Triangle<E> {
+    // Out of line, and below too, so that what is made of a million triangles is the same code whatever calls it.
+    #[inline(never)]
+    pub(in crate::fast) fn new(&Placed { vertices, normal }: &Placed, order: u32) -> Self {
+        let [a, b, c] = vertices;
+        let ends = Ends::new(vertices);
+        let [to_a, to_b, to_c] = ends.squares.map(f64::sqrt);
+        let volume = a.dot((b - a).cross(c - a));
+        let noise = VOLUME * to_a * to_b.max(to_c) * (b - a).length().max((c - a).length());
+        let sign = if volume.abs() > noise { volume.signum() } else { 0.0 };
+        // From elsewhere a cross product adds its errors.
+        let slack = |size: f64, noise: f64| E::narrow(2.0 * SIDE * E::ROUNDOFF * size + noise);
+        let edge = |from: usize, to: usize| {
+            let (direction, anchor) = (vertices[to] - vertices[from], ends.nearer(from, to));
+            let moment = anchor.cross(direction);
+            let length = l1(direction);
+            let noise = CONSTANT * l1(anchor) * length;
+            let scale = 0.5 * sign / (SIDE * E::ROUNDOFF * moment.length() + noise);
+            let from_eye = (point(moment * scale), E::narrow(if sign == 0.0 { -1.0 } else { 0.5 }));
+            let (direction, slack) = (point(direction), (slack(l1(moment), noise), slack(length, 0.0)));
+            (Edge { direction, moment: point(moment), slack }, from_eye)
+        };
+        let [a, b, c] = [edge(1, 2), edge(2, 0), edge(0, 1)];
+        Self {
+            edges: [a.0, b.0, c.0],
+            from_eye: [a.1, b.1, c.1],
+            normal: point(normal),
+            height: E::narrow(normal.dot(ends.nearest())),
+            order: E::narrow(f64::from(order)),
+        }
+    }
+
+    /// By the sides of its edges in Plücker coordinates, each with a bound on its error; what that leaves open is
+    /// [settled](settle). The distance is that of the plane, by the operations of a box's slab, so that one in the plane
+    /// of a face is met where the face is. A ray within the rounding error of the plane misses.
+    #[inline(always)]
+    fn meet_from_anywhere<S: Simd>(
+        &self,
+        simd: S,
+        place: Place,
+        ray: Ray<S, E>,
+        moment: Moment<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
+        let zero = constant::<S, E>(simd, 0.0);
+        let (a_left, a_right) = self.edges[0].side(simd, ray, moment);
+        let (b_left, b_right) = self.edges[1].side(simd, ray, moment);
+        let (c_left, c_right) = self.edges[2].side(simd, ray, moment);
+        let left = a_left.min(b_left).min(c_left).simd_ge(zero);
+        let right = a_right.max(b_right).max(c_right).simd_le(zero);
+        let inside = left | right;
+        if inside.any_true() {
+            let normal = Vec3::splat(simd, self.normal);
+            let slope = normal.dot(ray.direction);
+            let above = splat::<S, E>(simd, self.height) - normal.dot(ray.origin);
+            let distance = above * (constant::<S, E>(simd, 1.0) / slope);
+            let away = distance.simd_gt(constant::<S, E>(simd, distance_error::<E>()));
+            let clear = away
+                & (a_right.min(b_right).min(c_right).simd_gt(zero)
+                    | a_left.max(b_left).max(c_left).simd_lt(zero));
+            let hit = inside & distance.simd_gt(zero);
+            let ray = (ray.origin, ray.direction, Beside::Anywhere);
+            self.offer_settled(simd, place, ray, (hit, clear), (slope, distance), nearest);
+        }
+    }
+
+    #[inline(always)]
+    fn meet_from_eye<S: Simd>(
+        &self,
+        simd: S,
+        place: Place,
+        direction: Vec3<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
+        let [a, b, c] = self.from_eye;
+        let (a, b) = (affine(simd, a, direction), affine(simd, b, direction));
+        let least = a.min(b).min(affine(simd, c, direction));
+        let inside = least.simd_ge(constant::<S, E>(simd, 0.0));
+        if inside.any_true() {
+            let slope = Vec3::splat(simd, self.normal).dot(direction);
+            let distance = splat::<S, E>(simd, self.height) * (constant::<S, E>(simd, 1.0) / slope);
+            // What is clear of the edges lies ahead: the sides are turned that way.
+            let clear = least.simd_gt(constant::<S, E>(simd, 1.0));
+            let ray = (Vec3::zero(simd), direction, Beside::Eye);
+            self.offer_settled(simd, place, ray, (inside, clear), (slope, distance), nearest);
+        }
+    }
+
+    /// Offers a `hit`; where it is not `clear` of the edges, or nearly in the plane, what comes of it when settled. A ray
+    /// within the rounding error of the plane misses.
+    #[inline(always)]
+    fn offer_settled<S: Simd>(
+        &self,
+        simd: S,
+        place: Place,
+        (origin, direction, beside): (Vec3<S, E>, Vec3<S, E>, Beside),
+        (hit, clear): (Mask<S, E>, Mask<S, E>),
+        (slope, distance): (Lanes<S, E>, Lanes<S, E>),
+        nearest: &mut Nearest<S, E>,
+    ) {
+        let sure = clear & slope.abs().simd_ge(constant::<S, E>(simd, beside.flat()));
+        let doubtful = hit & !sure;
+        if !doubtful.any_true() {
+            return nearest.offer(simd, hit, distance, self.order);
+        }
+        let steep = slope.abs().simd_gt(constant::<S, E>(simd, GRAZING * E::ROUNDOFF));
+        // Put together here, so that only rays in doubt go through memory.
+        let ray = Ray { origin, direction };
+        let (met, settled) = settle(simd, place, ray, beside, (doubtful & steep, clear), distance);
+        let distance = doubtful.select(settled, distance);
+        let met = sure | (met & steep & distance.simd_gt(constant::<S, E>(simd, 0.0)));
+        nearest.offer(simd, hit & met, distance, self.order);
+    }
+}
+
+/// The triangle test's part of a ray.
+#[derive(Clone, Copy)]
+pub(in crate::fast) struct Moment<S: Simd, E: Real> {
+    /// origin x direction
+    pub(in crate::fast) moment: Vec3<S, E>,
+    /// |origin|₁
+    reach: Lanes<S, E>,
+}
+
+impl<E: Real> Aim<E> for Triangle<E> {
+    type Aimed<S: Simd> = Moment<S, E>;
+
+    #[inline(always)]
+    fn aim<S: Simd>(_: S, ray: Ray<S, E>) -> Moment<S, E> {
+        let Ray { origin, direction } = ray;
+        Moment { moment: origin.cross(direction), reach: origin.x.abs() + origin.y.abs() + origin.z.abs() }
+    }
+}
+
+impl<E: Real> Tests<Triangle<E>, E> for Robust {
+    #[inline(always)]
+    fn meet<S: Simd, const EYE: bool>(
+        simd: S,
+        triangle: &Triangle<E>,
+        place: Place,
+        ray: Ray<S, E>,
+        moment: Moment<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
+        if EYE {
+            triangle.meet_from_eye(simd, place, ray.direction, nearest);
+        } else {
+            triangle.meet_from_anywhere(simd, place, ray, moment, nearest);
+        }
+    }
+
+    /// The point is moved onto the plane by its height above it.
+    #[inline(always)]
+    fn surface<S: Simd, const EYE: bool>(
+        simd: S,
+        triangle: &Triangle<E>,
+        ray: Ray<S, E>,
+        distance: Lanes<S, E>,
+    ) -> Surface<S, E> {
+        let normal = Vec3::splat(simd, triangle.normal);
+        let zero = constant::<S, E>(simd, 0.0);
+        let point = ray.direction.scale_add(distance, ray.origin);
+        let height = splat::<S, E>(simd, triangle.height);
+        let above = normal.dot(point) - height;
+        let side = normal
+            .dot(ray.direction)
+            .simd_gt(zero)
+            .select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0));
+        let offset =
+            offset(simd, point, OFFSET) + height.abs() * constant::<S, E>(simd, OFFSET * E::ROUNDOFF);
+        Surface { start: normal.scale_add(side * offset - above, point), normal: normal.scale(side) }
+    }
+}
+
+/// A triangle as an obstacle to one sun: affine functions of the ray's origin.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::fast) struct Prism<E> {
+    /// In units of twice a bound on the error: below 0 is outside the triangle, from 0 to 1 in doubt.
+    sides: [([E; 3], E); 3],
+    /// The same for the side that the light does not shine on: below 0 is the other one.
+    depth: ([E; 3], E),
+}
+
+impl<E: Real> Prism<E> {
+    /// From the Plücker coordinates of the ray through `o` along `d`: `d · moment + direction · (o × d)`. `axes` are the
+    /// sun's [rounded](Sun::rounded) ones.
+    #[inline(never)]
+    pub(in crate::fast) fn new(&Placed { vertices, normal }: &Placed, axes: DMat3) -> Self {
+        let towards = axes.row(2);
+        let facing = normal.dot(towards);
+        let sign = facing.signum();
+        if facing.abs() <= EDGE_ON * E::ROUNDOFF {
+            return Self {
+                sides: [([E::narrow(0.0); 3], E::narrow(-1.0)); 3],
+                depth: ([E::narrow(0.0); 3], E::narrow(-1.0)),
+            };
+        }
+        let ends = Ends::new(vertices);
+        // No point has a coordinate beyond 1, no corner is farther away than the root of 3.
+        let scale = |slope: DVec3, start: f64, noise: f64| {
+            0.5 / (SIDE * E::ROUNDOFF * (l1(slope) + start.abs()) + noise)
+        };
+        let side = |from: usize, to: usize| {
+            let edge = vertices[to] - vertices[from];
+            let slope = towards.cross(edge) * sign;
+            let start = -slope.dot(ends.nearer(from, to));
+            let scale = scale(slope, start, 3.0 * CONSTANT * l1(edge));
+            (point(slope * scale), E::narrow(start * scale + 0.5))
+        };
+        let height = normal.dot(ends.nearest());
+        let scale = sign * scale(normal, height, CONSTANT);
+        Self {
+            sides: [side(1, 2), side(2, 0), side(0, 1)],
+            depth: (point(-normal * scale), E::narrow(height * scale)),
+        }
+    }
+
+    /// Whether points lie in the triangle's shadow: not below 0, certainly from 1.
+    #[inline(always)]
+    fn within<S: Simd>(&self, simd: S, point: Vec3<S, E>) -> Lanes<S, E> {
+        let [a, b, c] = self.sides;
+        let (a, b, c) = (affine(simd, a, point), affine(simd, b, point), affine(simd, c, point));
+        a.min(b).min(c).min(affine(simd, self.depth, point))
+    }
+}
+
+impl<E: Real> Obstructs<E> for Triangle<E> {
+    type Obstacle = Prism<E>;
+    type Faced<S: Simd> = ();
+
+    #[inline(always)]
+    fn face<S: Simd>(_: S, _: &Sun<E>, _: Vec3<S, E>) {}
+
+    /// By the most that any of the triangles says; what that leaves open is [settled](settle).
+    #[inline(always)]
+    fn unoccluded<S: Simd>(
+        simd: S,
+        obstacles: Obstacles<Prism<E>>,
+        items: impl Items,
+        sun: &Sun<E>,
+        (point, ()): (Vec3<S, E>, ()),
+        lit: Mask<S, E>,
+    ) -> Mask<S, E> {
+        let mut most = constant::<S, E>(simd, -1.0);
+        for (_, prism) in items.clone().of(obstacles.0) {
+            most = most.max(prism.within(simd, point));
+        }
+        let over = most.simd_ge(constant::<S, E>(simd, 0.0));
+        if !over.any_true() {
+            return lit;
+        }
+        let lit = lit & most.simd_lt(constant::<S, E>(simd, 1.0));
+        let doubtful = lit & over;
+        if doubtful.any_true() {
+            lit & !settle_shadows(simd, obstacles, items, sun, point, doubtful)
+        } else {
+            lit
+        }
+    }
+}
+
+/// Which of the doubtful points lie in the shadow of one of the triangles.
+#[cold]
+#[inline(never)]
+fn settle_shadows<S: Simd, E: Real>(
+    simd: S,
+    (prisms, corners): (&[Prism<E>], &dyn Corners),
+    items: impl Items,
+    sun: &Sun<E>,
+    point: Vec3<S, E>,
+    doubtful: Mask<S, E>,
+) -> Mask<S, E> {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let zero = constant::<S, E>(simd, 0.0);
+            let ray = Ray { origin: point, direction: sun.towards(simd) };
+            let none = zero.simd_lt(zero);
+            let mut dark = none;
+            for (at, prism) in items.of(prisms) {
+                let over = prism.within(simd, point).simd_ge(zero);
+                let open = doubtful & over & !dark;
+                if open.any_true() {
+                    dark |= settle(simd, (corners, at), ray, Beside::Light, (open, none), zero).0;
+                }
+            }
+            dark
+        },
+    )
+}
+
+/// A triangle's corners by how near they are to the eye: relative to the nearer one numbers are smaller, and rounded
+/// less.
+struct Ends {
+    vertices: [DVec3; 3],
+    /// Of their distances.
+    squares: [f64; 3],
+}
+
+impl Ends {
+    #[inline(always)]
+    fn new(vertices: [DVec3; 3]) -> Self {
+        Self { vertices, squares: vertices.map(|v| v.length_squared()) }
+    }
+
+    #[inline(always)]
+    fn nearer(&self, i: usize, j: usize) -> DVec3 {
+        self.vertices[if self.squares[i] < self.squares[j] { i } else { j }]
+    }
+
+    #[inline(always)]
+    fn nearest(&self) -> DVec3 {
+        let [a, b, c] = self.squares;
+        self.vertices[if a <= b && a <= c {
+            0
+        } else if b <= c {
+            1
+        } else {
+            2
+        }]
+    }
+}
+
+fn l1(v: DVec3) -> f64 {
+    v.abs().element_sum()
+}
+
+fn point<E: Real>(v: DVec3) -> [E; 3] {
+    v.to_array().map(E::narrow)
+}
