@@ -61,8 +61,10 @@ pub enum Code {
     NoTrace,
     /// A triangle that can never be hit.
     DegenerateTriangle,
-    /// A command that no `Trace` follows.
+    /// A command that no `Trace` follows, or none before a `Clear`.
     Unused,
+    /// A number that was probably written with a comma for a point, and is two.
+    DecimalComma,
     /// More faults than are described one by one.
     TooManyFaults,
     /// Settings that are not JSON, or not an object.

@@ -649,3 +649,97 @@ fn a_long_line_is_cut_around_the_fault() {
           = help: write `Trace`"#]],
     );
 }
+
+#[test]
+fn what_a_clear_removes_before_a_trace_has_no_effect() {
+    check(
+        "Screen 4 3\nTrace\nSphere 1 0 0 -5 1 0 0 0 0 0\nIlight 1 1 1 0 0 -1\nClear",
+        expect![[r#"
+        warning: this has no effect: a `Clear` removes it before a `Trace` shows it
+         --> a.txt:3:1
+          |
+        3 | Sphere 1 0 0 -5 1 0 0 0 0 0
+          | ^^^^^^ expected a `Trace` between this and the `Clear`
+          |
+          = help: `Trace` renders a frame of everything that stands before it"#]],
+    );
+    check(
+        "Screen 4 3\nBackground 1 1 1\nCamera 0 0 5 0 0 -1 0 1 0 1 -1 -1 1 1\nClear\nTrace",
+        expect![[r#"
+        warning: this has no effect: a `Clear` removes it before a `Trace` shows it
+         --> a.txt:2:1
+          |
+        2 | Background 1 1 1
+          | ^^^^^^^^^^ expected a `Trace` between this and the `Clear`
+          |
+          = help: `Trace` renders a frame of everything that stands before it"#]],
+    );
+    check(
+        "Screen 4 3\nTrace\nCamera 0 0 5 0 0 -1 0 1 0 1 -1 -1 1 1\nClear",
+        expect![[r#"
+        warning: this has no effect: no `Trace` follows
+         --> a.txt:3:1
+          |
+        3 | Camera 0 0 5 0 0 -1 0 1 0 1 -1 -1 1 1
+          | ^^^^^^ expected a `Trace` after this
+          |
+          = help: `Trace` renders a frame of everything that stands before it"#]],
+    );
+    check("Screen 4 3\nBackground 1 1 1\nTrace\nClear\nClear\nTrace", expect![]);
+}
+
+#[test]
+fn a_comma_as_decimal_sign() {
+    check(
+        "Screen 4 3\nBackground 0,5 1 0\nTrace",
+        expect![[r#"
+        error: `Background` takes 3 numbers, found 4
+         --> a.txt:2:18
+          |
+        2 | Background 0,5 1 0
+          |                  ^ expected the end of the line
+          |
+          = help: a comma separates numbers: if `0,5` is to be one, it is `0.5`; write `Background r g b`"#]],
+    );
+    check(
+        "Screen 4 3\nSphere 1,5 0 0 -5 1 0 0 0 0 0 # as 1.5\nTrace",
+        expect![[r#"
+        warning: `1,5` is two numbers
+         --> a.txt:2:8
+          |
+        2 | Sphere 1,5 0 0 -5 1 0 0 0 0 0 # as 1.5
+          |        ^^^ expected `1.5`, or a blank behind the comma
+          |
+          = help: the decimal sign is a point, a comma separates numbers"#]],
+    );
+    check(
+        "Screen 4 3\nSphere 1 -0,5 0 -5 1,5 0 0 0 0 0,25\nTrace",
+        expect![[r#"
+        warning: `-0,5` is two numbers
+         --> a.txt:2:10
+          |
+        2 | Sphere 1 -0,5 0 -5 1,5 0 0 0 0 0,25
+          |          ^^^^ expected `-0.5`, or a blank behind the comma
+          |
+          = help: the decimal sign is a point, a comma separates numbers"#]],
+    );
+}
+
+#[test]
+fn commas_that_separate_are_no_decimal_signs() {
+    check(
+        "Screen 4,3\nSphere 1 0,0,-5 1,0,0 0,0,0 1,1,1\nSphere 1, 0, 0, -5, 1, 0, 0, 0, 0, 0, 1\nTrace",
+        expect![],
+    );
+    check(
+        "Screen,4,3\nSphere,1,0,0,-5,1,0,0,0,0,0,1\nBackground 0,5,1,0\nTrace",
+        expect![[r#"
+        error: `Background` takes 3 numbers, found 4
+         --> a.txt:3:18
+          |
+        3 | Background 0,5,1,0
+          |                  ^ expected the end of the line
+          |
+          = help: write `Background r g b`"#]],
+    );
+}

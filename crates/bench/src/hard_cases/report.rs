@@ -80,9 +80,6 @@ impl Report {
     /// # Errors
     /// Never: text has room.
     pub fn page(&self, naive: &str) -> Result<String> {
-        let parts = |k: usize| -> (Vec<&Figure>, Vec<&Figure>) {
-            self.figures[k].iter().partition(|figure| figure.backend == naive)
-        };
         let mut table = String::from(
             "| case | what is asked | hold | largest figure | naive: hold | naive: largest figure |\n\
              | --- | --- | --: | --: | --: | --: |\n",
@@ -95,7 +92,9 @@ impl Report {
                 writeln!(table, "{title} | not measured | | | |")?;
                 continue;
             };
-            let (naives, others) = parts(k);
+            let (naives, others): (Vec<Figure>, Vec<Figure>) =
+                self.figures[k].iter().cloned().partition(|figure| figure.backend == naive);
+            let naives: Vec<Figure> = naives.into_iter().map(|figure| bounded(figure, &others)).collect();
             let (other, by_naive) = (Tally::of(&others), Tally::of(&naives));
             writeln!(table, "{title} | {} | {} | {} | {} |", other, other.worst, by_naive, by_naive.worst)?;
             ours.add(&other);
@@ -127,12 +126,12 @@ impl Report {
              tracer's {} hold {}.\n\n\
              Written by `cargo run --release -p rayfold-bench -- accuracy --hard-cases`, which measures every backend: the \
              plain `f64` tracer (`reference`), and packets in each precision by each width of vectors, down a tree and in \
-             other tiles. `{naive}` is a tracer of textbook formulas with an absolute epsilon, written to be compared with. \
+             other tiles. `{naive}` is a tracer of textbook formulas with an absolute epsilon, written to be compared with, and \
+             held to the others' bounds also where single precision is promised nothing. \
              What is right is said by an oracle of 640 bits. `tests/hard_cases.rs` holds every backend but the naive one to \
              the same bounds at quick sizes; seed {SEED}. All figures, also those without a bound, are in \
              [hard-cases/](hard-cases/): a file a case.\n\n\
-             {}\n\
-             ## What is asked, and how much of it holds\n\n\
+             {}## What is asked, and how much of it holds\n\n\
              A figure is the worst of its samples or a count; its largest is shown as a share of its bound, or as a count \
              where none is allowed.\n\n\
              {table}\n\
@@ -211,7 +210,7 @@ struct Worst {
 }
 
 impl Tally {
-    fn of(figures: &[&Figure]) -> Self {
+    fn of(figures: &[Figure]) -> Self {
         let mut tally = Self::default();
         for figure in figures {
             let Some(bound) = figure.bound else { continue };
@@ -261,6 +260,15 @@ impl std::fmt::Display for Worst {
     }
 }
 
+/// A figure without a bound with that of the others for the same.
+fn bounded(figure: Figure, others: &[Figure]) -> Figure {
+    // Behind that stand the seeds that a backend failed at.
+    let same = |what: &str| what.split(", seeds").next().map(str::to_owned);
+    let alike = others.iter().filter(|other| same(&other.what) == same(&figure.what));
+    let bound = figure.bound.or_else(|| alike.filter_map(|other| other.bound).reduce(f64::max));
+    Figure { bound, ..figure }
+}
+
 fn runs_file(folder: &Path) -> PathBuf {
     folder.join("runs.csv")
 }
@@ -305,7 +313,7 @@ mod tests {
             figure("f32", "t, ulp", 1e9, None),
             figure("f32", "cracks", f64::NAN, Some(0.0)),
             figure("textbook", "cracks", 12.0, Some(0.0)),
-            figure("textbook", "t, ulp", 1.6, Some(16.0)),
+            figure("textbook", "t, ulp, seeds 1 2", 1.6, None),
         ];
         report.add(run("12", Size::Full), figures);
         report.add(run("4", Size::Full), vec![figure("f64", "NaN", 0.0, Some(0.0))]);

@@ -60,8 +60,20 @@ struct Parser<'a> {
     traces: usize,
     /// Whether a word was probably meant to be a `Trace`.
     trace_misspelt: bool,
-    /// The first command since the last `Trace` that has no effect if no other `Trace` comes.
-    unused: Option<(Line<'a>, Range<usize>)>,
+    /// Where the first command since the last `Trace` stands that has no effect if no other `Trace` comes.
+    unseen: Unseen<(Line<'a>, Range<usize>)>,
+}
+
+/// What no `Trace` has shown yet.
+struct Unseen<T> {
+    /// Of what a `Clear` leaves: screen and camera.
+    lasting: Option<T>,
+    /// Of what a `Clear` removes.
+    removable: Option<T>,
+}
+
+impl<T> Unseen<T> {
+    const NOTHING: Self = Self { lasting: None, removable: None };
 }
 
 #[derive(Clone, Copy)]
@@ -81,6 +93,34 @@ struct Statement<'a> {
     values: [f64; MAX_NUMBERS],
 }
 
+/// The first parameter that was probably written with a comma for a point: `1,5`, in a line that would have as many
+/// numbers as its command takes if only blanks separated them.
+fn decimal_comma(text: &str, command: Command, words: &Words) -> Option<Range<usize>> {
+    // Most lines have no comma, which is quickly seen.
+    if !text.contains(',') {
+        return None;
+    }
+    let start = words.command.end;
+    let parameters = text[start..].split('#').next().unwrap_or_default();
+    let is_decimal = |part: &&str| {
+        let digits = |part: &str| part.bytes().all(|b| b.is_ascii_digit()) && !part.is_empty();
+        part.split_once(',')
+            .is_some_and(|(whole, fraction)| digits(whole.trim_start_matches(['+', '-'])) && digits(fraction))
+    };
+    let parts = || parameters.split([' ', '\t']).filter(|part| !part.is_empty());
+    let first = parts().find(is_decimal)?;
+    let at = first.as_ptr().addr() - text.as_ptr().addr();
+    let count = parts().filter(|part| *part != ",").count();
+    command.form().arity().contains(&count).then_some(at..at + first.len())
+}
+
+impl<'a> Statement<'a> {
+    /// Of its command.
+    fn place(&self) -> (Line<'a>, Range<usize>) {
+        (self.line, self.words.command.clone())
+    }
+}
+
 impl<'a> Parser<'a> {
     fn new(limits: &'a Limits, report: Report<'a>) -> Self {
         Self {
@@ -92,7 +132,7 @@ impl<'a> Parser<'a> {
             lights: 0,
             traces: 0,
             trace_misspelt: false,
-            unused: None,
+            unseen: Unseen::NOTHING,
         }
     }
 
@@ -111,8 +151,12 @@ impl<'a> Parser<'a> {
         if self.traces == 0 && !self.trace_misspelt {
             let end = last.bytes.len();
             self.report.error(last, end..end, wording::no_trace);
-        } else if let Some((line, span)) = self.unused.take() {
-            self.report.warning(line, span, wording::unused);
+        } else {
+            let Unseen { lasting, removable } = std::mem::replace(&mut self.unseen, Unseen::NOTHING);
+            let unseen = lasting.into_iter().chain(removable);
+            if let Some((line, span)) = unseen.min_by_key(|(line, _)| line.number) {
+                self.report.warning(line, span, wording::unused);
+            }
         }
         let script = if self.report.has_errors() { None } else { self.recorder.finish() };
         Parsed { script, diagnostics: self.report.finish() }
@@ -138,6 +182,10 @@ impl<'a> Parser<'a> {
         let values = self.values(line, text, command, &words);
         if values.is_none() {
             self.expect_no_more_of(command);
+        } else if words.count() > *command.form().arity().start()
+            && let Some(comma) = decimal_comma(text, command, &words)
+        {
+            self.report.warning(line, comma.clone(), || wording::decimal_comma(&text[comma]));
         }
         values.map(|values| Statement { line, command, words, values })
     }
@@ -174,7 +222,7 @@ impl<'a> Parser<'a> {
         match command {
             Command::Trace => {
                 self.trace_misspelt = true;
-                self.unused = None;
+                self.unseen = Unseen::NOTHING;
             }
             Command::Screen => {
                 if matches!(self.screen, ScreenState::Unset) {
@@ -222,7 +270,12 @@ impl<'a> Parser<'a> {
             good = false;
             self.report.error(line, words.rest(most), || {
                 let first = words.parameters().get(most).map_or("", |span| &text[span.clone()]);
-                wording::too_many(command, words, first)
+                wording::too_many(
+                    command,
+                    words,
+                    first,
+                    decimal_comma(text, command, words).map(|comma| &text[comma]),
+                )
             });
         }
         good.then_some(values)
@@ -258,7 +311,7 @@ impl<'a> Parser<'a> {
     }
 
     fn screen(&mut self, s: &Statement<'a>) {
-        self.awaits_trace(s);
+        self.unseen.lasting.get_or_insert_with(|| s.place());
         let limit = self.limits.max_pixels;
         self.screen = match self.read::<Screen>(s) {
             Some(screen) if screen.pixels() <= limit => ScreenState::Set(screen),
@@ -272,21 +325,21 @@ impl<'a> Parser<'a> {
     }
 
     fn camera(&mut self, s: &Statement<'a>, camera: Option<Camera>) {
-        self.awaits_trace(s);
+        self.unseen.lasting.get_or_insert_with(|| s.place());
         if let Some(camera) = camera {
             self.recorder.set_camera(camera);
         }
     }
 
     fn background(&mut self, s: &Statement<'a>) {
-        self.awaits_trace(s);
+        self.unseen.removable.get_or_insert_with(|| s.place());
         if let Some(background) = self.read(s) {
             self.recorder.set_background(background);
         }
     }
 
     fn object<T: Scripted + Into<Object>>(&mut self, s: &Statement<'a>) {
-        self.awaits_trace(s);
+        self.unseen.removable.get_or_insert_with(|| s.place());
         let Some(object) = self.read::<T>(s).map(Into::into) else { return };
         if let Some(doubt) = object.doubt() {
             let place = s.command.form().place(|_, parameter| parameter == doubt.parameter());
@@ -298,7 +351,7 @@ impl<'a> Parser<'a> {
     }
 
     fn light<T: Scripted + Into<Light>>(&mut self, s: &Statement<'a>) {
-        self.awaits_trace(s);
+        self.unseen.removable.get_or_insert_with(|| s.place());
         let Some(light) = self.read::<T>(s).map(Into::into) else { return };
         self.lights += 1;
         self.check_limit(s, self.lights, self.limits.max_lights, "lights in a scene");
@@ -307,20 +360,15 @@ impl<'a> Parser<'a> {
 
     fn clear(&mut self) {
         (self.objects, self.lights) = (0, 0);
-        self.unused = None;
-        self.recorder.clear();
-    }
-
-    /// A command that has no effect unless a `Trace` follows.
-    fn awaits_trace(&mut self, s: &Statement<'a>) {
-        if self.unused.is_none() {
-            self.unused = Some((s.line, s.words.command.clone()));
+        if let Some((line, span)) = self.unseen.removable.take() {
+            self.report.warning(line, span, wording::cleared);
         }
+        self.recorder.clear();
     }
 
     fn trace(&mut self, s: &Statement<'a>) {
         self.traces += 1;
-        self.unused = None;
+        self.unseen = Unseen::NOTHING;
         self.check_limit(s, self.traces, self.limits.max_frames.unwrap_or(usize::MAX), "frames");
         match self.screen {
             ScreenState::Set(screen) => self.record(|recorder| recorder.trace(screen)),

@@ -85,12 +85,13 @@ fn hint(word: &str) -> Option<String> {
 
 pub(super) fn too_few(command: Command, words: &Words) -> Fault {
     let (missing, _) = command.form().number(words.count());
-    miscounted(Code::TooFewParameters, command, words).expected(format!("expected `{missing}` here"))
+    miscounted(Code::TooFewParameters, command, words, None).expected(format!("expected `{missing}` here"))
 }
 
-/// `first` is the first word that is too much.
-pub(super) fn too_many(command: Command, words: &Words, first: &str) -> Fault {
-    let fault = miscounted(Code::TooManyParameters, command, words).expected("expected the end of the line");
+/// `first` is the first word that is too much; `comma` a parameter that was probably written with a comma for a point.
+pub(super) fn too_many(command: Command, words: &Words, first: &str, comma: Option<&str>) -> Fault {
+    let fault =
+        miscounted(Code::TooManyParameters, command, words, comma).expected("expected the end of the line");
     if Command::from_name(first).is_some() {
         fault.help("every command stands on a line of its own")
     } else {
@@ -98,7 +99,7 @@ pub(super) fn too_many(command: Command, words: &Words, first: &str) -> Fault {
     }
 }
 
-fn miscounted(code: Code, command: Command, words: &Words) -> Fault {
+fn miscounted(code: Code, command: Command, words: &Words, comma: Option<&str>) -> Fault {
     let (least, most) = command.form().arity().into_inner();
     let takes = match (least, most) {
         (0, 0) => "no parameters".to_string(),
@@ -109,8 +110,22 @@ fn miscounted(code: Code, command: Command, words: &Words) -> Fault {
         0 => "none".to_string(),
         count => grouped(count as u64),
     };
-    Fault::new(code, format!("`{}` takes {takes}, found {found}", command.name()))
-        .help(format!("write `{}`", command.form()))
+    Fault::new(code, format!("`{}` takes {takes}, found {found}", command.name())).help(match comma {
+        Some(comma) => format!("{}; write `{}`", two_numbers(comma), command.form()),
+        None => format!("write `{}`", command.form()),
+    })
+}
+
+/// About a number that was probably written with a comma for a point.
+pub(super) fn decimal_comma(comma: &str) -> Fault {
+    Fault::new(Code::DecimalComma, format!("{} is two numbers", quoted(comma)))
+        .expected(format!("expected {}, or a blank behind the comma", quoted(&comma.replace(',', "."))))
+        .help("the decimal sign is a point, a comma separates numbers")
+}
+
+fn two_numbers(comma: &str) -> String {
+    let one = comma.replace(',', ".");
+    format!("a comma separates numbers: if {} is to be one, it is {}", quoted(comma), quoted(&one))
 }
 
 /// `word` is the first of the numbers that it is about, in the place of `name`.
@@ -171,6 +186,12 @@ pub(super) fn doubtful(doubt: Doubt) -> Fault {
                 .expected("expected three points that are not on a line")
         }
     }
+}
+
+pub(super) fn cleared() -> Fault {
+    Fault::new(Code::Unused, "this has no effect: a `Clear` removes it before a `Trace` shows it")
+        .expected("expected a `Trace` between this and the `Clear`")
+        .help(TRACE_HELP)
 }
 
 pub(super) fn unused() -> Fault {
