@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 
 use rayfold_bucket::Webhook;
 
-pub struct Process {
+pub(crate) struct Process {
     child: Child,
     address: SocketAddr,
 }
@@ -15,7 +15,7 @@ pub struct Process {
 impl Process {
     /// Starts it and waits until it answers. `largest_file` is in blocks of 1024 bytes: beyond it, a write fails as on a full
     /// disk.
-    pub fn start(data: &Path, webhook: Option<&Webhook>, largest_file: Option<u64>) -> Self {
+    pub(crate) fn start(data: &Path, webhook: Option<&Webhook>, largest_file: Option<u64>) -> Self {
         let binary = env!("CARGO_BIN_EXE_rayfold-bucket");
         // The shell's limit outlives it, and so does the signal that it ignores.
         let limit = largest_file.map_or("unlimited".to_owned(), |blocks| blocks.to_string());
@@ -33,18 +33,18 @@ impl Process {
         Self { address: address.parse().unwrap(), child }
     }
 
-    pub fn address(&self) -> SocketAddr {
+    pub(crate) fn address(&self) -> SocketAddr {
         self.address
     }
 
     /// As `kill -9` does.
-    pub fn kill(mut self) {
+    pub(crate) fn kill(mut self) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
     }
 
     /// The most memory that it ever had, in bytes.
-    pub fn peak_memory(&self) -> u64 {
+    pub(crate) fn peak_memory(&self) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap();
         let line = status.lines().find(|line| line.starts_with("VmHWM:")).unwrap();
         line.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap() * 1024

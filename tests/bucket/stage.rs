@@ -15,16 +15,16 @@ use tempfile::TempDir;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 
-pub const BUCKET: &str = "films";
-pub const TOKEN: &str = "token";
+pub(crate) const BUCKET: &str = "films";
+pub(crate) const TOKEN: &str = "token";
 
-pub struct Stage {
-    pub server: Server,
-    pub client: Client,
-    pub folder: TempDir,
+pub(crate) struct Stage {
+    pub(crate) server: Server,
+    pub(crate) client: Client,
+    pub(crate) folder: TempDir,
 }
 
-pub fn client(address: SocketAddr) -> Client {
+pub(crate) fn client(address: SocketAddr) -> Client {
     let config = aws_sdk_s3::Config::builder()
         .behavior_version(BehaviorVersion::latest())
         .region(Region::new("us-east-1"))
@@ -37,7 +37,7 @@ pub fn client(address: SocketAddr) -> Client {
     Client::from_conf(config)
 }
 
-pub fn options(data: &Path, webhook: Option<Webhook>) -> Options {
+pub(crate) fn options(data: &Path, webhook: Option<Webhook>) -> Options {
     Options {
         data: data.to_owned(),
         address: ([127, 0, 0, 1], 0).into(),
@@ -48,11 +48,11 @@ pub fn options(data: &Path, webhook: Option<Webhook>) -> Options {
 }
 
 /// A store with one bucket.
-pub async fn stage() -> Stage {
+pub(crate) async fn stage() -> Stage {
     stage_with(None).await
 }
 
-pub async fn stage_with(webhook: Option<Webhook>) -> Stage {
+pub(crate) async fn stage_with(webhook: Option<Webhook>) -> Stage {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(options(folder.path(), webhook)).await.unwrap();
     let client = client(server.address());
@@ -61,39 +61,39 @@ pub async fn stage_with(webhook: Option<Webhook>) -> Stage {
 }
 
 impl Stage {
-    pub async fn put(&self, key: &str, body: impl Into<Vec<u8>>) -> String {
+    pub(crate) async fn put(&self, key: &str, body: impl Into<Vec<u8>>) -> String {
         let put = self.client.put_object().bucket(BUCKET).key(key).body(body.into().into());
         put.send().await.unwrap().e_tag.unwrap()
     }
 
-    pub async fn get(&self, key: &str) -> Vec<u8> {
+    pub(crate) async fn get(&self, key: &str) -> Vec<u8> {
         let got = self.client.get_object().bucket(BUCKET).key(key).send().await.unwrap();
         got.body.collect().await.unwrap().to_vec()
     }
 
     /// Files of large bodies on the disk.
-    pub fn files(&self) -> usize {
+    pub(crate) fn files(&self) -> usize {
         let folders = std::fs::read_dir(self.folder.path().join("bodies")).unwrap();
         folders.map(|folder| std::fs::read_dir(folder.unwrap().path()).unwrap().count()).sum()
     }
 
     /// Tells every change to the webhook.
-    pub async fn notify(&self) {
+    pub(crate) async fn notify(&self) {
         notify(&self.client).await;
     }
 
     /// A URL that may do what the request would.
-    pub fn presigning(&self) -> PresigningConfig {
+    pub(crate) fn presigning(&self) -> PresigningConfig {
         PresigningConfig::expires_in(Duration::from_secs(60)).unwrap()
     }
 
     /// Sends a request as it stands; gives status, headers and body as text.
-    pub async fn raw(&self, request: &str) -> String {
+    pub(crate) async fn raw(&self, request: &str) -> String {
         raw(self.server.address(), request.as_bytes()).await
     }
 }
 
-pub async fn notify(client: &Client) {
+pub(crate) async fn notify(client: &Client) {
     let queue = QueueConfiguration::builder()
         .queue_arn(QUEUE_ARN)
         .events(Event::from("s3:ObjectCreated:*"))
@@ -105,7 +105,7 @@ pub async fn notify(client: &Client) {
     set.send().await.unwrap();
 }
 
-pub async fn raw(address: SocketAddr, request: &[u8]) -> String {
+pub(crate) async fn raw(address: SocketAddr, request: &[u8]) -> String {
     let mut stream = TcpStream::connect(address).await.unwrap();
     stream.write_all(request).await.unwrap();
     let mut answer = Vec::new();
@@ -114,7 +114,7 @@ pub async fn raw(address: SocketAddr, request: &[u8]) -> String {
 }
 
 /// S3's code of an error, and the status.
-pub fn failure<T: std::fmt::Debug, E: ProvideErrorMetadata + std::fmt::Debug>(
+pub(crate) fn failure<T: std::fmt::Debug, E: ProvideErrorMetadata + std::fmt::Debug>(
     answer: Result<T, SdkError<E>>,
 ) -> (u16, String) {
     let error = answer.unwrap_err();
@@ -124,15 +124,15 @@ pub fn failure<T: std::fmt::Debug, E: ProvideErrorMetadata + std::fmt::Debug>(
 
 /// Names and keys of the events that a listener was told, in order.
 #[derive(Clone, Default)]
-pub struct Heard(pub Arc<Mutex<Vec<(String, String)>>>);
+pub(crate) struct Heard(pub(crate) Arc<Mutex<Vec<(String, String)>>>);
 
 impl Heard {
-    pub fn all(&self) -> Vec<(String, String)> {
+    pub(crate) fn all(&self) -> Vec<(String, String)> {
         self.0.lock().unwrap().clone()
     }
 
     /// Waits until so many were told.
-    pub async fn wait(&self, count: usize) -> Vec<(String, String)> {
+    pub(crate) async fn wait(&self, count: usize) -> Vec<(String, String)> {
         for _ in 0..1000 {
             if self.all().len() >= count {
                 return self.all();
@@ -144,7 +144,7 @@ impl Heard {
 }
 
 /// Listens for events. `refuse` answers 503 to as many at first.
-pub async fn listener(refuse: usize) -> (Webhook, Heard) {
+pub(crate) async fn listener(refuse: usize) -> (Webhook, Heard) {
     use http_body_util::{BodyExt, Empty};
     use hyper::body::{Bytes, Incoming};
     use hyper::{Request, Response, StatusCode};
