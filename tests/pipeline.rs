@@ -305,7 +305,8 @@ async fn the_requests_of_a_lonely_frame_are_these() {
             keys.collect::<Vec<_>>()
         };
         assert_eq!(kinds(Function::Render), ["frames", "manifests", "assemblies"]);
-        assert_eq!(kinds(Function::Assemble), ["animations"]);
+        // Its lease, and the GIF.
+        assert_eq!(kinds(Function::Assemble), ["frames", "animations"]);
     })
     .await;
 }

@@ -23,15 +23,17 @@ struct Lease {
     until: Timestamp,
 }
 
-/// Whether somebody else may take a lease that says this.
-fn may_be_taken(body: &[u8], request_id: &str, now: Timestamp) -> bool {
-    // One that cannot be read is nobody's.
-    let lease: Option<Lease> = serde_json::from_slice(body).ok();
-    lease.is_none_or(|lease| lease.assembler == request_id || lease.until <= now)
+/// Whose lease it is; one that cannot be read is nobody's.
+fn holder(body: &[u8]) -> Option<Lease> {
+    serde_json::from_slice(body).ok()
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Takes the animation's lease; says whether this invocation holds it.
+    /// Takes the animation's lease; says whether this invocation holds it. If not, another one does.
+    ///
+    /// # Errors
+    ///
+    /// Those of the store, and [`Error::Conflict`] for a lease that comes and goes.
     pub(crate) async fn take_lease(&self, animation: &Animation) -> Result<bool> {
         let key = Key::Lease { animation: animation.clone() }.to_string();
         let until = self.deadline.unwrap_or_else(|| self.clock.now().after(self.policy.stuck_after));
@@ -43,14 +45,17 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 return Ok(true);
             }
             let Some(there) = self.get(&key).await? else { continue };
-            if !may_be_taken(&there.body, self.request_id(), self.clock.now()) {
+            let holder = holder(&there.body);
+            let is_own = holder.as_ref().is_some_and(|holder| holder.assembler == self.request_id());
+            if holder.is_some_and(|holder| !is_own && holder.until > self.clock.now()) {
                 return Ok(false);
             }
-            if there.body == body || self.replace_lease(&key, body.clone(), there.info.etag).await? {
+            // An own one need not be renewed.
+            if self.replace_lease(&key, body.clone(), there.info.etag).await? || is_own {
                 return Ok(true);
             }
         }
-        Ok(false)
+        Err(Error::Conflict { key })
     }
 
     async fn replace_lease(&self, key: &str, body: Vec<u8>, etag: ETag) -> Result<bool> {
@@ -65,8 +70,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     /// Whether the animation's lease is this event's, perhaps from an earlier attempt at it.
     pub(crate) async fn holds_lease(&self, animation: &Animation) -> Result<bool> {
         let there = self.get(&Key::Lease { animation: animation.clone() }.to_string()).await?;
-        let lease: Option<Lease> = there.and_then(|there| serde_json::from_slice(&there.body).ok());
-        Ok(lease.is_some_and(|lease| lease.assembler == self.request_id()))
+        let holder = there.and_then(|there| holder(&there.body));
+        Ok(holder.is_some_and(|holder| holder.assembler == self.request_id()))
     }
 
     /// Gives the animation's lease back.
@@ -78,13 +83,31 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::store::MemoryStore;
+    use crate::{Policy, Randomness, SystemClock};
 
-    #[test]
-    fn a_lease_is_its_holders_until_its_time_is_up() {
-        let body = br#"{"assembler":"a","until":1000}"#;
-        assert!(may_be_taken(body, "a", Timestamp(0)), "by the next attempt at the same event");
-        assert!(!may_be_taken(body, "b", Timestamp(999)));
-        assert!(may_be_taken(body, "b", Timestamp(1_000)));
-        assert!(may_be_taken(b"garbage", "b", Timestamp(0)));
+    /// The time of the test's invocations, and when the platform ends them.
+    const DEADLINE: Timestamp = Timestamp(u64::MAX);
+
+    async fn takes(store: &MemoryStore<SystemClock>, request_id: &str) -> bool {
+        let (random, policy) = (Randomness::seeded(1), Policy::new(1));
+        let invocation = Invocation::new(store, &SystemClock, &random, &policy, request_id).until(DEADLINE);
+        invocation.take_lease(&Animation::new("film").unwrap()).await.unwrap()
+    }
+
+    async fn says(store: &MemoryStore<SystemClock>, body: &str) {
+        let body = body.to_owned().into();
+        store.put("frames/film/@assembler.json", body, PutOptions::always()).await.unwrap();
+    }
+
+    #[tokio::test]
+    async fn a_lease_is_its_holders_until_its_time_is_up() {
+        let store = MemoryStore::new(SystemClock);
+        assert!(takes(&store, "a").await && !takes(&store, "b").await);
+        assert!(takes(&store, "a").await, "by the next attempt at the same event");
+        says(&store, r#"{"assembler":"a","until":1000}"#).await;
+        assert!(takes(&store, "b").await && !takes(&store, "a").await);
+        says(&store, "garbage").await;
+        assert!(takes(&store, "a").await && !takes(&store, "b").await);
     }
 }

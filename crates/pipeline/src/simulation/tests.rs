@@ -39,7 +39,7 @@ fn a_missing_second_listing_is_noticed() {
 
 #[test]
 fn claims_before_their_commit_are_noticed() {
-    notices(Mutation::ClaimBeforeCommit, 6_559);
+    notices(Mutation::ClaimBeforeCommit, 50_017);
 }
 
 #[test]
@@ -83,6 +83,12 @@ fn what_comes_back_while_it_is_tidied_away_is_drawn_again() {
 #[test]
 fn a_set_that_becomes_whole_late_is_not_refused() {
     run(23_812, None).unwrap_or_else(|violation| panic!("{violation}"));
+}
+
+/// An attempt that found the lease of an earlier one, and could not renew it, took it for another's and left.
+#[test]
+fn an_assembler_knows_its_own_lease() {
+    run(61_305, None).unwrap_or_else(|violation| panic!("{violation}"));
 }
 
 #[test]
