@@ -23,7 +23,9 @@
 //! ```
 
 mod checksum;
+mod delivery;
 mod error;
+mod events;
 mod front;
 mod host;
 mod identity;

@@ -11,6 +11,7 @@ use tokio::sync::oneshot;
 use tokio::task::{JoinHandle, JoinSet};
 use tokio::time::timeout;
 
+use crate::delivery::Delivery;
 use crate::front::Front;
 use crate::host::Hosts;
 use crate::identity::{Access, AssumeRole, Identities, Sessions};
@@ -30,6 +31,7 @@ pub struct Server {
     address: SocketAddr,
     ending: Option<oneshot::Sender<()>>,
     accepting: JoinHandle<()>,
+    delivering: Option<JoinHandle<()>>,
     writing: Option<Writing>,
 }
 
@@ -46,6 +48,9 @@ impl Server {
         let data = options.data;
         let opened = tokio::task::spawn_blocking(move || Storage::open(&data)).await;
         let (storage, writing) = opened.map_err(|panicked| Error::Start(panicked.to_string()))??;
+        let delivery = options.webhook.as_ref();
+        let delivery = delivery.map(|webhook| Delivery::new(storage.clone(), &options.region, webhook));
+        let delivering = delivery.transpose()?.map(|delivery| tokio::spawn(delivery.run()));
         let collected = storage.clone();
         // Files that a killed run left take room, and stand in nobody's way.
         tokio::task::spawn_blocking(move || drop(collected.collect_orphans()));
@@ -59,7 +64,7 @@ impl Server {
         builder.set_route(AssumeRole(identities));
         let (ending, end) = oneshot::channel();
         let accepting = tokio::spawn(accept(listener, builder.build(), end));
-        Ok(Self { address, ending: Some(ending), accepting, writing: Some(writing) })
+        Ok(Self { address, ending: Some(ending), accepting, delivering, writing: Some(writing) })
     }
 
     /// Where it listens.
@@ -73,6 +78,9 @@ impl Server {
             let _ = ending.send(());
         }
         let _ = (&mut self.accepting).await;
+        if let Some(delivering) = self.delivering.take() {
+            delivering.abort();
+        }
         if let Some(writing) = self.writing.take() {
             let _ = tokio::task::spawn_blocking(|| writing.end()).await;
         }
@@ -88,6 +96,9 @@ impl std::fmt::Debug for Server {
 impl Drop for Server {
     fn drop(&mut self) {
         self.accepting.abort();
+        if let Some(delivering) = &self.delivering {
+            delivering.abort();
+        }
     }
 }
 

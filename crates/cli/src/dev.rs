@@ -29,9 +29,9 @@ const CATCH_UP: Duration = Duration::from_secs(3);
 /// Run the whole pipeline on this machine: an S3 server, the bucket and the functions
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Nothing has to be installed: the S3 server is part of rayfold. `--store minio` takes MinIO instead,
-from RAYFOLD_MINIO or the PATH; without one it is installed from source, once, which needs Go 1.25 or
-later. Each keeps objects of its own, `bucket/` and `objects/` in the data folder.
+Nothing has to be installed: the S3 server is part of rayfold. `--store minio` takes MinIO
+instead, from RAYFOLD_MINIO or the PATH; without one it is installed from source, once, which
+needs Go 1.25 or later. Each keeps objects of its own, `bucket/` and `objects/` in the data folder.
 
 The functions, rayfold-render and rayfold-assemble, are those in the folder that RAYFOLD_FUNCTIONS
 names; without it those beside rayfold, or on the PATH, or they are built where rayfold was built.

@@ -81,7 +81,7 @@ impl Service {
             Ok(set(batch, Table::Buckets, name.as_bytes(), &record)?)
         });
         create.await?;
-        Ok(CreateBucketOutput { location: Some(location), ..CreateBucketOutput::default() })
+        Ok(CreateBucketOutput { location: Some(location) })
     }
 
     pub(super) fn bucket_exists(&self, name: &str) -> Answer<()> {

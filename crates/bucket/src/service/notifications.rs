@@ -65,7 +65,7 @@ impl Service {
                     value: Some(value),
                 })
                 .collect();
-            let filter = (!filters.is_empty()).then(|| NotificationConfigurationFilter {
+            let filter = (!filters.is_empty()).then_some(NotificationConfigurationFilter {
                 key: Some(S3KeyFilter { filter_rules: Some(filters) }),
             });
             QueueConfiguration {

@@ -108,10 +108,13 @@ impl Held {
 /// See the module.
 pub(super) struct Outgest {
     pieces: VecDeque<Piece>,
-    reading: Option<JoinHandle<io::Result<(Bytes, Option<Piece>)>>>,
+    reading: Option<JoinHandle<io::Result<Block>>>,
     left: u64,
     _pins: Option<Pins>,
 }
+
+/// Bytes, and what comes after them.
+type Block = (Bytes, Option<Piece>);
 
 enum Piece {
     Bytes(Bytes),
@@ -121,7 +124,7 @@ enum Piece {
 
 impl Piece {
     /// The first block, and what comes after it.
-    fn read(self) -> io::Result<(Bytes, Option<Self>)> {
+    fn read(self) -> io::Result<Block> {
         let (file, range) = match self {
             Self::Bytes(bytes) => return Ok((bytes, None)),
             Self::Closed(path, range) => (Arc::new(File::open(path)?), range),

@@ -233,7 +233,10 @@ fn note(changes: &mut Vec<u8>, table: Table, key: &[u8], value: Option<&[u8]>) {
     changes.extend(value.unwrap_or_default());
 }
 
-fn noted<'a>(changes: &mut &'a [u8]) -> Option<(Table, &'a [u8], Option<&'a [u8]>)> {
+/// Table, key, and the value of a row that was not removed.
+type Noted<'a> = (Table, &'a [u8], Option<&'a [u8]>);
+
+fn noted<'a>(changes: &mut &'a [u8]) -> Option<Noted<'a>> {
     let table = Table::of(*changes.split_off_first()?)?;
     let key_length = u32::from_le_bytes(*changes.split_off(..4)?.as_array()?);
     let value_length = u32::from_le_bytes(*changes.split_off(..4)?.as_array()?);

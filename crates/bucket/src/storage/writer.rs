@@ -4,7 +4,6 @@
 //! is checked in one holds when its change is made. A batch reaches the journal as a whole or not at all, and nothing is
 //! acknowledged before. When the disk fails, the batch is gone and the database is opened anew from disk and journal.
 
-use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
 use std::sync::{Arc, RwLock};
@@ -15,7 +14,7 @@ use redb::StorageError;
 use tokio::sync::oneshot;
 
 use super::bodies::{Bodies, sync_names};
-use super::database::Open;
+use super::database::{Open, is_full};
 use super::folder::Folder;
 use super::journal::{Journal, OpenError};
 use super::table::{Applied, Batch};
@@ -180,6 +179,7 @@ impl Writer {
                 return Err(failed);
             }
         };
+        let full = full || !open.has_room();
         let mut batch = Batch::of(&transaction).map_err(Failure::Database)?;
         let mut lazy = true;
         for mut job in jobs {
@@ -199,6 +199,10 @@ impl Writer {
             }
         }
         let Applied { changes, mut adopted, discarded } = batch.end();
+        if !open.has_room() {
+            transaction.abort().map_err(|error| Failure::Database(error.into()))?;
+            return Err(Failure::Refused(Unavailable::Full));
+        }
         if changes.is_empty() {
             return transaction.abort().map_err(|error| Failure::Database(error.into()));
         }
@@ -246,11 +250,15 @@ impl Writer {
             return;
         }
         let Ok(open) = self.opened() else { return };
+        if !open.has_room() {
+            return;
+        }
         let started = Instant::now();
         let done = open.begin().and_then(|transaction| open.commit_durably(transaction, self.journal.last()));
         match done {
             // What cannot be cleared is skipped at the next start.
-            Ok(()) => drop(self.journal.clear()),
+            Ok(()) if open.has_room() => drop(self.journal.clear()),
+            Ok(()) => {}
             Err(_) => {
                 self.open_anew();
                 std::thread::sleep(RECOVERY_PAUSE.saturating_sub(started.elapsed()));
@@ -258,6 +266,7 @@ impl Writer {
         }
     }
 
+    #[allow(clippy::useless_conversion, reason = "the width differs between systems")]
     fn is_nearly_full(&self) -> bool {
         statvfs(self.folder.path()).is_ok_and(|disk| {
             let free = u64::from(disk.blocks_available()).saturating_mul(disk.fragment_size());
@@ -292,11 +301,8 @@ pub(super) fn open(folder: &Folder) -> Result<(Open, Journal), redb::Error> {
 }
 
 fn reason(error: &redb::Error) -> Unavailable {
-    if let redb::Error::Io(failed) = error {
-        use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
-        if matches!(failed.kind(), StorageFull | QuotaExceeded | FileTooLarge) {
-            return Unavailable::Full;
-        }
+    if matches!(error, redb::Error::Io(failed) if is_full(failed)) {
+        return Unavailable::Full;
     }
     Unavailable::Failed(error.to_string().into())
 }

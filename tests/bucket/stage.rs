@@ -1,0 +1,190 @@
+//! A store in a fresh folder, its client, a listener for its events, and requests that no client would send.
+
+use std::net::SocketAddr;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use aws_sdk_s3::Client;
+use aws_sdk_s3::config::{BehaviorVersion, Credentials as Keys, Region};
+use aws_sdk_s3::error::{ProvideErrorMetadata, SdkError};
+use aws_sdk_s3::presigning::PresigningConfig;
+use aws_sdk_s3::types::{Event, NotificationConfiguration, QueueConfiguration};
+use rayfold_bucket::{Credentials, Options, QUEUE_ARN, Server, Webhook};
+use tempfile::TempDir;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::{TcpListener, TcpStream};
+
+pub(crate) const BUCKET: &str = "films";
+pub(crate) const TOKEN: &str = "token";
+
+pub(crate) struct Stage {
+    pub(crate) server: Server,
+    pub(crate) client: Client,
+    pub(crate) folder: TempDir,
+}
+
+pub(crate) fn client(address: SocketAddr) -> Client {
+    let config = aws_sdk_s3::Config::builder()
+        .behavior_version(BehaviorVersion::latest())
+        .region(Region::new("us-east-1"))
+        .credentials_provider(Keys::new("root", "secret-key", None, None, "test"))
+        .http_client(aws_smithy_http_client::Builder::new().build_http())
+        .endpoint_url(format!("http://{address}"))
+        .force_path_style(true)
+        .retry_config(aws_sdk_s3::config::retry::RetryConfig::disabled())
+        .build();
+    Client::from_conf(config)
+}
+
+pub(crate) fn options(data: &Path, webhook: Option<Webhook>) -> Options {
+    Options {
+        data: data.to_owned(),
+        address: ([127, 0, 0, 1], 0).into(),
+        root: Credentials { access_key: "root".into(), secret_key: "secret-key".into() },
+        region: "us-east-1".into(),
+        webhook,
+    }
+}
+
+/// A store with one bucket.
+pub(crate) async fn stage() -> Stage {
+    stage_with(None).await
+}
+
+pub(crate) async fn stage_with(webhook: Option<Webhook>) -> Stage {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(options(folder.path(), webhook)).await.unwrap();
+    let client = client(server.address());
+    client.create_bucket().bucket(BUCKET).send().await.unwrap();
+    Stage { server, client, folder }
+}
+
+impl Stage {
+    pub(crate) async fn put(&self, key: &str, body: impl Into<Vec<u8>>) -> String {
+        let put = self.client.put_object().bucket(BUCKET).key(key).body(body.into().into());
+        put.send().await.unwrap().e_tag.unwrap()
+    }
+
+    pub(crate) async fn get(&self, key: &str) -> Vec<u8> {
+        let got = self.client.get_object().bucket(BUCKET).key(key).send().await.unwrap();
+        got.body.collect().await.unwrap().to_vec()
+    }
+
+    /// Files of large bodies on the disk.
+    pub(crate) fn files(&self) -> usize {
+        let folders = std::fs::read_dir(self.folder.path().join("bodies")).unwrap();
+        folders.map(|folder| std::fs::read_dir(folder.unwrap().path()).unwrap().count()).sum()
+    }
+
+    /// Tells every change to the webhook.
+    pub(crate) async fn notify(&self) {
+        notify(&self.client).await;
+    }
+
+    /// A URL that may do what the request would.
+    pub(crate) fn presigning(&self) -> PresigningConfig {
+        PresigningConfig::expires_in(Duration::from_secs(60)).unwrap()
+    }
+
+    /// Sends a request as it stands; gives status, headers and body as text.
+    pub(crate) async fn raw(&self, request: &str) -> String {
+        raw(self.server.address(), request.as_bytes()).await
+    }
+}
+
+pub(crate) async fn notify(client: &Client) {
+    let queue = QueueConfiguration::builder()
+        .queue_arn(QUEUE_ARN)
+        .events(Event::from("s3:ObjectCreated:*"))
+        .events(Event::from("s3:ObjectRemoved:*"))
+        .build()
+        .unwrap();
+    let all = NotificationConfiguration::builder().queue_configurations(queue).build();
+    let set = client.put_bucket_notification_configuration().bucket(BUCKET).notification_configuration(all);
+    set.send().await.unwrap();
+}
+
+pub(crate) async fn raw(address: SocketAddr, request: &[u8]) -> String {
+    let mut stream = TcpStream::connect(address).await.unwrap();
+    stream.write_all(request).await.unwrap();
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).await.unwrap();
+    String::from_utf8_lossy(&answer).into_owned()
+}
+
+/// S3's code of an error, and the status.
+pub(crate) fn failure<T: std::fmt::Debug, E: ProvideErrorMetadata + std::fmt::Debug>(
+    answer: Result<T, SdkError<E>>,
+) -> (u16, String) {
+    let error = answer.unwrap_err();
+    let status = error.raw_response().unwrap().status().as_u16();
+    (status, error.code().unwrap_or_default().to_owned())
+}
+
+/// Names and keys of the events that a listener was told, in order.
+#[derive(Clone, Default)]
+pub(crate) struct Heard(pub(crate) Arc<Mutex<Vec<(String, String)>>>);
+
+impl Heard {
+    pub(crate) fn all(&self) -> Vec<(String, String)> {
+        self.0.lock().unwrap().clone()
+    }
+
+    /// Waits until so many were told.
+    pub(crate) async fn wait(&self, count: usize) -> Vec<(String, String)> {
+        for _ in 0..1000 {
+            if self.all().len() >= count {
+                return self.all();
+            }
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+        panic!("{} of {count} events: {:?}", self.all().len(), self.all());
+    }
+}
+
+/// Listens for events. `refuse` answers 503 to as many at first.
+pub(crate) async fn listener(refuse: usize) -> (Webhook, Heard) {
+    use http_body_util::{BodyExt, Empty};
+    use hyper::body::{Bytes, Incoming};
+    use hyper::{Request, Response, StatusCode};
+
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let url = format!("http://{}/events", listener.local_addr().unwrap());
+    let heard = Heard::default();
+    let refused = Arc::new(Mutex::new(refuse));
+    let told = heard.clone();
+    tokio::spawn(async move {
+        loop {
+            let (stream, _) = listener.accept().await.unwrap();
+            let (told, refused) = (told.clone(), refused.clone());
+            let service = hyper::service::service_fn(move |request: Request<Incoming>| {
+                let (told, refused) = (told.clone(), refused.clone());
+                async move {
+                    assert_eq!(request.headers()["authorization"], format!("Bearer {TOKEN}"));
+                    let body = request.into_body().collect().await?.to_bytes();
+                    let mut answer = Response::new(Empty::<Bytes>::new());
+                    let refuse = {
+                        let mut left = refused.lock().unwrap();
+                        let refuse = *left > 0;
+                        *left = left.saturating_sub(1);
+                        refuse
+                    };
+                    if refuse {
+                        *answer.status_mut() = StatusCode::SERVICE_UNAVAILABLE;
+                    } else {
+                        let message: serde_json::Value = serde_json::from_slice(&body).unwrap();
+                        let record = &message["Records"][0];
+                        let name = record["eventName"].as_str().unwrap().to_owned();
+                        let key = record["s3"]["object"]["key"].as_str().unwrap().to_owned();
+                        told.0.lock().unwrap().push((name, key));
+                    }
+                    Ok::<_, hyper::Error>(answer)
+                }
+            });
+            let stream = hyper_util::rt::TokioIo::new(stream);
+            tokio::spawn(hyper::server::conn::http1::Builder::new().serve_connection(stream, service));
+        }
+    });
+    (Webhook { url, token: TOKEN.into() }, heard)
+}
