@@ -66,7 +66,7 @@ impl<'a> User<'a> {
     }
 }
 
-/// Every object with its version, but for the claims that come and go.
+/// Every object with its version.
 async fn objects(stage: &Stage) -> Vec<(String, String)> {
     let page = stage.store().list(ListRequest::all("")).await.unwrap();
     page.objects.into_iter().map(|object| (object.key, object.etag.as_str().to_owned())).collect()
@@ -106,6 +106,7 @@ async fn each_kind_of_user_can_do_what_its_name_says_and_no_more() {
             viewer.can("fetch film -o %02d.png");
             assert!(viewer.folder.path().join("02.png").exists());
             viewer.write("film/f1.txt", &scene(5.0));
+            viewer.write("film/f2.txt", &scene(7.0));
             viewer.cannot("submit film");
             viewer.cannot("retry film --all");
             viewer.cannot("remove film");
