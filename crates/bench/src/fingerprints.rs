@@ -253,7 +253,8 @@ impl Dice {
         if matches!(scene.camera, Camera::Orthographic) {
             let scale = 0.2 * f64::from(side);
             let middle = DVec3::new(0.5, 0.5, -1.0) * f64::from(side);
-            objects = objects.iter().map(|o| placed(o, scale, middle)).collect::<Result<_>>()?;
+            let place = |o: &Object| o.placed(scale, |p| scale * p + middle);
+            objects = objects.iter().map(place).collect::<Result<_, _>>()?;
         }
         scene.objects = objects.into();
         let lights = (0..self.0.usize(0..4))
@@ -285,18 +286,6 @@ impl Dice {
         };
         (0..101).map(|_| ray()).collect()
     }
-}
-
-/// Scaled, and then moved.
-fn placed(object: &Object, scale: f64, offset: DVec3) -> Result<Object> {
-    let place = |p: DVec3| scale * p + offset;
-    Ok(match object {
-        Object::Sphere(o) => {
-            Object::Sphere(Sphere::new(o.radius() * scale, place(o.center()), *o.material())?)
-        }
-        Object::Cuboid(o) => Object::Cuboid(Cuboid::new(o.corners().map(place), *o.material())?),
-        Object::Triangle(o) => Object::Triangle(Triangle::new(o.vertices().map(place), *o.material())?),
-    })
 }
 
 #[cfg(test)]

@@ -17,60 +17,60 @@
 use super::real::Real;
 
 /// How far off its surface a new ray starts, in roundoffs of the sum of the coordinates there (of a sphere: of its
-/// largest coordinate).
+/// centre's largest coordinate and its radius).
 ///
-/// What can put the start on the wrong side: the hit, off by the distance's 13 roundoffs ([`distance_error`] has their
-/// sum) and 2 of `origin + distance · direction`, but then brought back to its surface (a sphere's point is worked out
-/// from the centre and the normal, a box's is set to the face, a triangle's moved by its height above the plane), which
-/// leaves 2 to 4; rounding the start itself, 1; and the next test's own errors, at most 13 of the coordinates. 18, and
-/// room.
+/// Three errors can put the start on the wrong side. The point is off its surface: a box's is set to the face, 0; a
+/// triangle's is moved by its height above the plane, which has 4; a sphere's is worked out from the centre and a normal
+/// of length 1 but for 3, and a sum, 4. The start is rounded, 1. And the next test errs: by 9 in a height above a plane
+/// ([`distance_error`]), by 8 in a slab ([`LATE`]). Together 14, and as much again.
 pub(super) const OFFSET: f64 = 32.0;
 
-/// How far bounds on where objects lie are widened, in roundoffs of the object's largest coordinate: tiles, lists and
+/// How far bounds on where objects lie are widened, in roundoffs of the object's largest coordinate: for tiles, lists and
 /// outlines.
 ///
-/// A ray meets an object at most as far beside it as the test errs: [`SIDE`] (5.25) of two products for a triangle's
-/// edge, and 16 or 32 where that was settled (see `Beside` there), 8 for a box ([`LATE`]), about 10 for a sphere. The
-/// bounds themselves are worked out in `f64`. Twice the largest.
+/// Rays meet objects beside where they lie by the errors of their tests: boxes 8 ([`LATE`]), spheres about 10; triangles,
+/// once settled, 16 of the distance from the eye, which is at most √3 of the largest coordinate: 28, and 7 towards a
+/// light (`Beside` in the predicate). The ray's own direction is off by 3. Together 31, and as much again.
 pub(super) const BOUNDS: f64 = 64.0;
 
 /// How far the boxes of a tree are widened, in roundoffs of the scene's size, which is 1.
 ///
-/// The test of a ray against a box is `corner · inverse - origin · inverse`: 1 for the inverse, 2 for the two products, 1
-/// for the sum, all relative to products no larger than the distance to the far end of the scene, and the origin's own
-/// rounding, 1, wherever the box lies. A hit is off its object by up to 13 of the distance ([`distance_error`], where a
-/// plane is not met under a flat angle). 18, and room.
+/// A ray's origin is rounded relative to that size, wherever the box lies: 1. The test, `corner · inverse - origin ·
+/// inverse`, has 1 for the inverse, which both products share, 1 for each product and 1 for the difference: 4. Spheres and
+/// boxes are met up to 10 beside where they lie. Together 15, and as much again. What a triangle is met beside is cut off
+/// at the box: see the predicate.
 pub(super) const BOX: f64 = 32.0;
 
 /// The part of a pixel by which tiles are wider than their pixels.
 ///
-/// Not a count of roundoffs: the direction of a ray is off by 3 roundoffs, which single precision is chosen for only
-/// where it is below a twentieth of a pixel... and 1/32 of a pixel is what candidates are widened by besides [`BOUNDS`].
+/// A pixel's coordinate on the window is `start + i · step`, with 3 roundoffs: in `f32`, in an image of 100,000 columns,
+/// 1/56 of a pixel. What the direction is off besides is in [`BOUNDS`].
 pub(super) const MARGIN: f64 = 1.0 / 32.0;
 
 /// Below this many roundoffs the sine of the angle between a ray and a triangle's plane is noise: the ray is in the plane,
 /// and misses.
 ///
-/// `normal · direction` is a sum of three products of unit vectors: 1 roundoff of each factor and 1 of each sum.
+/// The sine is `normal · direction`, of two vectors of length 1: 1 roundoff of each of the two, and 1 of each of the two
+/// sums that are left with fused multiply-add.
 pub(super) const GRAZING: f64 = 4.0;
 
 /// Below this many roundoffs the sine of the angle between the light and a triangle's plane is noise.
 ///
-/// Such a triangle has no shadow; taken for one that has, its sides would bound a line without ends. More than
-/// [`GRAZING`], as the light's direction and the normal are rounded before they are compared in `f64`, and the test then
-/// has two of these sines.
+/// Such a triangle has no shadow; taken for one that has, its sides would bound a line without ends. The direction of the
+/// light and the normal are both rounded in all three coordinates, which turns each by up to √3 roundoffs, and the sides
+/// are divided by what is left: four times [`GRAZING`].
 pub(super) const EDGE_ON: f64 = 16.0;
 
 /// How much later than leaving a box a ray may enter it, in roundoffs of the distance.
 ///
-/// Each is `(face - origin) · inverse`, 3 roundoffs, one of them the inverse's, which two faces of an axis share; an edge
-/// compares those of two axes: 6, and room (Ize, "Robust BVH ray traversal", JCGT 2(2), 2013, has the same argument).
+/// A face is met at `(face - origin) · inverse`: 1 roundoff of the difference, 1 of the inverse, 1 of the product. At an
+/// edge the faces of two axes are compared: 6, and room (Ize, "Robust BVH ray traversal", JCGT 2(2), 2013).
 pub(super) const LATE: f64 = 8.0;
 
 /// How much later than at its far side a ray may enter a box of a tree, in roundoffs of the distance.
 ///
-/// As [`LATE`], where `corner · inverse` and `origin · inverse` are rounded before they are subtracted: that error is
-/// relative to the larger of them, which [`BOX`] pays for where it is the origin's. Generous, as it costs nothing.
+/// As [`LATE`]; but `corner · inverse` and `origin · inverse` are rounded before they are subtracted, and may be larger
+/// than the distance. What that adds is in [`BOX`]. Generous, as it costs nothing.
 pub(super) const LATE_IN_TREE: f64 = 64.0;
 
 /// Rounding errors of a ray's side of an edge, in roundoffs of the sum of the products' magnitudes.
@@ -78,16 +78,22 @@ pub(super) const LATE_IN_TREE: f64 = 64.0;
 /// One of the constant, four of the sum without fused multiply-add, and what is of second order.
 pub(super) const SIDE: f64 = 5.25;
 
-/// Rounding errors of the constants of an edge in `f64`, before they are rounded to the kernels' numbers: of a cross
-/// product, 2 roundings of each product and its difference, of corners that were rounded once each.
+/// Rounding errors of the constants of an edge in `f64`, before they are rounded to the kernels' numbers, relative to the
+/// product of the lengths.
+///
+/// A cross product of a corner and a difference of corners: 1 roundoff of the difference, 1 of each product and 1 of their
+/// difference; 8 are allowed for.
 pub(super) const CONSTANT: f64 = 4.0 * f64::EPSILON;
 
-/// Rounding errors of a triangle's volume with the eye in `f64`, relative to the product of the lengths: of a cross and a
-/// dot product, as [`CONSTANT`].
+/// Rounding errors of a triangle's volume with the eye in `f64`, relative to the product of the lengths: those of
+/// [`CONSTANT`], and of a dot product of three terms.
 pub(super) const VOLUME: f64 = 4.0 * f64::EPSILON;
 
 /// How far a region of points that wait for light is widened on a sun's screen, in roundoffs of the sum of the
-/// coordinates: 3 for the axes, which are rounded, and each dot product's 3, on both sides of the comparison, and room.
+/// coordinates.
+///
+/// Each coordinate there is a dot product with an axis: 1 roundoff of the axis, 3 of the products and sums; on both sides
+/// of the comparison 8, and as much again.
 pub(super) const BEAM: f64 = 16.0;
 
 /// A bound on the rounding errors of distances to triangles that are not met under a flat angle, as a part of 1 and of
@@ -97,7 +103,7 @@ pub(super) const BEAM: f64 = 16.0;
 /// the errors of the height are at most 32 times as large along the ray: 9 · 32 = 288 and 4 · 32 = 128, together 416 of
 /// 512. The rest is what a normal is off that was worked out in `f64` from corners before they were rounded.
 ///
-/// [settled]: super::shapes::triangle::settle
+/// [settled]: super::predicate::settle
 pub(super) const fn distance_error<E: Real>() -> f64 {
     512.0 * E::ROUNDOFF + 2048.0 * f64::EPSILON
 }

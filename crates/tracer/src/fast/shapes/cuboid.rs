@@ -22,6 +22,19 @@ pub(in crate::fast) struct Placed {
     pub(in crate::fast) max: DVec3,
 }
 
+impl Placed {
+    /// Moved so that `center` is the origin, and then scaled.
+    pub(in crate::fast) fn new(cuboid: &rayfold_scene::Cuboid, center: DVec3, scale: f64) -> Self {
+        Self { min: (cuboid.min() - center) * scale, max: (cuboid.max() - center) * scale }
+    }
+}
+
+/// The largest distance along an axis from `center` to a point of the box.
+pub(in crate::fast) fn reach(cuboid: &rayfold_scene::Cuboid, center: DVec3) -> f64 {
+    let from = |point: DVec3| (point - center).abs().max_element();
+    from(cuboid.min()).max(from(cuboid.max()))
+}
+
 impl placed::Placed for Placed {
     fn bounds(&self) -> Bounds {
         (self.min, self.max)

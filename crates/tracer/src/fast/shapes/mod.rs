@@ -25,7 +25,6 @@ use super::predicate::Corners;
 use super::real::{Lanes, Mask, Real, Vec3};
 use super::shape::{Aim, Items, Obstructs, Tests};
 use crate::parallel::map;
-use crate::reference::{normal_and_width, power, triangle_normal};
 
 /// A shape in the kernels' coordinates.
 #[derive(Clone, Copy, Debug)]
@@ -70,34 +69,13 @@ impl Shape {
     /// An object of the scene in the kernels' coordinates: moved so that `center` is the origin, then scaled. None if it
     /// can never be hit.
     pub(super) fn new(object: &Object, center: DVec3, scale: f64) -> Option<Self> {
-        let place = |point: DVec3| (point - center) * scale;
-        Some(match object {
-            Object::Sphere(sphere) => Self::Sphere(sphere::Placed {
-                center: place(sphere.center()),
-                radius: sphere.radius() * scale,
-                power: power(center, sphere, scale),
-            }),
-            Object::Cuboid(cuboid) => {
-                Self::Cuboid(cuboid::Placed { min: place(cuboid.min()), max: place(cuboid.max()) })
-            }
-            Object::Triangle(triangle) => {
-                let vertices = triangle.vertices().map(place);
-                // Its own size decides whether it has an area, wherever it lies.
-                let (own, width) = normal_and_width(triangle.vertices());
-                if own == DVec3::ZERO {
-                    return None;
-                }
-                // A needle turns when its corners are rounded; rays meet it as it is here.
-                let here = if width < NEEDLE { triangle_normal(&vertices) } else { own };
-                let normal = if here == DVec3::ZERO { own } else { here };
-                Self::Triangle(triangle::Placed { vertices, normal })
-            }
-        })
+        match object {
+            Object::Sphere(sphere) => Some(Self::Sphere(sphere::Placed::new(sphere, center, scale))),
+            Object::Cuboid(cuboid) => Some(Self::Cuboid(cuboid::Placed::new(cuboid, center, scale))),
+            Object::Triangle(triangle) => triangle::Placed::new(triangle, center, scale).map(Self::Triangle),
+        }
     }
 }
-
-/// The width of a triangle, for its length, below which its normal is worked out from where its corners are rounded to.
-const NEEDLE: f64 = 0.1;
 
 /// What an object is.
 pub(super) fn kind(object: &Object) -> Kind {
@@ -110,11 +88,10 @@ pub(super) fn kind(object: &Object) -> Kind {
 
 /// The largest distance along an axis from `center` to a point of the object.
 pub(super) fn reach(object: &Object, center: DVec3) -> f64 {
-    let from = |point: DVec3| (point - center).abs().max_element();
     match object {
-        Object::Sphere(sphere) => from(sphere.center()) + sphere.radius(),
-        Object::Cuboid(cuboid) => from(cuboid.min()).max(from(cuboid.max())),
-        Object::Triangle(triangle) => triangle.vertices().iter().map(|v| from(*v)).fold(0.0, f64::max),
+        Object::Sphere(sphere) => sphere::reach(sphere, center),
+        Object::Cuboid(cuboid) => cuboid::reach(cuboid, center),
+        Object::Triangle(triangle) => triangle::reach(triangle, center),
     }
 }
 

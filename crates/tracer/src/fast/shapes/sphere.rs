@@ -14,6 +14,7 @@ use crate::fast::predicate::Place;
 use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rounding::OFFSET;
 use crate::fast::shape::{Aim, Items, Obstacles, Obstructs, Robust, Tests};
+use crate::reference::power;
 
 /// A sphere in the kernels' coordinates.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +23,22 @@ pub(in crate::fast) struct Placed {
     pub(in crate::fast) radius: f64,
     /// That of the eye: |center|² - radius², as exact as a number can be.
     pub(in crate::fast) power: f64,
+}
+
+impl Placed {
+    /// Moved so that `center` is the origin, and then scaled.
+    pub(in crate::fast) fn new(sphere: &rayfold_scene::Sphere, center: DVec3, scale: f64) -> Self {
+        Self {
+            center: (sphere.center() - center) * scale,
+            radius: sphere.radius() * scale,
+            power: power(center, sphere, scale),
+        }
+    }
+}
+
+/// The largest distance along an axis from `center` to a point of the sphere.
+pub(in crate::fast) fn reach(sphere: &rayfold_scene::Sphere, center: DVec3) -> f64 {
+    (sphere.center() - center).abs().max_element() + sphere.radius()
 }
 
 impl placed::Placed for Placed {

@@ -14,12 +14,40 @@ use crate::fast::predicate::{Beside, Corners, Place, settle};
 use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rounding::{CONSTANT, EDGE_ON, GRAZING, OFFSET, SIDE, VOLUME, distance_error};
 use crate::fast::shape::{Aim, Items, Obstacles, Obstructs, Robust, Tests};
+use crate::reference::{normal_and_width, triangle_normal};
 
 /// A triangle in the kernels' coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::fast) struct Placed {
     pub(in crate::fast) vertices: [DVec3; 3],
     pub(in crate::fast) normal: DVec3,
+}
+
+/// The width of a triangle, for its length, below which its normal is worked out from where its corners are rounded to.
+const NEEDLE: f64 = 0.1;
+
+impl Placed {
+    /// Moved so that `center` is the origin, and then scaled; none if it has no area.
+    pub(in crate::fast) fn new(
+        triangle: &rayfold_scene::Triangle,
+        center: DVec3,
+        scale: f64,
+    ) -> Option<Self> {
+        let vertices = triangle.vertices().map(|vertex| (vertex - center) * scale);
+        // Its own size decides whether it has an area, wherever it lies.
+        let (own, width) = normal_and_width(triangle.vertices());
+        if own == DVec3::ZERO {
+            return None;
+        }
+        // A needle turns when its corners are rounded; rays meet it as it is here.
+        let here = if width < NEEDLE { triangle_normal(&vertices) } else { own };
+        Some(Self { vertices, normal: if here == DVec3::ZERO { own } else { here } })
+    }
+}
+
+/// The largest distance along an axis from `center` to a corner.
+pub(in crate::fast) fn reach(triangle: &rayfold_scene::Triangle, center: DVec3) -> f64 {
+    triangle.vertices().iter().map(|v| (v - center).abs().max_element()).fold(0.0, f64::max)
 }
 
 impl placed::Placed for Placed {
