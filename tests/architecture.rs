@@ -66,9 +66,6 @@ const OUTSIDE_THE_CORE: &[&str] = &[
     "getrandom",
 ];
 
-/// Crates whose modules still use one another in circles. None is added here: a circle is cut.
-const STILL_IN_CIRCLES: &[&str] = &["bucket"];
-
 /// Lines of a source file; beyond it a file holds more than one responsibility.
 const LONGEST_FILE: usize = 800;
 
@@ -126,12 +123,8 @@ fn no_modules_use_one_another_in_a_circle() {
         let name = folder.file_name().into_string().unwrap();
         let roots = crate_roots(&folder.path().join("src"));
         assert!(!roots.is_empty(), "crates/{name} has neither a library nor a program");
-        let circles: Vec<_> = roots.iter().flat_map(|root| circles::circles(root, &read)).collect();
-        if STILL_IN_CIRCLES.contains(&name.as_str()) {
-            assert!(!circles.is_empty(), "crates/{name} has no circle any more: take it off the list");
-        } else {
-            told.extend(circles.into_iter().map(|circle| format!("crates/{name}: {circle}")));
-        }
+        let circles = roots.iter().flat_map(|root| circles::circles(root, &read));
+        told.extend(circles.map(|circle| format!("crates/{name}: {circle}")));
     }
     assert!(told.is_empty(), "modules that use one another in a circle:\n{}", told.join("\n"));
 }

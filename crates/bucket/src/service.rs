@@ -32,6 +32,7 @@ use crate::identity::discreetly;
 use crate::records::{self, key};
 use crate::storage::{Batch, Kind, Snapshot, Storage, Table};
 use answer::{Answer, no_such_bucket, no_such_key, unavailable, unreadable};
+use meaning::check;
 
 /// See the module.
 #[derive(Clone)]
@@ -45,6 +46,15 @@ pub(crate) struct Service {
 pub(crate) struct Caller {
     principal: String,
     origin: Origin,
+}
+
+impl Caller {
+    /// What an operation is given besides its input.
+    fn of<T>(request: &S3Request<T>) -> Self {
+        let principal = request.credentials.as_ref().map(|c| c.access_key.clone()).unwrap_or_default();
+        let origin = request.extensions.get::<Origin>().cloned().unwrap_or_default();
+        Self { principal, origin }
+    }
 }
 
 /// Why a change was not made.
@@ -103,21 +113,6 @@ impl Service {
         let row = key::object(bucket, key.as_bytes());
         records::find(snapshot, Table::Objects, &row).map_err(unreadable)?.ok_or_else(no_such_key)
     }
-}
-
-/// What an operation is given besides its input.
-fn caller<T>(request: &S3Request<T>) -> Caller {
-    let principal = request.credentials.as_ref().map(|c| c.access_key.clone()).unwrap_or_default();
-    let origin = request.extensions.get::<Origin>().cloned().unwrap_or_default();
-    Caller { principal, origin }
-}
-
-fn check<T>(request: &S3Request<T>) -> Answer<()> {
-    meaning::check(&request.headers, &request.uri)
-}
-
-fn time(moment: records::Moment) -> Timestamp {
-    moment.system_time().into()
 }
 
 /// Each operation is its family's function of the same name.

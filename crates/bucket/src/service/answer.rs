@@ -1,13 +1,19 @@
-//! S3's errors, in its words.
+//! What operations answer with: S3's errors, in its words, and moments as it writes them.
 
 use hyper::StatusCode;
 use redb::StorageError;
+use s3s::dto::Timestamp;
 use s3s::{S3Error, S3ErrorCode, StdError, s3_error};
 
+use crate::records::Moment;
 use crate::storage::Unavailable;
 
 /// What a request ends with: what was asked for, or S3's error.
 pub(crate) type Answer<T> = Result<T, S3Error>;
+
+pub(super) fn time(moment: Moment) -> Timestamp {
+    moment.system_time().into()
+}
 
 pub(crate) fn no_such_bucket() -> S3Error {
     s3_error!(NoSuchBucket, "The specified bucket does not exist")

@@ -3,10 +3,11 @@
 use s3s::dto::*;
 use s3s::{S3Error, S3ErrorCode, S3Request, S3Response, S3Result, s3_error};
 
-use super::answer::{Answer, invalid_argument, not_implemented, unreadable};
+use super::Service;
+use super::answer::{Answer, invalid_argument, not_implemented, time, unreadable};
 use super::meaning::OWNER;
+use super::meaning::check;
 use super::objects::bucket;
-use super::{Service, check, time};
 use crate::records::{self, Moment, all, decode, find, key, release, set};
 use crate::storage::{Kind, Table, View};
 

@@ -3,19 +3,19 @@
 use s3s::dto::*;
 use s3s::{S3Request, s3_error};
 
-use super::answer::{Answer, invalid_argument, invalid_request, not_implemented};
+use super::answer::{Answer, invalid_argument, invalid_request, not_implemented, time};
 use super::conditions::{ReadConditions, WriteConditions};
 use super::ingest::{Claims, LARGEST_BODY, etag, ingest};
 use super::objects::{Destination, admit, check_key, check_metadata, expires, keep, place};
 use super::writes::{of, stored_encoding};
-use super::{Service, caller, time};
+use super::{Caller, Service};
 use crate::checksum::Algorithm;
 use crate::records::{self, Headers, Moment};
 use crate::storage::Kind;
 
 impl Service {
     pub(super) async fn object_copied(&self, req: S3Request<CopyObjectInput>) -> Answer<CopyObjectOutput> {
-        let caller = caller(&req);
+        let caller = Caller::of(&req);
         // Conditions on the destination have no place in the input yet.
         let header = |name: &str| {
             req.headers.get(name).map(|value| ETagCondition::parse_http_header(value.as_bytes()))

@@ -5,7 +5,7 @@ use s3s::{S3Request, s3_error};
 
 use super::answer::{Answer, invalid_request, not_implemented, precondition_failed, unavailable};
 use super::objects::{bucket, tell};
-use super::{Caller, Service, Stop, caller};
+use super::{Caller, Service, Stop};
 use crate::identity::DeniedKeys;
 use crate::records::{self, find, key, release};
 use crate::storage::{Batch, Bodies, Kind, Table};
@@ -18,7 +18,7 @@ impl Service {
         &self,
         req: S3Request<DeleteObjectInput>,
     ) -> Answer<DeleteObjectOutput> {
-        let caller = caller(&req);
+        let caller = Caller::of(&req);
         let input = req.input;
         let ids = self.storage.bodies().clone();
         let delete = self.change(Kind::Shrinks, move |batch| {
@@ -33,7 +33,7 @@ impl Service {
         &self,
         req: S3Request<DeleteObjectsInput>,
     ) -> Answer<DeleteObjectsOutput> {
-        let caller = caller(&req);
+        let caller = Caller::of(&req);
         let S3Request { input: DeleteObjectsInput { bucket: name, delete, .. }, extensions, .. } = req;
         let denied = extensions.get::<DeniedKeys>().cloned().unwrap_or_default();
         if delete.objects.is_empty() || delete.objects.len() > MOST_KEYS {

@@ -6,9 +6,9 @@
 
 use s3s::dto::*;
 
-use super::answer::{Answer, invalid_argument, unreadable};
+use super::Service;
+use super::answer::{Answer, invalid_argument, time, unreadable};
 use super::buckets::owner;
-use super::{Service, time};
 use crate::records::{self, decode, key};
 use crate::storage::{Snapshot, Table, View};
 

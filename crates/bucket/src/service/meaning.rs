@@ -6,7 +6,7 @@
 use hyper::{HeaderMap, Uri};
 
 use super::answer::{Answer, invalid_argument, not_implemented};
-use s3s::s3_error;
+use s3s::{S3Request, s3_error};
 
 /// Whose everything is.
 pub(crate) const OWNER: &str = "000000000000";
@@ -29,8 +29,12 @@ const UNSUPPORTED: [&str; 11] = [
 /// Access lists that say what holds anyway.
 const OWNERS_ALONE: [&str; 3] = ["private", "bucket-owner-full-control", "bucket-owner-read"];
 
-/// Refuses what is not implemented.
-pub(crate) fn check(headers: &HeaderMap, uri: &Uri) -> Answer<()> {
+/// Refuses a request that asks for what is not implemented.
+pub(crate) fn check<T>(request: &S3Request<T>) -> Answer<()> {
+    check_parts(&request.headers, &request.uri)
+}
+
+fn check_parts(headers: &HeaderMap, uri: &Uri) -> Answer<()> {
     for (name, value) in headers {
         let value = value.to_str().unwrap_or_default();
         check_one(name.as_str(), value)?;
@@ -75,7 +79,7 @@ mod tests {
     fn code(name: &'static str, value: &'static str) -> Option<S3ErrorCode> {
         let headers =
             HeaderMap::from_iter([(HeaderName::from_static(name), HeaderValue::from_static(value))]);
-        check(&headers, &Uri::from_static("/films/a")).err().map(|error| error.code().clone())
+        check_parts(&headers, &Uri::from_static("/films/a")).err().map(|error| error.code().clone())
     }
 
     #[test]
@@ -108,7 +112,7 @@ mod tests {
 
     #[test]
     fn urls_are_looked_at_as_well() {
-        let refused = |uri| check(&HeaderMap::new(), &Uri::from_static(uri)).is_err();
+        let refused = |uri| check_parts(&HeaderMap::new(), &Uri::from_static(uri)).is_err();
         assert!(refused("/films/a?versionId=3sL4kqtJlcpXroDTDmJ"));
         assert!(refused("/films/a?X-Amz-Acl=public-read&X-Amz-Signature=1"));
         assert!(!refused("/films/a?versionId=null&X-Amz-Signature=1&partNumber=2"));

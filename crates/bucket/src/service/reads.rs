@@ -7,10 +7,10 @@ use hyper::header::{CONTENT_RANGE, ETAG, HeaderMap, HeaderValue, LAST_MODIFIED};
 use s3s::dto::*;
 use s3s::{S3Error, S3ErrorCode, S3Request, S3Response, S3Result, s3_error};
 
-use super::answer::{Answer, coded, invalid_argument, invalid_request};
+use super::Service;
+use super::answer::{Answer, coded, invalid_argument, invalid_request, time};
 use super::conditions::ReadConditions;
 use super::writes::of;
-use super::{Service, time};
 use crate::checksum::Algorithm;
 use crate::records::{Layout, Object};
 

@@ -4,13 +4,13 @@ use hyper::StatusCode;
 use s3s::dto::*;
 use s3s::{S3Request, s3_error};
 
-use super::answer::{Answer, coded, invalid_argument, invalid_request, no_such_upload, unreadable};
+use super::answer::{Answer, coded, invalid_argument, invalid_request, no_such_upload, time, unreadable};
 use super::conditions::{ReadConditions, WriteConditions};
 use super::copies::source;
 use super::ingest::{Claims, Ingested, LARGEST_BODY, etag, ingest};
 use super::objects::{Destination, admit, bucket, check_key, check_metadata, expires, keep, place};
 use super::writes::{of, stored_encoding};
-use super::{Service, Stop, caller, time};
+use super::{Caller, Service, Stop};
 use crate::checksum::{self, Algorithm};
 use crate::records::{self, Body, Headers, Layout, LayoutPart, Moment, all, decode, find, key, release, set};
 use crate::storage::{Batch, Kind, Table, View};
@@ -202,7 +202,7 @@ impl Service {
         &self,
         req: S3Request<CompleteMultipartUploadInput>,
     ) -> Answer<CompleteMultipartUploadOutput> {
-        let caller = caller(&req);
+        let caller = Caller::of(&req);
         let input = req.input;
         let conditions = WriteConditions { if_match: input.if_match, if_none_match: input.if_none_match };
         conditions.check_form()?;

@@ -4,10 +4,10 @@
 
 use s3s::dto::*;
 
-use super::answer::{Answer, invalid_argument};
+use super::Service;
+use super::answer::{Answer, invalid_argument, time};
 use super::buckets::owner;
 use super::lists::{Query, after, encoded, encoding, most, prefixes};
-use super::{Service, time};
 use crate::records;
 
 /// The version of an object that was put while its bucket kept none.

@@ -7,14 +7,14 @@ use super::answer::Answer;
 use super::conditions::WriteConditions;
 use super::ingest::{Claims, etag, ingest};
 use super::objects::{Destination, admit, check_key, check_metadata, expires, keep, place};
-use super::{Service, caller};
+use super::{Caller, Service};
 use crate::checksum::{Algorithm, Checksum};
 use crate::records::{Headers, Moment, Object};
 use crate::storage::Kind;
 
 impl Service {
     pub(super) async fn object_put(&self, req: S3Request<PutObjectInput>) -> Answer<PutObjectOutput> {
-        let caller = caller(&req);
+        let caller = Caller::of(&req);
         let claims = Claims::of_request(&req.headers, req.trailing_headers.clone(), Algorithm::Crc64nvme)?;
         let input = req.input;
         check_key(&input.key)?;
