@@ -3,10 +3,12 @@
 //! Reads see one moment ([`Storage::snapshot`]). Changes are functions ([`Storage::change`]) that run one after the other;
 //! what they give is handed on when the change is on the disk. Knows no protocol and no record.
 //!
-//!     marker, lock    whose the folder is, and that one process uses it
-//!     database        rows: their durable state of some moment
-//!     journal         what changed since then
-//!     bodies/         bodies that are too large for a row, a file each
+//! ```text
+//! marker, lock    whose the folder is, and that one process uses it
+//! database        rows: their durable state of some moment
+//! journal         what changed since then
+//! bodies/         bodies that are too large for a row, a file each
+//! ```
 
 mod bodies;
 mod database;
