@@ -213,6 +213,9 @@ async fn a_storm_of_everything_ends_in_the_right_gif() {
         let mut stage = stage(store, |settings| {
             settings.concurrency = 8;
             settings.fates = Some(fates);
+            // The assembler reads thirty frames: where one request in a hundred is deadly, three tries of it all die one
+            // time in forty, and the animation is rightly refused.
+            settings.retry_pauses = vec![Duration::from_millis(50); 5];
             settings.sweep_every = Some(Duration::from_secs(1));
             settings.environment.push(("RAYFOLD_STUCK_AFTER_MS".into(), "3000".into()));
             settings.chaos = Chaos {

@@ -20,6 +20,7 @@ mod settings;
 
 use std::net::SocketAddr;
 use std::sync::Arc;
+use std::time::Duration;
 
 use bytes::Bytes;
 use tokio::net::TcpListener;
@@ -37,13 +38,16 @@ use crate::observation::{Observation, Observer, Outcome};
 use crate::routes::Function;
 use events::Pools;
 use pool::Workers;
-use queue::{Caller, Job, Pending};
+use queue::{Caller, Job, Pending, Pool};
 
 /// What the schedule of `infra/terraform` sends.
 const SWEEP: &str = r#"{"sweep":true}"#;
 
 /// The same when nobody has listened for events: what is pending is not on its way.
 const CATCH_UP: &str = r#"{"sweep":true,"catch_up":true}"#;
+
+/// Between two looks at whether everything has ended.
+const LOOK: Duration = Duration::from_millis(5);
 
 /// A running invoker.
 pub struct Invoker {
@@ -102,7 +106,13 @@ impl Invoker {
             pending.clone(),
             &mut tasks,
         );
-        pools.assemble.submit(Job::event(CATCH_UP));
+        match settings.kept_events {
+            None => pools.assemble.submit(Job::event(CATCH_UP)),
+            Some(soon) => {
+                pending.add();
+                tasks.spawn(catch_up_after(soon, pools.assemble.clone(), pending.clone()));
+            }
+        }
         if let Some(pause) = settings.sweep_every {
             let assemble = pools.assemble.clone();
             tasks.spawn(async move {
@@ -152,4 +162,15 @@ impl Invoker {
     pub fn pending(&self) -> usize {
         self.pending.count()
     }
+}
+
+/// Sweeps when the events that the store has kept were heard, and all that they woke has ended.
+async fn catch_up_after(soon: Duration, assemble: Pool, pending: Pending) {
+    tokio::time::sleep(soon).await;
+    // This sweep itself is one of them, so that nobody takes the invoker for idle before.
+    while pending.count() > 1 {
+        tokio::time::sleep(LOOK).await;
+    }
+    assemble.submit(Job::event(CATCH_UP));
+    pending.remove();
 }

@@ -19,7 +19,7 @@ pub struct Observation {
 /// What can happen.
 #[derive(Clone, Debug)]
 pub enum Seen {
-    /// MinIO reported a change of an object; `function` is whom it wakes, if any.
+    /// The store reported a change of an object; `function` is whom it wakes, if any.
     Event {
         /// Whom it wakes.
         function: Option<Function>,

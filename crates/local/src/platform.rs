@@ -21,6 +21,12 @@ use crate::s3_server::{S3Server, StoreKind};
 /// How long MinIO may take to know its webhook.
 const QUEUE_TIMEOUT: Duration = Duration::from_secs(20);
 
+/// The store built in connects to the webhook when it starts: what it has kept comes as soon as the invoker listens.
+const KEPT_AT_START: Duration = Duration::from_millis(20);
+
+/// It tries again after at most a second, when nobody has listened for a while.
+const KEPT_AFTER_A_PAUSE: Duration = Duration::from_millis(1200);
+
 /// What a platform is made of.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -91,9 +97,13 @@ impl Platform {
         observer: Option<UnboundedSender<Observation>>,
     ) -> Result<&Invoker> {
         self.stop_invoker().await;
-        let listener = match self.listener.take() {
-            Some(listener) => listener,
-            None => self.listen_again().await?,
+        let (listener, soon) = match self.listener.take() {
+            Some(listener) => (listener, KEPT_AT_START),
+            None => (self.listen_again().await?, KEPT_AFTER_A_PAUSE),
+        };
+        self.settings.kept_events = match self.server.kind() {
+            StoreKind::BuiltIn => Some(soon),
+            StoreKind::Minio => None,
         };
         let invoker = Invoker::start_on(listener, self.settings.clone(), observer)?;
         Ok(self.invoker.insert(invoker))

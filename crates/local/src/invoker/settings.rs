@@ -34,6 +34,9 @@ pub struct Settings {
     pub timeout: Duration,
     /// Before each further try of an event that failed; Lambda's are one and two minutes.
     pub retry_pauses: Vec<Duration>,
+    /// How soon the store delivers what it has kept while nobody listened; nothing when it keeps no events. The sweep at
+    /// the start waits for these: what they wake needs no waking.
+    pub kept_events: Option<Duration>,
     /// Between the sweeps after the one at the start.
     pub sweep_every: Option<Duration>,
     /// What goes wrong on purpose with events and processes.
@@ -57,6 +60,7 @@ impl Settings {
             memory_mb: 1769,
             timeout: Duration::from_secs(300),
             retry_pauses: vec![Duration::from_millis(500), Duration::from_secs(1)],
+            kept_events: None,
             sweep_every: Some(Duration::from_secs(30)),
             chaos: Chaos::default(),
             fates: None,
