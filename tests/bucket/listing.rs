@@ -90,6 +90,38 @@ async fn listed_v1(stage: &Stage, prefix: &str, delimiter: &str, most: i32) -> L
     }
 }
 
+/// The same by versions, of which every object has the one that is called `null`.
+async fn versions_listed(stage: &Stage, prefix: &str, delimiter: &str, most: i32) -> Listing {
+    let mut listing = Listing::default();
+    let mut markers = (None, None);
+    loop {
+        let page = stage
+            .client
+            .list_object_versions()
+            .bucket(BUCKET)
+            .prefix(prefix)
+            .set_delimiter((!delimiter.is_empty()).then(|| delimiter.to_owned()))
+            .set_key_marker(markers.0)
+            .set_version_id_marker(markers.1)
+            .max_keys(most)
+            .send()
+            .await
+            .unwrap();
+        assert!(page.delete_markers().is_empty());
+        for version in page.versions() {
+            assert_eq!((version.version_id(), version.is_latest), (Some("null"), Some(true)));
+            listing.keys.push(version.key().unwrap().to_owned());
+        }
+        listing.prefixes.extend(page.common_prefixes().iter().map(|p| p.prefix().unwrap().to_owned()));
+        if page.is_truncated != Some(true) {
+            assert_eq!((page.next_key_marker, page.next_version_id_marker), (None, None));
+            return listing;
+        }
+        assert!(page.next_key_marker.is_some());
+        markers = (page.next_key_marker, page.next_version_id_marker);
+    }
+}
+
 fn name(random: &mut Rng) -> String {
     (0..random.usize(1..5))
         .map(|_| *random.choice(&["a", "b", "/", "//", "-", "ü", "c d", "z+"]).unwrap())
@@ -126,6 +158,8 @@ async fn listings_are_as_the_model_says() {
             assert_eq!(found, expected(&model, &prefix, delimiter, &after), "{shown}");
             let found = listed_v1(&stage, &prefix, delimiter, most).await;
             assert_eq!(found, expected(&model, &prefix, delimiter, ""), "version 1, {shown}");
+            let found = versions_listed(&stage, &prefix, delimiter, most).await;
+            assert_eq!(found, expected(&model, &prefix, delimiter, ""), "versions, {shown}");
         }
         for (key, etag) in &model {
             assert_eq!(stage.get(key).await, key.as_bytes(), "{key:?}");
