@@ -1,7 +1,7 @@
 //! Inputs on which ray tracers are known to go wrong, each with a figure and the bound that it must keep.
 //!
 //! The table [`CASES`] is the list; a case measures every backend and says by how much it stays within its bound.
-//! What is right is said by the [oracle], or where an image is compared with itself by that image. Rays
+//! What is right is said by the [oracle](crate::oracle), or where an image is compared with itself by that image. Rays
 //! and positions are numbers that `f32` holds, unless the case is about those that it does not: so a figure is the
 //! error of tracing, not that of rounding the input. Everything random comes from [`SEED`].
 
