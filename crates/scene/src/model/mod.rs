@@ -2,7 +2,7 @@
 //!
 //! A bad value cannot be built: every type with a condition has private fields, a constructor that checks it and
 //! accessors. A thing that a line of a script holds says in its file also how it is written there
-//! ([`crate::form::Scripted`]). Lengths are world units, colours are display values (0 black, 1 white, unclamped),
+//! (`form::Scripted`). Lengths are world units, colours are display values (0 black, 1 white, unclamped),
 //! positions and directions are right-handed with y up on the screen. All numbers are finite.
 
 mod background;
