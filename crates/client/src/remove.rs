@@ -31,7 +31,9 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
     /// [`Error::NoAnimation`], and those of the store.
     pub async fn remove(&self, animation: &Animation, mut told: impl FnMut(Removing)) -> Result<u64> {
         let scripts = self.keys_of(animation, &[animation.scripts()]).await?;
-        if scripts.is_empty() && self.made_of(animation).await?.is_empty() {
+        // Listed before anything goes: whoever may not see all of an animation removes nothing of it.
+        let made = self.made_of(animation).await?;
+        if scripts.is_empty() && made.is_empty() {
             return Err(Error::NoAnimation(animation.clone()));
         }
         self.delete(&scripts, |done| told(Removing::Deleted(done))).await?;
