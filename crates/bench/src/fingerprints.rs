@@ -6,8 +6,10 @@
 //! one plane, eyes within objects, lights along the axes. Each is drawn with every instruction set and all numbers. It
 //! judges nothing: whether a picture is right is for the tests.
 //!
-//!     rayfold-bench fingerprints scenes --random 10000 > after.txt
-//!     cmp before.txt after.txt
+//! ```text
+//! rayfold-bench fingerprints scenes --random 10000 > after.txt
+//! cmp before.txt after.txt
+//! ```
 
 use std::fmt::Write as _;
 use std::hash::{DefaultHasher, Hasher};
