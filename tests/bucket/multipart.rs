@@ -54,6 +54,7 @@ async fn parts_become_one_object() {
 
     let complete = stage.client.complete_multipart_upload().bucket(BUCKET).key("film").upload_id(&id);
     let completed = complete.multipart_upload(list(&parts)).send().await.unwrap();
+    assert!(completed.location.unwrap().ends_with("/films/film"));
     let etag = completed.e_tag.unwrap();
     assert!(etag.ends_with("-3\""), "{etag}");
     let whole = bodies.concat();
@@ -77,8 +78,14 @@ async fn parts_become_one_object() {
 
     assert_eq!(stage.files(), 2, "the part that was overwritten and the one for nothing are gone");
     assert!(stage.client.list_multipart_uploads().bucket(BUCKET).send().await.unwrap().uploads().is_empty());
-    let again = stage.client.complete_multipart_upload().bucket(BUCKET).key("film").upload_id(&id);
-    assert_eq!(failure(again.multipart_upload(list(&parts)).send().await), (404, "NoSuchUpload".into()));
+    let again = || {
+        let again = stage.client.complete_multipart_upload().bucket(BUCKET).key("film").upload_id(&id);
+        again.multipart_upload(list(&parts))
+    };
+    let told_again = again().send().await.unwrap().e_tag.unwrap();
+    assert_eq!(told_again, etag, "an answer that was lost can be asked for again");
+    stage.put("film", "another").await;
+    assert_eq!(failure(again().send().await), (404, "NoSuchUpload".into()), "what came after it stays");
     stage.client.delete_object().bucket(BUCKET).key("film").send().await.unwrap();
     assert_eq!(stage.files(), 0);
 }

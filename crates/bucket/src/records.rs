@@ -96,6 +96,9 @@ pub(crate) struct Object {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) checksum: Option<Checksum>,
     pub(crate) body: Body,
+    /// The upload in parts that it came from, so that a completion whose answer was lost can be asked for again.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) upload: Option<String>,
 }
 
 /// One of the parts that an object was uploaded in.

@@ -82,7 +82,15 @@ impl Service {
             let there = admit(batch, &to)?;
             let body = keep(batch, &ids, ingested.content)?;
             let checksum = Some(checksum);
-            let object = records::Object { size, etag, modified: Moment::now(), headers, checksum, body };
+            let object = records::Object {
+                size,
+                etag,
+                modified: Moment::now(),
+                headers,
+                checksum,
+                body,
+                upload: None,
+            };
             place(batch, &ids, &to, there, &object, "ObjectCreated:Copy")?;
             Ok(object)
         });

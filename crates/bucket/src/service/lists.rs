@@ -127,7 +127,7 @@ impl Service {
             next_continuation_token: page.next.as_deref().map(token),
             contents: Some(contents(page.objects, with_owner, url)),
             common_prefixes: Some(prefixes(page.prefixes, url)),
-            delimiter: input.delimiter.map(shown),
+            delimiter: input.delimiter.filter(|delimiter| !delimiter.is_empty()).map(shown),
             encoding_type: input.encoding_type,
             start_after: input.start_after.map(shown),
             request_charged: None,
@@ -146,7 +146,9 @@ impl Service {
         // S3 names the next marker only where the last key alone may not say it.
         let last_key = page.objects.last().map(|(name, _)| name);
         let last = last_key.into_iter().chain(page.prefixes.last()).max().cloned();
-        let next = last.filter(|_| page.next.is_some() && input.delimiter.is_some());
+        let next = last.filter(|_| {
+            page.next.is_some() && input.delimiter.as_ref().is_some_and(|delimiter| !delimiter.is_empty())
+        });
         Ok(ListObjectsOutput {
             name: Some(input.bucket),
             prefix: Some(shown(input.prefix.unwrap_or_default())),
@@ -155,7 +157,7 @@ impl Service {
             is_truncated: Some(page.next.is_some()),
             contents: Some(contents(page.objects, true, url)),
             common_prefixes: Some(prefixes(page.prefixes, url)),
-            delimiter: input.delimiter.map(shown),
+            delimiter: input.delimiter.filter(|delimiter| !delimiter.is_empty()).map(shown),
             next_marker: next.map(shown),
             encoding_type: input.encoding_type,
             request_charged: None,

@@ -11,7 +11,7 @@ use super::Service;
 use super::answer::{Answer, coded, invalid_argument, invalid_request, time};
 use super::conditions::ReadConditions;
 use super::writes::of;
-use crate::checksum::Algorithm;
+use crate::checksum::{Algorithm, Checksum as StoredChecksum};
 use crate::records::{Layout, Object};
 
 /// What of an object is asked for.
@@ -21,6 +21,74 @@ struct Selection {
     partial: bool,
     /// Of which part.
     part: Option<usize>,
+}
+
+/// What is told of an object that is read.
+struct Told {
+    object: Object,
+    selection: Selection,
+    checksum: Option<StoredChecksum>,
+    /// Of the whole object, also where the checksum is a part's.
+    checksum_kind: Option<ChecksumType>,
+    parts_count: Option<i32>,
+}
+
+impl Told {
+    /// What of the object is asked for, and the checksum of that if it is asked for too.
+    fn new(
+        object: &Object,
+        layout: Option<&Layout>,
+        range: Option<Range>,
+        part_number: Option<i32>,
+        mode: Option<&ChecksumMode>,
+    ) -> Answer<Self> {
+        let selection = select(object, layout, range, part_number)?;
+        let whole = !selection.partial || selection.part.is_some();
+        let wanted = whole && mode.is_some_and(|mode| mode.as_str() == ChecksumMode::ENABLED);
+        let kind = object.checksum.as_ref().filter(|_| wanted).map(|sum| sum.kind.name());
+        let checksum = match (selection.part, layout) {
+            (Some(part), Some(layout)) => layout.parts[part].checksum.clone(),
+            _ => object.checksum.clone(),
+        };
+        Ok(Self {
+            object: object.clone(),
+            selection,
+            checksum: checksum.filter(|_| wanted),
+            checksum_kind: kind.map(ChecksumType::from_static),
+            parts_count: parts_count(part_number, layout),
+        })
+    }
+}
+
+/// The answer of a Get or a Head, which have these headers in common.
+macro_rules! answer {
+    ($output:ident, $told:expr $(, $field:ident: $value:expr)*) => {{
+        let Told { object, selection, checksum, checksum_kind, parts_count } = $told;
+        let sum = checksum.as_ref();
+        $output {
+            accept_ranges: Some("bytes".to_owned()),
+            cache_control: object.headers.cache_control,
+            checksum_crc32: of(sum, Algorithm::Crc32),
+            checksum_crc32c: of(sum, Algorithm::Crc32c),
+            checksum_crc64nvme: of(sum, Algorithm::Crc64nvme),
+            checksum_sha1: of(sum, Algorithm::Sha1),
+            checksum_sha256: of(sum, Algorithm::Sha256),
+            checksum_type: checksum_kind,
+            content_disposition: object.headers.content_disposition,
+            content_encoding: object.headers.content_encoding,
+            content_language: object.headers.content_language,
+            content_length: i64::try_from(selection.bytes.end - selection.bytes.start).ok(),
+            content_range: selection.partial.then(|| place(&selection.bytes, object.size)),
+            content_type: Some(object.headers.content_type.unwrap_or_else(default_type)),
+            e_tag: Some(ETag::Strong(object.etag)),
+            expires: object.headers.expires.as_deref().and_then(date),
+            last_modified: Some(object.modified.whole_seconds().into()),
+            metadata: Some(object.headers.metadata.into_iter().collect()),
+            parts_count,
+            $($field: $value,)*
+            ..$output::default()
+        }
+    }};
 }
 
 impl Service {
@@ -33,40 +101,10 @@ impl Service {
         };
         let held = self.held(&input.bucket, &input.key)?;
         conditions.check(&held.object).map_err(|error| with_validators(error, &held.object))?;
-        let selection = select(&held.object, held.layout.as_ref(), input.range, input.part_number)?;
-        let whole = !selection.partial || selection.part.is_some();
-        let wanted =
-            whole && input.checksum_mode.as_ref().is_some_and(|mode| mode.as_str() == ChecksumMode::ENABLED);
-        let object = held.object.clone();
-        let sum = match (selection.part, &held.layout) {
-            (Some(part), Some(layout)) => layout.parts[part].checksum.clone(),
-            _ => object.checksum.clone(),
-        };
-        let sum = sum.as_ref().filter(|_| wanted);
-        let output = GetObjectOutput {
-            accept_ranges: Some("bytes".to_owned()),
-            cache_control: object.headers.cache_control,
-            checksum_crc32: of(sum, Algorithm::Crc32),
-            checksum_crc32c: of(sum, Algorithm::Crc32c),
-            checksum_crc64nvme: of(sum, Algorithm::Crc64nvme),
-            checksum_sha1: of(sum, Algorithm::Sha1),
-            checksum_sha256: of(sum, Algorithm::Sha256),
-            checksum_type: sum.map(|sum| ChecksumType::from_static(sum.kind.name())),
-            content_disposition: object.headers.content_disposition,
-            content_encoding: object.headers.content_encoding,
-            content_language: object.headers.content_language,
-            content_length: i64::try_from(selection.bytes.end - selection.bytes.start).ok(),
-            content_range: selection.partial.then(|| place(&selection.bytes, object.size)),
-            content_type: Some(object.headers.content_type.unwrap_or_else(default_type)),
-            e_tag: Some(ETag::Strong(object.etag)),
-            expires: object.headers.expires.as_deref().and_then(date),
-            last_modified: Some(object.modified.whole_seconds().into()),
-            metadata: Some(object.headers.metadata.into_iter().collect()),
-            parts_count: parts_count(input.part_number, held.layout.as_ref()),
-            body: Some(StreamingBlob::new(held.bytes(&self.storage, selection.bytes)?)),
-            ..GetObjectOutput::default()
-        };
-        Ok(S3Response::new(output))
+        let mode = input.checksum_mode.as_ref();
+        let told = Told::new(&held.object, held.layout.as_ref(), input.range, input.part_number, mode)?;
+        let body = StreamingBlob::new(held.bytes(&self.storage, told.selection.bytes.clone())?);
+        Ok(S3Response::new(answer!(GetObjectOutput, told, body: Some(body))))
     }
 
     pub(super) fn object_looked_at(
@@ -87,39 +125,11 @@ impl Service {
             Some(_) => self.layout(&snapshot, &object)?,
             None => None,
         };
-        let selection = select(&object, layout.as_ref(), input.range, input.part_number)?;
-        let whole = !selection.partial || selection.part.is_some();
-        let wanted =
-            whole && input.checksum_mode.as_ref().is_some_and(|mode| mode.as_str() == ChecksumMode::ENABLED);
-        let sum = match (selection.part, &layout) {
-            (Some(part), Some(layout)) => layout.parts[part].checksum.clone(),
-            _ => object.checksum.clone(),
-        };
-        let sum = sum.as_ref().filter(|_| wanted);
-        let output = HeadObjectOutput {
-            accept_ranges: Some("bytes".to_owned()),
-            cache_control: object.headers.cache_control,
-            checksum_crc32: of(sum, Algorithm::Crc32),
-            checksum_crc32c: of(sum, Algorithm::Crc32c),
-            checksum_crc64nvme: of(sum, Algorithm::Crc64nvme),
-            checksum_sha1: of(sum, Algorithm::Sha1),
-            checksum_sha256: of(sum, Algorithm::Sha256),
-            checksum_type: sum.map(|sum| ChecksumType::from_static(sum.kind.name())),
-            content_disposition: object.headers.content_disposition,
-            content_encoding: object.headers.content_encoding,
-            content_language: object.headers.content_language,
-            content_length: i64::try_from(selection.bytes.end - selection.bytes.start).ok(),
-            content_range: selection.partial.then(|| place(&selection.bytes, object.size)),
-            content_type: Some(object.headers.content_type.unwrap_or_else(default_type)),
-            e_tag: Some(ETag::Strong(object.etag)),
-            expires: object.headers.expires.as_deref().and_then(date),
-            last_modified: Some(object.modified.whole_seconds().into()),
-            metadata: Some(object.headers.metadata.into_iter().collect()),
-            parts_count: parts_count(input.part_number, layout.as_ref()),
-            ..HeadObjectOutput::default()
-        };
-        let mut response = S3Response::new(output);
-        response.status = selection.partial.then_some(StatusCode::PARTIAL_CONTENT);
+        let mode = input.checksum_mode.as_ref();
+        let told = Told::new(&object, layout.as_ref(), input.range, input.part_number, mode)?;
+        let partial = told.selection.partial;
+        let mut response = S3Response::new(answer!(HeadObjectOutput, told));
+        response.status = partial.then_some(StatusCode::PARTIAL_CONTENT);
         Ok(response)
     }
 

@@ -1,6 +1,8 @@
 //! Uploads in parts. A part is a body of its own; completing an upload writes the list of its parts, and copies nothing.
 
 use hyper::StatusCode;
+use hyper::header::HOST;
+use hyper::http::uri::Authority;
 use s3s::dto::*;
 use s3s::{S3Request, s3_error};
 
@@ -203,6 +205,7 @@ impl Service {
         req: S3Request<CompleteMultipartUploadInput>,
     ) -> Answer<CompleteMultipartUploadOutput> {
         let caller = Caller::of(&req);
+        let location = location(&req);
         let input = req.input;
         let conditions = WriteConditions { if_match: input.if_match, if_none_match: input.if_none_match };
         conditions.check_form()?;
@@ -220,7 +223,6 @@ impl Service {
             value: claims.into_iter().find_map(|(algorithm, value)| value.map(|value| (algorithm, value))),
             size: input.mpu_object_size.map(|size| u64::try_from(size).unwrap_or_default()),
         };
-        let location = format!("/{}/{}", input.bucket, input.key);
         let (bucket, object_key) = (input.bucket.clone(), input.key.clone());
         let to = Destination { bucket: input.bucket, key: input.key, conditions, caller };
         let id = input.upload_id;
@@ -228,7 +230,13 @@ impl Service {
         let complete = self.change(Kind::Grows, move |batch| {
             let there = admit(batch, &to)?;
             let row = key::upload(&to.bucket, &to.key, &id);
-            let upload: records::Upload = find(batch, Table::Uploads, &row)?.ok_or_else(no_such_upload)?;
+            let Some(upload) = find::<records::Upload>(batch, Table::Uploads, &row)? else {
+                // Completed before, and still what is there: the answer may have been lost.
+                let existing = there.1;
+                return existing
+                    .filter(|object| object.upload.as_ref() == Some(&id))
+                    .ok_or_else(|| no_such_upload().into());
+            };
             let Chosen { layout, size, etag, checksum } = choose(batch, &id, &upload, &wanted, &claim)?;
 
             let body = ids.id();
@@ -248,6 +256,7 @@ impl Service {
                 headers: upload.headers,
                 checksum,
                 body: Body::Parts(body),
+                upload: Some(id.clone()),
             };
             place(batch, &ids, &to, there, &object, "ObjectCreated:CompleteMultipartUpload")?;
             Ok(object)
@@ -462,6 +471,13 @@ fn copied_range(range: &str, size: u64) -> Answer<std::ops::Range<u64>> {
         return Err(coded("InvalidArgument", StatusCode::BAD_REQUEST, message));
     }
     Ok(first..last + 1)
+}
+
+/// Where the object is that a request is about, as the client called it.
+fn location(req: &S3Request<CompleteMultipartUploadInput>) -> String {
+    let named = req.headers.get(HOST).and_then(|host| host.to_str().ok());
+    let host = named.or(req.uri.authority().map(Authority::as_str)).unwrap_or_default();
+    format!("http://{host}{}", req.uri.path())
 }
 
 #[cfg(test)]

@@ -37,7 +37,7 @@ impl Service {
         Ok(ListObjectVersionsOutput {
             name: Some(input.bucket),
             prefix: Some(shown(input.prefix.unwrap_or_default())),
-            delimiter: input.delimiter.map(shown),
+            delimiter: input.delimiter.filter(|delimiter| !delimiter.is_empty()).map(shown),
             key_marker: Some(shown(marker)),
             version_id_marker: Some(input.version_id_marker.unwrap_or_default()),
             max_keys: i32::try_from(most).ok(),

@@ -41,7 +41,8 @@ impl Service {
             let there = admit(batch, &to)?;
             let body = keep(batch, &ids, ingested.content)?;
             let checksum = Some(checksum);
-            let object = Object { size, etag, modified: Moment::now(), headers, checksum, body };
+            let object =
+                Object { size, etag, modified: Moment::now(), headers, checksum, body, upload: None };
             place(batch, &ids, &to, there, &object, "ObjectCreated:Put")?;
             Ok(object)
         });
@@ -68,7 +69,7 @@ pub(super) fn stored_encoding(encoding: Option<String>) -> Option<String> {
         .map(str::trim)
         .filter(|coding| !coding.is_empty() && !coding.eq_ignore_ascii_case("aws-chunked"))
         .collect();
-    (!kept.is_empty()).then(|| kept.join(","))
+    (!kept.is_empty()).then(|| kept.join(", "))
 }
 
 /// The checksum's value, if it is of this algorithm.
@@ -86,6 +87,7 @@ mod tests {
         assert_eq!(kept("aws-chunked"), None);
         assert_eq!(kept("gzip, aws-chunked").as_deref(), Some("gzip"));
         assert_eq!(kept("aws-chunked,gzip").as_deref(), Some("gzip"));
+        assert_eq!(kept("aws-chunked, deflate, gzip").as_deref(), Some("deflate, gzip"));
         assert_eq!(kept("br").as_deref(), Some("br"));
         assert_eq!(stored_encoding(None), None);
     }
