@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use rayfold_lambda::animator::GifAnimator;
 use rayfold_lambda::raytracer::RayTracer;
-use rayfold_pipeline::keys::{Animation, Key};
+use rayfold_pipeline::keys::{Animation, Key, Receipt};
 use rayfold_pipeline::manifest::{FrameState, Manifest, Status};
 use rayfold_pipeline::render::Outcome;
 use rayfold_pipeline::retry::{Scope, retry};
@@ -260,6 +260,36 @@ async fn frames_of_unlike_sizes_are_refused_by_name() {
     assert!(world.gif("a").await.is_some());
 }
 
+/// What an invocation puts first that this retry woke.
+fn begun(retry: &str) -> String {
+    let Ok(Key::Retry { animation, name, tag, part, attempt }) = retry.parse() else { panic!("{retry}") };
+    animation.receipt(&Receipt::Begun { name, tag, part, attempt })
+}
+
+/// A frame that waited behind those of another animation was given up after three wakings, though none had begun.
+#[tokio::test]
+async fn a_frame_that_waits_in_the_queue_is_not_given_up() {
+    let mut world = World::new();
+    world.store.put("scripts/a/1.txt", script(1, 1).into(), PutOptions::always()).await.unwrap();
+    let mut woken = 0;
+    for sweep_number in 1..=30 {
+        let before = world.policy.stuck_after * 8;
+        world.clock.sleep(before).await;
+        let id = format!("sweep-{sweep_number}");
+        let invocation = Invocation::new(&world.store, &world.clock, &world.random, &world.policy, &id);
+        let swept = require_send(sweep(&invocation)).await.unwrap();
+        let visit = *swept.visits[0].1.as_ref().unwrap();
+        assert_eq!(visit.given_up, 0, "sweep {sweep_number}");
+        woken += visit.woken;
+    }
+    assert!((4..=10).contains(&woken), "it is woken on and on, but ever more seldom: {woken}");
+    let retries = world.store.list(ListRequest::all("retries/")).await.unwrap().objects;
+    let retry = &retries.last().unwrap().key;
+    assert_eq!(world.event(retry).await, Outcome::Drawn);
+    assert!(world.store.head(&begun(retry)).await.unwrap().is_some(), "the attempt was counted");
+    assert!(world.gif("a").await.is_some());
+}
+
 #[tokio::test]
 async fn the_sweep_wakes_what_was_lost_and_gives_up_in_the_end() {
     let mut world = World::new();
@@ -277,9 +307,12 @@ async fn the_sweep_wakes_what_was_lost_and_gives_up_in_the_end() {
         let visit = *swept.visits[0].1.as_ref().unwrap();
         let expected = if attempt <= 3 { (1, 0) } else { (0, 1) };
         assert_eq!((visit.woken, visit.given_up), expected, "attempt {attempt}");
-        // The wakings are lost as well.
         let retries = world.store.list(ListRequest::all("retries/")).await.unwrap().objects;
         assert_eq!(retries.len() as u64, attempt.min(3));
+        // Each waking begins an invocation, which dies.
+        for retry in &retries {
+            world.store.put(&begun(&retry.key), "".into(), PutOptions::always()).await.unwrap();
+        }
         world.delivered.extend(retries.into_iter().map(|listed| listed.key));
         world.deliver().await;
     }

@@ -156,9 +156,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 "the render function died in each of {tries} attempts, most likely for lack of memory"
             )),
             _ if attempts < self.policy.attempts => None,
-            End::TimedOut | End::Died | End::TooOld => {
-                Some(format!("no result in each of {attempts} attempts"))
-            }
+            // It has not been tried.
+            End::TooOld => None,
+            End::TimedOut | End::Died => Some(format!("no result in each of {attempts} attempts")),
             End::Error(message) => Some(format!("no result in each of {attempts} attempts: {message}")),
         };
         match hopeless {

@@ -163,6 +163,18 @@ pub enum Receipt {
         /// Which of its frames.
         part: Part,
     },
+    /// `<name>@<tag>.begun-<attempt>`, of a part `<name>@<tag>/<number>.begun-<attempt>`: an invocation has begun that a
+    /// retry woke.
+    Begun {
+        /// The script.
+        name: ScriptName,
+        /// Its version.
+        tag: Tag,
+        /// Which of its frames.
+        part: Part,
+        /// The retry's.
+        attempt: NonZeroU64,
+    },
     /// `<name>@<tag>.split-<k>`
     Split {
         /// The script.
@@ -388,6 +400,7 @@ impl Receipt {
         match self {
             Receipt::Frame { name, tag, .. }
             | Receipt::Fault { name, tag, .. }
+            | Receipt::Begun { name, tag, .. }
             | Receipt::Split { name, tag, .. } => name == script && tag.version == *version,
             Receipt::Refusal { .. } => false,
         }
@@ -457,6 +470,9 @@ fn receipt(rest: &str) -> Option<(&str, Receipt)> {
         } else if let Some(stem) = file.strip_suffix(".error.json") {
             let (name, tag) = name_and_tag(stem)?;
             Receipt::Fault { name, tag, part: None }
+        } else if let Some((stem, attempt)) = file.rsplit_once(".begun-") {
+            let (name, tag) = name_and_tag(stem)?;
+            Receipt::Begun { name, tag, part: None, attempt: canonical(attempt)? }
         } else {
             let (stem, count) = file.rsplit_once(".split-")?;
             let (name, tag) = name_and_tag(stem)?;
@@ -466,9 +482,12 @@ fn receipt(rest: &str) -> Option<(&str, Receipt)> {
     }
     let (animation, scripted) = above.rsplit_once('/')?;
     let (name, tag) = name_and_tag(scripted)?;
-    let receipt = match file.strip_suffix(".error.json") {
-        Some(number) => Receipt::Fault { name, tag, part: Some(canonical(number)?) },
-        None => Receipt::Frame { name, tag, part: Some(canonical(file.strip_suffix(".png")?)?) },
+    let receipt = if let Some(number) = file.strip_suffix(".error.json") {
+        Receipt::Fault { name, tag, part: Some(canonical(number)?) }
+    } else if let Some((number, attempt)) = file.split_once(".begun-") {
+        Receipt::Begun { name, tag, part: Some(canonical(number)?), attempt: canonical(attempt)? }
+    } else {
+        Receipt::Frame { name, tag, part: Some(canonical(file.strip_suffix(".png")?)?) }
     };
     Some((animation, receipt))
 }
@@ -542,6 +561,10 @@ impl fmt::Display for Receipt {
             Receipt::Frame { name, tag, part: Some(number) } => write!(f, "{name}@{tag}/{number}.png"),
             Receipt::Fault { name, tag, part: None } => write!(f, "{name}@{tag}.error.json"),
             Receipt::Fault { name, tag, part: Some(number) } => write!(f, "{name}@{tag}/{number}.error.json"),
+            Receipt::Begun { name, tag, part: None, attempt } => write!(f, "{name}@{tag}.begun-{attempt}"),
+            Receipt::Begun { name, tag, part: Some(number), attempt } => {
+                write!(f, "{name}@{tag}/{number}.begun-{attempt}")
+            }
             Receipt::Split { name, tag, count } => write!(f, "{name}@{tag}.split-{count}"),
             Receipt::Refusal { generation } => write!(f, "@{generation}.error.json"),
         }

@@ -161,7 +161,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             stream::iter(listings).buffered(self.policy.concurrency).try_collect().await?;
         let parts = listed.into_iter().flatten().filter_map(|listed| receipt(animation, listed));
         results.receipts.extend(parts.filter(|found| match &found.receipt {
-            Receipt::Frame { part, .. } | Receipt::Fault { part, .. } => part.is_some(),
+            Receipt::Frame { part, .. } | Receipt::Fault { part, .. } | Receipt::Begun { part, .. } => {
+                part.is_some()
+            }
             _ => false,
         }));
         Ok(())

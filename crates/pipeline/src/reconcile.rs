@@ -175,7 +175,7 @@ fn resolve(results: &Results) -> BTreeMap<(&ScriptName, &ETag), Resolution<'_>> 
                 let outcome = resolutions.entry((name, &tag.version)).or_default().outcome(*part);
                 outcome.fault = outcome.fault.max(Some((tag.pixels, etag)));
             }
-            Receipt::Refusal { .. } => {}
+            Receipt::Begun { .. } | Receipt::Refusal { .. } => {}
         }
     }
     resolutions

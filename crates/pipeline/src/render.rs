@@ -127,6 +127,8 @@ struct Subject {
     part: Part,
     /// The version that a part belongs to: of another one there is nothing to draw.
     only: Option<ETag>,
+    /// The retry that woke it, and the version that this was for.
+    retry: Option<(NonZeroU64, ETag)>,
 }
 
 /// A script as it is now.
@@ -150,13 +152,16 @@ impl Subject {
     /// `None` for a key that is about no script.
     fn of(key: Key) -> Option<Self> {
         match key {
-            Key::Script { animation, name } => Some(Subject { animation, name, part: None, only: None }),
-            Key::Retry { animation, name, tag, part, .. } => {
-                let only = part.map(|_| tag.version);
-                Some(Subject { animation, name, part, only })
+            Key::Script { animation, name } => {
+                Some(Subject { animation, name, part: None, only: None, retry: None })
+            }
+            Key::Retry { animation, name, tag, part, attempt } => {
+                let only = part.map(|_| tag.version.clone());
+                Some(Subject { animation, name, part, only, retry: Some((attempt, tag.version)) })
             }
             Key::Part { animation, name, tag, number } => {
-                Some(Subject { animation, name, part: Some(number), only: Some(tag.version) })
+                let only = Some(tag.version);
+                Some(Subject { animation, name, part: Some(number), only, retry: None })
             }
             Key::Settings { .. }
             | Key::Receipt { .. }
@@ -237,6 +242,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         script: Script,
         stages: &mut Stages,
     ) -> Result<(Outcome, Fact)> {
+        self.begin(subject, &script.version).await?;
         let before = self.clock.now();
         let drawing = self.draw(renderer, &subject.name, script.body, subject.part).await?;
         let drawn = self.clock.now();
@@ -244,6 +250,15 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let put = self.put_drawing(subject, script.version, script.uploaded, drawing).await?;
         stages.put = self.clock.now().since(drawn);
         Ok(put)
+    }
+
+    /// Says that the attempt has begun: the sweep counts those alone, for others may still wait to be tried.
+    async fn begin(&self, subject: &Subject, version: &ETag) -> Result<()> {
+        let Subject { animation, name, part, retry, .. } = subject;
+        let Some((attempt, _)) = retry.as_ref().filter(|(_, meant)| meant == version) else { return Ok(()) };
+        let tag = Tag { version: version.clone(), pixels: self.policy.pixels };
+        let begun = Receipt::Begun { name: name.clone(), tag, part: *part, attempt: *attempt };
+        self.put_receipt(&animation.receipt(&begun), Bytes::new(), "text/plain").await.map(drop)
     }
 
     /// Draws, but not beyond the deadline: what is killed cannot say why.

@@ -58,13 +58,20 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             .collect();
         let named: BTreeSet<_> =
             wanted.iter().map(|frame| (&frame.script, &frame.version, frame.part)).collect();
-        let mut doomed = Vec::new();
+        let (mut doomed, mut counted) = (Vec::new(), Vec::new());
         for found in &observation.results.receipts {
             let (name, tag, part, drawn) = match &found.receipt {
                 Receipt::Frame { name, tag, part } => (name, tag, *part, true),
                 Receipt::Fault { name, tag, part } => (name, tag, *part, false),
                 Receipt::Refusal { .. } => {
                     doomed.push(animation.receipt(&found.receipt));
+                    continue;
+                }
+                // Attempts are counted anew.
+                Receipt::Begun { name, tag, part, .. } => {
+                    if named.contains(&(name, &tag.version, *part)) {
+                        counted.push(animation.receipt(&found.receipt));
+                    }
                     continue;
                 }
                 Receipt::Split { .. } => continue,
@@ -74,6 +81,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             }
         }
         let deleted = doomed.len() as u64;
+        doomed.extend(counted);
         for listed in self.retries(animation).await? {
             if let Ok(Key::Retry { name, tag, part, .. }) = listed.key.parse()
                 && named.contains(&(&name, &tag.version, part))

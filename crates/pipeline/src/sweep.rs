@@ -48,11 +48,17 @@ pub struct Visit {
 }
 
 /// How often and when last a frame was woken.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Wakings {
+    /// The last one's number.
     attempts: u64,
     last: Timestamp,
+    /// To how many of them an invocation has begun. The others may wait behind a thousand frames.
+    begun: u64,
 }
+
+/// The pause between wakings doubles no more than so often.
+const MOST_DOUBLINGS: u64 = 6;
 
 /// Visits all animations.
 ///
@@ -152,7 +158,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         if pending.is_empty() || now.since(last) < self.policy.stuck_after {
             return Ok(());
         }
-        let wakings = self.wakings(animation).await?;
+        let wakings = self.wakings(animation, observation).await?;
         let steps = pending.into_iter().map(|frame| {
             let waking = wakings.get(&(frame.script.clone(), frame.version.clone(), frame.part)).copied();
             self.wake_frame(animation, frame, waking, now)
@@ -179,16 +185,15 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         waking: Option<Wakings>,
         now: Timestamp,
     ) -> Result<Step> {
-        let Wakings { attempts, last } =
-            waking.unwrap_or(Wakings { attempts: 0, last: Timestamp::default() });
-        let doublings = u32::try_from(attempts.saturating_sub(1)).unwrap_or(u32::MAX);
+        let Wakings { attempts, last, begun } = waking.unwrap_or_default();
+        let doublings = attempts.saturating_sub(1).min(MOST_DOUBLINGS) as u32;
         let patience = self.policy.stuck_after.saturating_mul(2_u32.saturating_pow(doublings));
         if attempts > 0 && now.since(last) < patience {
             return Ok(Step::Patient);
         }
         let tag = Tag { version: frame.version.clone(), pixels: self.policy.pixels };
-        if attempts >= self.policy.attempts {
-            let reason = Reason::new(format!("no result in each of {attempts} attempts"));
+        if begun >= self.policy.attempts {
+            let reason = Reason::new(format!("no result in each of {begun} attempts"));
             self.put_fault(animation, &frame.script, &tag, frame.part, &reason).await?;
             return Ok(Step::GivenUp);
         }
@@ -251,15 +256,22 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 
     /// How often each frame of an animation was woken.
-    async fn wakings(&self, animation: &Animation) -> Result<BTreeMap<(ScriptName, ETag, Part), Wakings>> {
-        let mut wakings = BTreeMap::new();
+    async fn wakings(
+        &self,
+        animation: &Animation,
+        observation: &Observation,
+    ) -> Result<BTreeMap<(ScriptName, ETag, Part), Wakings>> {
+        let mut wakings: BTreeMap<_, Wakings> = BTreeMap::new();
         for listed in self.retries(animation).await? {
             if let Ok(Key::Retry { name, tag, part, attempt, .. }) = listed.key.parse() {
-                let waking: &mut Wakings = wakings
-                    .entry((name, tag.version, part))
-                    .or_insert(Wakings { attempts: 0, last: listed.modified });
+                let waking = wakings.entry((name, tag.version, part)).or_default();
                 waking.attempts = waking.attempts.max(attempt.get());
                 waking.last = waking.last.max(listed.modified);
+            }
+        }
+        for found in &observation.results.receipts {
+            if let Receipt::Begun { name, tag, part, .. } = &found.receipt {
+                wakings.entry((name.clone(), tag.version.clone(), *part)).or_default().begun += 1;
             }
         }
         Ok(wakings)
@@ -280,9 +292,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let used = used_pixels(&observation.manifest);
         let superseded = |found: &&ReceiptFound| match &found.receipt {
             Receipt::Refusal { generation } => *generation != observation.manifest.head.generation,
-            Receipt::Split { name, tag, .. } | Receipt::Fault { name, tag, .. } => {
-                current.get(name) != Some(&&tag.version)
-            }
+            Receipt::Split { name, tag, .. }
+            | Receipt::Fault { name, tag, .. }
+            | Receipt::Begun { name, tag, .. } => current.get(name) != Some(&&tag.version),
             Receipt::Frame { name, tag, part } => match used.get(&(name, *part)) {
                 _ if current.get(name) != Some(&&tag.version) => true,
                 Some(used) => tag.pixels < *used,
@@ -372,7 +384,10 @@ fn part_of(key: &Key) -> Option<(&ScriptName, &ETag)> {
     match key {
         Key::Part { name, tag, .. } => Some((name, &tag.version)),
         Key::Receipt {
-            receipt: Receipt::Frame { name, tag, part: Some(_) } | Receipt::Fault { name, tag, part: Some(_) },
+            receipt:
+                Receipt::Frame { name, tag, part: Some(_) }
+                | Receipt::Fault { name, tag, part: Some(_) }
+                | Receipt::Begun { name, tag, part: Some(_), .. },
             ..
         } => Some((name, &tag.version)),
         _ => None,

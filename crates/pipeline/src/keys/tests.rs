@@ -43,6 +43,14 @@ fn every_kind_of_key_reads_back() {
             "00 1@x@d41d8cd9-2-p3/12.error.json",
             Receipt::Fault { name: name.clone(), tag: t(), part: Some(number) },
         ),
+        (
+            "00 1@x@d41d8cd9-2-p3.begun-12",
+            Receipt::Begun { name: name.clone(), tag: t(), part: None, attempt: number },
+        ),
+        (
+            "00 1@x@d41d8cd9-2-p3/12.begun-12",
+            Receipt::Begun { name: name.clone(), tag: t(), part: Some(number), attempt: number },
+        ),
         ("00 1@x@d41d8cd9-2-p3.split-12", Receipt::Split { name: name.clone(), tag: t(), count: number }),
         ("@0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a.error.json", Receipt::Refusal { generation: generation.clone() }),
     ] {
@@ -70,6 +78,7 @@ fn names_that_start_with_an_at_sign_have_receipts_like_all_others() {
             let receipts = [
                 Receipt::Frame { name: name.clone(), tag: tag.clone(), part },
                 Receipt::Fault { name: name.clone(), tag: tag.clone(), part },
+                Receipt::Begun { name: name.clone(), tag: tag.clone(), part, attempt: NonZeroU64::MIN },
                 Receipt::Split { name: name.clone(), tag: tag.clone(), count: NonZeroU64::MIN },
             ];
             for receipt in receipts {
