@@ -3,7 +3,10 @@
 //! The one list of them: each refers to its [`Form`], which stands with what the command makes.
 
 use crate::form::{Form, Scripted};
-use crate::model::{Background, Cuboid, DirectionalLight, ORTHOCAMERA, Pinhole, Screen, Sphere, Triangle};
+use crate::model::{
+    Background, Cone, Cuboid, Cylinder, DirectionalLight, Disc, Lamp, Look, ORTHOCAMERA, Pinhole, Plane,
+    Screen, Sphere, Torus, Triangle,
+};
 
 /// Defines [`Command`] from its names, so that the list of all is whole.
 macro_rules! commands {
@@ -32,11 +35,18 @@ commands! {
     Screen: Screen::FORM, "The size of the image.";
     Orthocamera: ORTHOCAMERA, "A parallel projection.";
     Camera: Pinhole::FORM, "A pinhole camera.";
+    Look: Look::FORM, "A camera that looks at a target.";
     Background: Background::FORM, "What a ray sees that hits nothing.";
     Sphere: Sphere::FORM, "A sphere.";
     Triangle: Triangle::FORM, "A triangle.";
     Cuboid: Cuboid::FORM, "A box along the axes.";
+    Plane: Plane::FORM, "A plane without end.";
+    Disc: Disc::FORM, "A flat, round disc.";
+    Cylinder: Cylinder::FORM, "A closed cylinder.";
+    Cone: Cone::FORM, "A closed cone, also cut off.";
+    Torus: Torus::FORM, "A ring.";
     Ilight: DirectionalLight::FORM, "A light at infinity.";
+    Plight: Lamp::FORM, "A light at a place.";
     Clear: Form::new("Clear", &[]), "Removes objects and lights.";
     Trace: Form::new("Trace", &[]), "Renders a frame.";
 }

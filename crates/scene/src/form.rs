@@ -54,6 +54,10 @@ pub enum Kind {
     WindowPosition,
     /// A direction, of any length.
     Direction,
+    /// An angle.
+    Angle,
+    /// A plain number.
+    Plain,
     /// Red, green and blue.
     Color,
     /// What share of the light a surface sends on, for red, green and blue.
@@ -69,6 +73,8 @@ pub enum Unit {
     World,
     /// Brightness on the screen: 0 is black, 1 the brightest.
     Display,
+    /// Degrees of an angle.
+    Degrees,
     /// A plain number.
     One,
 }
@@ -82,6 +88,16 @@ pub enum Values {
     Clamped,
     /// Greater than 0.
     Positive,
+    /// At least 0.
+    NotNegative,
+    /// At least 1.
+    AtLeastOne,
+    /// From 0 to 1.
+    Share,
+    /// From 0 to below 180.
+    HalfTurn,
+    /// Above 0 and below 180.
+    FieldOfView,
     /// Not all components 0.
     NotZero,
     /// Whole numbers in a range.
@@ -177,7 +193,8 @@ impl Kind {
             Self::Count(unit) => unit,
             Self::Length | Self::Position | Self::WindowPosition => Unit::World,
             Self::Color => Unit::Display,
-            Self::Direction | Self::Coefficients => Unit::One,
+            Self::Angle => Unit::Degrees,
+            Self::Direction | Self::Coefficients | Self::Plain => Unit::One,
         }
     }
 }
@@ -190,6 +207,8 @@ impl Display for Kind {
             Self::Position => "position",
             Self::WindowPosition => "position in the window",
             Self::Direction => "direction",
+            Self::Angle => "angle",
+            Self::Plain => "number",
             Self::Color => "colour",
             Self::Coefficients => "coefficients",
         })
@@ -202,6 +221,7 @@ impl Display for Unit {
             Self::Pixels => "pixels",
             Self::World => "world units",
             Self::Display => "display values",
+            Self::Degrees => "degrees",
             Self::One => "plain numbers",
         })
     }
@@ -213,6 +233,11 @@ impl Display for Values {
             Self::Any => f.write_str("any"),
             Self::Clamped => f.write_str("clamped to 0..1"),
             Self::Positive => f.write_str("greater than 0"),
+            Self::NotNegative => f.write_str("at least 0"),
+            Self::AtLeastOne => f.write_str("at least 1"),
+            Self::Share => f.write_str("from 0 to 1"),
+            Self::HalfTurn => f.write_str("from 0 to below 180"),
+            Self::FieldOfView => f.write_str("above 0 and below 180"),
             Self::NotZero => f.write_str("not all 0"),
             Self::Whole(least, u32::MAX) => write!(f, "whole, from {least}"),
             Self::Whole(least, most) => write!(f, "whole, from {least} to {most}"),

@@ -32,8 +32,9 @@ pub use diagnostic::{Code, Diagnostic, Severity};
 pub use form::{Field, Form, Kind, Unit, Values};
 pub use limits::Limits;
 pub use model::{
-    Camera, Cuboid, DirectionalLight, InvalidValue, Light, Material, Object, Parameter, Pinhole, Scene,
-    Screen, Sphere, Triangle,
+    Background, Camera, Coefficients, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Finish, Glass,
+    Instance, InvalidValue, Lamp, Lens, Light, Look, Material, Object, Parameter, Pattern, Pinhole,
+    Placement, Plane, Samples, Scene, Screen, Shine, Shutter, Sphere, Tone, Torus, Triangle, Weight,
 };
 pub use natural::{SETTINGS_FILE, natural_cmp, script_name};
 pub use parse::{Parsed, parse};

@@ -5,6 +5,7 @@ use std::fmt::{self, Formatter};
 use glam::{DVec2, DVec3};
 
 use super::invalid::{Faults, InvalidValue, Parameter, direction, finite, positive};
+use super::look::Look;
 use super::vector::{to_unit_scale, unit};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values, write_line};
 
@@ -19,6 +20,8 @@ pub enum Camera {
     Orthographic,
     /// All rays start at the eye.
     Pinhole(Pinhole),
+    /// All rays start at the eye, and the middle one meets a target.
+    Look(Look),
 }
 
 impl Camera {
@@ -27,6 +30,7 @@ impl Camera {
         match self {
             Self::Orthographic => writeln!(f, "{}", ORTHOCAMERA.name),
             Self::Pinhole(pinhole) => write_line(f, pinhole),
+            Self::Look(look) => write_line(f, look),
         }
     }
 }
@@ -164,19 +168,19 @@ impl Scripted for Pinhole {
 /// so once it is rounded to floats.
 const PARALLEL: f64 = 4.0 * f64::EPSILON;
 
-fn is_parallel(a: DVec3, b: DVec3) -> bool {
+pub(super) fn is_parallel(a: DVec3, b: DVec3) -> bool {
     let (a, b) = (level(a), level(b));
     cross(a, b).length() < PARALLEL * a.length() * b.length()
 }
 
 /// The vector times a power of two, about as long as 1.
-fn level(v: DVec3) -> DVec3 {
+pub(super) fn level(v: DVec3) -> DVec3 {
     v * to_unit_scale(v.abs().max_element())
 }
 
 /// The cross product to within 1.5 units in the last place of each component, also of nearly parallel vectors
 /// (Kahan's difference of products; Jeannerod, Louvet, Muller 2013, "Further analysis of Kahan's algorithm").
-fn cross(a: DVec3, b: DVec3) -> DVec3 {
+pub(super) fn cross(a: DVec3, b: DVec3) -> DVec3 {
     let difference = |a: f64, b: f64, c: f64, d: f64| {
         let cd = c * d;
         let error = (-c).mul_add(d, cd);

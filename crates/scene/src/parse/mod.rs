@@ -17,7 +17,10 @@ use crate::command::{Command, MAX_NUMBERS};
 use crate::diagnostic::Diagnostic;
 use crate::form::{Numbers, Scripted};
 use crate::limits::Limits;
-use crate::model::{Camera, Cuboid, DirectionalLight, InvalidValue, Light, Object, Screen, Sphere, Triangle};
+use crate::model::{
+    Camera, Cone, Cuboid, Cylinder, DirectionalLight, Disc, InvalidValue, Lamp, Light, Object, Plane, Screen,
+    Sphere, Torus, Triangle,
+};
 use crate::report::{Fault, Line, Report};
 use crate::script::{Recorder, Script};
 use text::{Words, lines};
@@ -235,7 +238,14 @@ impl<'a> Parser<'a> {
             | Command::Sphere
             | Command::Triangle
             | Command::Cuboid
+            | Command::Look
+            | Command::Plane
+            | Command::Disc
+            | Command::Cylinder
+            | Command::Cone
+            | Command::Torus
             | Command::Ilight
+            | Command::Plight
             | Command::Clear => {}
         }
     }
@@ -289,11 +299,21 @@ impl<'a> Parser<'a> {
                 let pinhole = self.read(s).map(Camera::Pinhole);
                 self.camera(s, pinhole);
             }
+            Command::Look => {
+                let look = self.read(s).map(Camera::Look);
+                self.camera(s, look);
+            }
             Command::Background => self.background(s),
             Command::Sphere => self.object::<Sphere>(s),
             Command::Triangle => self.object::<Triangle>(s),
             Command::Cuboid => self.object::<Cuboid>(s),
+            Command::Plane => self.object::<Plane>(s),
+            Command::Disc => self.object::<Disc>(s),
+            Command::Cylinder => self.object::<Cylinder>(s),
+            Command::Cone => self.object::<Cone>(s),
+            Command::Torus => self.object::<Torus>(s),
             Command::Ilight => self.light::<DirectionalLight>(s),
+            Command::Plight => self.light::<Lamp>(s),
             Command::Clear => self.clear(),
             Command::Trace => self.trace(s),
         }

@@ -143,7 +143,13 @@ pub(super) fn invalid(fault: InvalidValue, name: &str, word: &str) -> Fault {
         InvalidValue::OutOfRange(_, least, most) => {
             told(&format!("expected a number from {least} to {most}"))
         }
-        InvalidValue::MirrorOnFlat => told("expected no mirror coefficients"),
+        InvalidValue::Negative(_) => told("expected a number from 0"),
+        InvalidValue::TooSmall(_, least) => told(&format!("expected a number from {least}")),
+        InvalidValue::NoAxis => told("expected two points that differ"),
+        InvalidValue::NoRadius => told("expected a number greater than 0 at one end at least"),
+        InvalidValue::ThickTorus => told("expected `r` to be less than `R`"),
+        InvalidValue::NoGaze => told("expected a target apart from the eye"),
+        InvalidValue::EmptyGradient => told("expected `a` and `b` to differ"),
     }
 }
 

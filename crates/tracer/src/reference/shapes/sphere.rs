@@ -42,7 +42,7 @@ impl Shape for Sphere {
     }
 
     fn seen_from(&self, eye: DVec3) -> Option<Object> {
-        let placed = Self::new(self.radius(), self.center() - eye, *self.material()).ok()?;
+        let placed = Self::new(self.radius(), self.center() - eye, self.material().clone()).ok()?;
         let side = |eye, sphere| power(eye, sphere, 1.0).partial_cmp(&0.0);
         (side(eye, self) == side(DVec3::ZERO, &placed)).then_some(placed.into())
     }
