@@ -110,7 +110,11 @@ mod tests {
         let exact = square(0.6) + square(0.8) - square(1.0);
         assert_eq!(just_inside, exact as f64 * 2f64.powi(-106));
         assert_eq!(
-            power(DVec3::new(3.0, 4.0, 0.0), &Sphere::new(5.0, DVec3::ZERO, *unit.material()).unwrap(), 1.0),
+            power(
+                DVec3::new(3.0, 4.0, 0.0),
+                &Sphere::new(5.0, DVec3::ZERO, unit.material().clone()).unwrap(),
+                1.0
+            ),
             0.0
         );
     }
