@@ -30,6 +30,8 @@ impl Limits {
     pub const SCRIPT_BYTES: usize = 256 << 20;
     /// What fits into a few gigabytes together with what speeds up tracing.
     pub const OBJECTS: usize = 4_000_000;
+    /// How many groups may be drawn for each object that may: groups that only use others cost time, too.
+    pub(crate) const USES_PER_OBJECT: usize = 4;
     /// Every light is a shadow ray at every hit: far beyond what can be waited for.
     pub const LIGHTS: usize = 1024;
     /// 64 megapixels, 8000 x 8000.

@@ -38,6 +38,9 @@ pub(super) enum CurveFault {
 /// The first fault, and where.
 pub(super) fn parse(text: &str, span: Range<usize>) -> Result<Number, (Range<usize>, CurveFault)> {
     let bytes = &text.as_bytes()[..span.end];
+    if !text[span.clone()].ends_with(')') {
+        return Err((span.start..span.start + 1, CurveFault::Unclosed));
+    }
     let mut at = span.start + 1;
     let mut mode = None;
     let mut cycle = false;
@@ -128,7 +131,7 @@ mod tests {
             let (span, found) = parsed(text).unwrap_err();
             assert_eq!((&text[span], found), (place, fault), "{text}");
         };
-        check("(1:0 2:3", "(1:0 2:3", CurveFault::Unclosed);
+        check("(1:0 2:3", "(", CurveFault::Unclosed);
         check("()", "()", CurveFault::NoKey);
         check("(smooth)", "(smooth)", CurveFault::NoKey);
         check("(smoth 1:0)", "smoth", CurveFault::NotAMode("smoth".into()));

@@ -114,6 +114,12 @@ impl<'a> Parser<'a> {
                 Kinds::Materials => self.materials.line_of(name),
                 Kinds::Groups => self.groups.line_of(name),
             };
+            if later.is_some() {
+                match kind {
+                    Kinds::Materials => self.materials.refer(name),
+                    Kinds::Groups => self.groups.refer(name),
+                };
+            }
             let nearest = match kind {
                 _ if later.is_some() || !self.report.describes_next() => None,
                 Kinds::Materials => self.materials.nearest(name),
@@ -143,20 +149,39 @@ impl<'a> Parser<'a> {
     ) {
         let Some(subject) = subject else { return };
         let name = &text[subject.clone()];
-        let used = match command.act() {
+        // Nobody is told that it is not used, either.
+        match command.act() {
             Act::Material => {
-                // That it is there twice is told of lines in order only.
-                let _ = self.materials.define(name, line, subject, None);
-                self.materials.refer(name)
+                if self.materials.refer(name).is_none()
+                    && self.materials.define(name, line, subject, None).is_ok()
+                {
+                    self.materials.refer(name);
+                }
             }
             Act::Group => {
-                let _ = self.groups.define(name, line, subject, None);
-                self.groups.refer(name)
+                if self.groups.refer(name).is_none() && self.groups.define(name, line, subject, None).is_ok()
+                {
+                    self.groups.refer(name);
+                }
             }
-            _ => None,
-        };
-        // Nobody is told either that it is not used.
-        let _ = used;
+            Act::Use => {
+                self.groups.refer(name);
+            }
+            Act::Screen
+            | Act::Camera(_)
+            | Act::Background
+            | Act::Lens
+            | Act::Samples
+            | Act::Shutter
+            | Act::Tone
+            | Act::Depth
+            | Act::Frames
+            | Act::End
+            | Act::Object(_)
+            | Act::Light(_)
+            | Act::Clear
+            | Act::Trace => {}
+        }
     }
 
     pub(super) fn material(&mut self, s: &Statement<'a>) {
@@ -267,10 +292,10 @@ impl<'a> Parser<'a> {
                     .map_err(|fault| (span.clone(), wording::bad_number(fault, name, word, false))),
                 None => Err((0..0, wording::no_clause())),
             };
-            let is_word = word.as_ref().is_none_or(|(_, word)| is_name(word));
+            let is_next = word.as_ref().is_none_or(|(_, word)| Clause::from_name(word).is_some());
             match number {
                 Ok(number) => numbers.push(number),
-                Err(_) if is_word => {
+                Err(_) if is_next => {
                     let end = words[..*next].last().map_or(place.end, |word| word.end);
                     let found = spans.len();
                     self.report.error(s.line, end..end, || wording::clause_too_short(clause, name, found));
@@ -372,13 +397,15 @@ impl<'a> Parser<'a> {
         if let Some(group) = &self.group
             && !self.line_lost
         {
-            let (line, span) = (group.line, group.command.clone());
+            let (line, span, name) = (group.line, group.command.clone(), group.name);
             self.report.error(line, span, wording::group_not_ended);
+            self.close_group();
+            self.groups.refer(name);
         }
         self.close_group();
     }
 
-    fn close_group(&mut self) {
+    pub(super) fn close_group(&mut self) {
         let Some(group) = self.group.take() else { return };
         let OpenGroup { name, line, subject, recorder, drawn, uses, reach, contents, .. } = group;
         let info = GroupInfo { drawn, uses, reach, contents, seen: None };

@@ -106,7 +106,7 @@ impl<'a> Parser<'a> {
             Some(subject) => match self.subject(line, text, command, subject, &mut words) {
                 Some(name) => Some(name),
                 None => {
-                    self.faulty_line(line, text, command, None);
+                    self.faulty_line(line, text, command, None, &words);
                     return None;
                 }
             },
@@ -116,7 +116,7 @@ impl<'a> Parser<'a> {
             return Some(Statement { line, text, command, words, subject, values, row: None, surface: None });
         }
         let Some(parameters) = self.parameters(line, text, command, &words) else {
-            self.faulty_line(line, text, command, subject);
+            self.faulty_line(line, text, command, subject, &words);
             return None;
         };
         let Parameters { values, row, surface } = parameters;
@@ -157,8 +157,15 @@ impl<'a> Parser<'a> {
         text: &'a str,
         command: Command,
         subject: Option<Range<usize>>,
+        words: &Words,
     ) {
         self.expect_no_more_of(command);
+        if command.form().surface().is_some() {
+            for name in words.parameters().iter().map(|span| &text[span.clone()]).filter(|word| is_name(word))
+            {
+                self.materials.refer(name);
+            }
+        }
         self.define_faulty(line, text, command, subject);
     }
 
@@ -181,7 +188,7 @@ impl<'a> Parser<'a> {
         self.report.error(line, words.command.clone(), || wording::unknown_command(name, nearest));
         if let Some(command) = nearest {
             let subject = words.take_first().filter(|span| is_name(&text[span.clone()]));
-            self.faulty_line(line, text, command, subject);
+            self.faulty_line(line, text, command, subject, &words);
         }
     }
 
@@ -196,7 +203,7 @@ impl<'a> Parser<'a> {
         let form = command.form();
         let mut parameters = Parameters { values: [0.0; MAX_NUMBERS], row: None, surface: None };
         let mut curves: Vec<(usize, Number)> = Vec::new();
-        let mut good = true;
+        let (mut good, mut is_countable) = (true, true);
         let (_, most) = form.arity();
         let takes_words = matches!(form.fields.first().map(|field| field.values), Some(Values::OneOf(_)));
         for (i, span) in words.parameters().iter().take(most).enumerate() {
@@ -230,6 +237,8 @@ impl<'a> Parser<'a> {
                     Ok(curve) => curves.push((i, curve)),
                     Err((place, fault)) => {
                         good = false;
+                        // Then numbers that are missing behind it may be in it.
+                        is_countable &= fault != curve::CurveFault::Unclosed;
                         self.report.error(line, place, || wording::curve(fault, name));
                     }
                 }
@@ -238,6 +247,7 @@ impl<'a> Parser<'a> {
             } else {
                 good = false;
                 let is_surface = form.surface() == Some(i) && is_name(word);
+                is_countable &= !is_surface;
                 self.report.error(line, span.clone(), || wording::bad_number(fault, name, word, is_surface));
             }
         }
@@ -253,7 +263,7 @@ impl<'a> Parser<'a> {
                     decimal_comma(text, command, words).map(|comma| &text[comma]),
                 )
             });
-        } else if parameters.surface.is_none() && !form.takes(count) {
+        } else if parameters.surface.is_none() && is_countable && !form.takes(count) {
             good = false;
             self.report.error(line, words.end(), || {
                 wording::too_few(

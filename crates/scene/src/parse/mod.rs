@@ -183,7 +183,8 @@ impl<'a> Parser<'a> {
                     self.screen = ScreenState::Faulty;
                 }
             }
-            Act::Group | Act::End => self.line_lost = true,
+            Act::Group => self.line_lost = true,
+            Act::End => self.close_group(),
             Act::Camera(_)
             | Act::Background
             | Act::Lens
@@ -459,6 +460,7 @@ impl<'a> Parser<'a> {
         self.uses = used.saturating_add(uses);
         let limit = self.limits.max_objects;
         self.check_limit(s, objects, self.objects, limit, "objects in a scene");
+        let limit = limit.saturating_mul(Limits::USES_PER_OBJECT);
         self.check_limit(s, used, self.uses, limit, "groups drawn in a scene");
     }
 

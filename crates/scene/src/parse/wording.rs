@@ -159,6 +159,11 @@ pub(super) fn invalid(fault: InvalidValue, name: &str, field: &Field, word: &str
     if let InvalidValue::NotWhole(_, least, most) = fault {
         return not_whole(least, most, name, field, word);
     }
+    if let InvalidValue::OutOfRange(parameter, ..) = fault {
+        let values = field.values;
+        return Fault::new(Code::InvalidValue, format!("{parameter} must be {values}"))
+            .expected(format!("expected a number {values}"));
+    }
     Fault::new(Code::InvalidValue, fault.to_string()).expected(expectation(fault))
 }
 
@@ -284,7 +289,7 @@ pub(super) fn too_much_work() -> Fault {
 
 /// `word` is none of the words that `field` takes.
 pub(super) fn no_such_word(word: &str, words: &[&str], field: &Field) -> Fault {
-    let fault = Fault::new(Code::InvalidValue, format!("{} is not {}", quoted(word), field.parameter))
+    let fault = Fault::new(Code::InvalidValue, format!("{} is no {}", quoted(word), field.names[0]))
         .expected(format!("expected {}", words.join(" or ")));
     match nearest(word, words.iter().copied()) {
         Some(near) => fault.help(format!("did you mean `{near}`?")),
