@@ -17,6 +17,7 @@ mod command;
 mod curve;
 pub mod diagnostic;
 mod form;
+mod language;
 mod limits;
 pub mod model;
 mod natural;
@@ -31,6 +32,7 @@ mod shown;
 pub use command::Command;
 pub use diagnostic::{Code, Diagnostic, Severity};
 pub use form::{Field, Form, Kind, Names, Presence, Subject, Together, Unit, Values};
+pub use language::{CommandEntry, Language, ModeEntry, ParameterEntry, SubjectEntry, language};
 pub use limits::Limits;
 pub use model::{
     Background, Camera, Clause, Coefficients, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Finish,
