@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use rayfold_scene::{Diagnostic, Limits, SETTINGS_FILE};
+use rayfold_scene::{Diagnostic, Language, Limits, SETTINGS_FILE};
 use serde::Serialize;
 
 use crate::console::{Console, Format, describe};
@@ -22,8 +22,9 @@ Examples:
   cat a.txt | rayfold check -                 a buffer that is not saved
 
 The JSON document holds the number of files, frames, errors and warnings; `diagnostics`, each with file, line,
-column, span (byte offsets), severity, code, message and, where there is one, expected and help; and `unreadable`,
-the files that could not be read.")]
+column, span (byte offsets), severity, code, message and, where there is one, expected and help; `unreadable`, the
+files that could not be read; and `language`, the table of the scene language: its commands, the clauses of materials
+and the modes of curves, each number with its name, kind, unit, range and default.")]
 pub(crate) struct Args {
     /// Folders, script files, animation.json, or - for standard input
     #[arg(required = true)]
@@ -46,6 +47,7 @@ struct Report<'a> {
     warnings: usize,
     diagnostics: &'a [Diagnostic],
     unreadable: Vec<String>,
+    language: Language,
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
@@ -91,6 +93,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
                 warnings: faults.warnings(),
                 diagnostics: &faults.diagnostics,
                 unreadable: faults.unreadable.iter().map(describe).collect(),
+                language: rayfold_scene::language(),
             };
             let mut text = serde_json::to_vec_pretty(&report)?;
             text.push(b'\n');

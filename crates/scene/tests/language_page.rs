@@ -1,6 +1,8 @@
 //! `docs/language.md` tells the truth: its examples are parsed, its messages and limits are the real ones.
 
-use rayfold_scene::{AnimationSettings, Command, Field, Limits, parse, parse_settings};
+use rayfold_scene::{
+    AnimationSettings, CommandEntry, Limits, ParameterEntry, language, parse, parse_settings,
+};
 
 const PAGE: &str = include_str!("../../../docs/language.md");
 
@@ -18,6 +20,26 @@ fn the_example_is_a_script() {
     assert_eq!(parsed.script.map(|script| script.frame_count()), Some(1));
 }
 
+/// The lines that are set apart by four blanks and start with `start`.
+fn lines(start: &str) -> String {
+    let lines = PAGE.lines().skip_while(|line| !line.starts_with(&format!("    {start}")));
+    lines.take_while(|line| line.starts_with("    ")).map(|line| format!("{}\n", line.trim())).collect()
+}
+
+#[test]
+fn the_examples_of_curves_and_groups_are_in_order() {
+    let script = format!(
+        "Screen 4 3\nMaterial red diffuse 1 0 0\nMaterial brass diffuse .8 .6 .2\nGroup hand\nBox 0 0 0 .1 .1 1 red\nEnd\n\
+         {}{}Frames 60\nTrace\n",
+        lines("Sphere 1   ("),
+        lines("Group clock")
+    );
+    let parsed = parse("clock.txt", script.as_bytes(), &Limits::default());
+    assert!(parsed.diagnostics.is_empty(), "{script}\n{:?}", parsed.diagnostics);
+    let script = parsed.script.unwrap();
+    assert_eq!((script.frame_count(), script.frame(59).unwrap().objects.len()), (60, 5));
+}
+
 #[test]
 fn the_message_is_what_is_told_about_the_example_misspelt() {
     let script = block("# Two balls").replacen("\nSphere", "\nSpere", 1);
@@ -33,35 +55,53 @@ fn table(heading: &str) -> Vec<Vec<&'static str>> {
     rows.take_while(|line| line.starts_with('|')).map(cells).collect()
 }
 
-#[test]
-fn every_command_is_written_as_the_table_says() {
-    let usages: Vec<_> = table("## Commands")
+/// How the rows of a table write its commands.
+fn usages(heading: &str) -> Vec<String> {
+    table(heading)
         .iter()
         .map(|row| {
             let [command, parameters] = [row[0], row[1]].map(|cell| cell.trim_matches('`'));
             [command].into_iter().chain(parameters.split_whitespace()).collect::<Vec<_>>().join(" ")
         })
-        .collect();
-    assert_eq!(usages, Command::ALL.iter().map(|command| command.form().to_string()).collect::<Vec<_>>());
+        .collect()
+}
+
+#[test]
+fn every_command_and_clause_is_written_as_the_table_says() {
+    let language = language();
+    let expect =
+        |entries: &[CommandEntry]| entries.iter().map(|entry| entry.usage.clone()).collect::<Vec<_>>();
+    assert_eq!(usages("## Commands"), expect(&language.commands));
+    assert_eq!(usages("## Materials"), expect(&language.clauses));
 }
 
 #[test]
 fn every_parameter_is_told_with_what_it_counts_by_and_may_be() {
-    let rows: Vec<_> = table("### Parameters").iter().map(|row| row.join(" | ")).collect();
-    let told = |command: Command, field: &Field| {
-        let optional = if field.optional { ", may be left out" } else { "" };
-        format!(
-            "`{}` | `{}` | {} | {} | {}{optional}",
-            command.name(),
-            field.names.join(" "),
-            field.kind,
-            field.kind.unit(),
-            field.values
-        )
+    let check = |heading: &str, entries: &[CommandEntry]| {
+        let rows: Vec<_> = table(heading).iter().map(|row| row.join(" | ")).collect();
+        let told = |entry: &CommandEntry, p: &ParameterEntry| {
+            let default = p.default.unwrap_or("must stand");
+            format!(
+                "`{}` | `{}` | {} | {} | {} | {default}",
+                entry.name,
+                p.names.join(" "),
+                p.kind,
+                p.unit,
+                p.range
+            )
+        };
+        let parameters = entries.iter().flat_map(|entry| entry.parameters.iter().map(move |p| (entry, p)));
+        let expect: Vec<_> = parameters.map(|(entry, p)| told(entry, p)).collect();
+        assert_eq!(rows, expect, "the page should have\n| {} |", expect.join(" |\n| "));
     };
-    let fields = Command::ALL.iter().flat_map(|command| command.form().fields.iter().map(|f| (*command, f)));
-    let expect: Vec<_> = fields.map(|(command, field)| told(command, field)).collect();
-    assert_eq!(rows, expect, "the page should have\n| {} |", expect.join(" |\n| "));
+    check("### Parameters", &language().commands);
+    check("### Parameters of clauses", &language().clauses);
+}
+
+#[test]
+fn every_mode_of_a_curve_is_told() {
+    let words: Vec<_> = table("## Numbers that change").iter().map(|row| row[0].trim_matches('`')).collect();
+    assert_eq!(words, language().curve_modes.iter().map(|mode| mode.name).collect::<Vec<_>>());
 }
 
 #[test]
@@ -83,7 +123,7 @@ fn the_limits_are_the_defaults() {
         limits.max_objects as u64,
         limits.max_lights as u64,
         limits.max_pixels,
-        limits.max_frames.map_or(0, |frames| frames as u64),
+        Limits::FRAMES,
     ];
     assert_eq!(numbers, expect, "{rows:#?}");
 }

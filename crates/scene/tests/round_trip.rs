@@ -7,8 +7,9 @@
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use rayfold_scene::{
-    Camera, Cuboid, DirectionalLight, Light, Limits, Material, Object, Pinhole, Scene, Screen, Script,
-    Sphere, Triangle, parse,
+    Background, Camera, Coefficients, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Finish, Glass,
+    Lamp, Lens, Light, Limits, Look, Material, Object, Pattern, Pinhole, Plane, Samples, Scene, Screen,
+    Script, Shine, Shutter, Sphere, Tone, Torus, Triangle, Weight, parse,
 };
 
 fn script(text: &str) -> Script {
@@ -31,38 +32,153 @@ fn vector() -> impl Strategy<Value = DVec3> {
     [number(), number(), number()].prop_map(DVec3::from)
 }
 
-fn material(mirror: impl Strategy<Value = DVec3>) -> impl Strategy<Value = Material> {
-    (vector(), vector(), mirror).prop_map(|(a, r, s)| Material::new(a, r, s).unwrap())
+/// Greater than 0.
+fn size() -> impl Strategy<Value = f64> {
+    number().prop_map(f64::abs).prop_filter("greater than 0", |x| *x > 0.0)
 }
 
-fn object() -> impl Strategy<Value = Object> {
-    let matte = || material(Just(DVec3::ZERO));
+fn matte() -> impl Strategy<Value = Coefficients> {
+    (vector(), vector(), prop_oneof![Just(DVec3::ZERO), vector()])
+        .prop_map(|(a, r, s)| Coefficients::new(a, r, s).unwrap())
+}
+
+fn weight() -> impl Strategy<Value = Weight> {
     prop_oneof![
-        (number(), vector(), material(prop_oneof![Just(DVec3::ZERO), vector()]))
-            .prop_filter_map("a radius above 0", |(r, c, m)| Sphere::new(r.abs(), c, m)
-                .ok()
-                .map(Object::Sphere)),
-        ([vector(), vector(), vector()], matte())
-            .prop_map(|(v, m)| Object::Triangle(Triangle::new(v, m).unwrap())),
-        ([vector(), vector()], matte()).prop_map(|(c, m)| Object::Cuboid(Cuboid::new(c, m).unwrap())),
+        size().prop_map(Weight::Checker),
+        size().prop_map(Weight::Stripes),
+        size().prop_map(Weight::Noise),
+        (number(), number())
+            .prop_filter("ends that differ", |(a, b)| a != b)
+            .prop_map(|(a, b)| Weight::Gradient(a, b)),
     ]
 }
 
-fn light() -> impl Strategy<Value = Light> {
-    (vector(), vector()).prop_filter_map("a direction", |(color, direction)| {
-        DirectionalLight::new(color, direction).ok().map(Light::Directional)
-    })
+fn material() -> BoxedStrategy<Material> {
+    let shine = (vector(), 1.0..1e3).prop_map(|(color, n)| Shine::new(color, n).unwrap());
+    let glass = (vector(), size()).prop_map(|(color, ior)| Glass::new(color, ior).unwrap());
+    let pattern = (weight(), matte()).prop_map(|(weight, other)| Pattern { weight, other });
+    let finish = (prop::option::of(shine), prop::option::of(glass), prop::option::of(pattern))
+        .prop_map(|(shine, glass, pattern)| Finish { shine, glass, pattern });
+    prop_oneof![
+        2 => matte().prop_map(Material::from),
+        1 => (matte(), finish).prop_map(|(matte, finish)| Material::finished(matte, finish)),
+    ]
+    .boxed()
 }
 
-fn camera() -> impl Strategy<Value = Camera> {
+fn object() -> BoxedStrategy<Object> {
+    let ends = || [vector(), vector()];
+    prop_oneof![
+        (size(), vector(), material()).prop_map(|(r, c, m)| Sphere::new(r, c, m).unwrap().into()),
+        ([vector(), vector(), vector()], material())
+            .prop_map(|(v, m)| Object::Triangle(Triangle::new(v, m).unwrap())),
+        (ends(), material()).prop_map(|(c, m)| Object::Cuboid(Cuboid::new(c, m).unwrap())),
+        (vector(), vector(), material())
+            .prop_filter_map("a normal", |(p, n, m)| Plane::new(p, n, m).ok().map(Object::from)),
+        (size(), vector(), vector(), material()).prop_filter_map("a normal", |(r, c, n, m)| Disc::new(
+            r, c, n, m
+        )
+        .ok()
+        .map(Object::from)),
+        (size(), ends(), material())
+            .prop_filter_map("an axis", |(r, e, m)| Cylinder::new(r, e, m).ok().map(Object::from)),
+        ([size(), size()], ends(), material())
+            .prop_filter_map("an axis", |(r, e, m)| Cone::new(r, e, m).ok().map(Object::from)),
+        (size(), size(), vector(), vector(), material()).prop_filter_map("a ring", |(a, b, c, n, m)| {
+            Torus::new(a.max(b), a.min(b), c, n, m).ok().map(Object::from)
+        }),
+    ]
+    .boxed()
+}
+
+fn light() -> BoxedStrategy<Light> {
+    let amount = || prop_oneof![Just(0.0), size()];
+    prop_oneof![
+        (vector(), vector(), prop_oneof![Just(0.0), 0.0..180.0]).prop_filter_map(
+            "a direction",
+            |(color, direction, angle)| {
+                let light = DirectionalLight::new(color, direction).ok()?;
+                light.spanning(angle).ok().map(Light::Directional)
+            }
+        ),
+        (vector(), vector(), amount(), amount()).prop_map(|(color, at, radius, reach)| Lamp::new(
+            color, at, radius, reach
+        )
+        .unwrap()
+        .into()),
+    ]
+    .boxed()
+}
+
+fn camera() -> BoxedStrategy<Camera> {
     let corner = || [number(), number()].prop_map(DVec2::from);
-    let pinhole = (vector(), vector(), vector(), number(), corner(), corner());
+    let pinhole = (vector(), vector(), vector(), size(), corner(), corner());
+    let look = (vector(), vector(), 1e-3..179.9, prop::option::of(vector()));
     prop_oneof![
         Just(Camera::Orthographic),
         pinhole.prop_filter_map("a camera", |(e, g, up, s, a, b)| {
-            Pinhole::new(e, g, up, s.abs(), a, b).ok().map(Camera::Pinhole)
+            Pinhole::new(e, g, up, s, a, b).ok().map(Camera::Pinhole)
         }),
+        look.prop_filter_map("a camera", |(e, t, fov, up)| Look::new(e, t, fov, up).ok().map(Camera::Look)),
     ]
+    .boxed()
+}
+
+fn background() -> BoxedStrategy<Background> {
+    prop_oneof![
+        vector().prop_map(|color| Background::new(color).unwrap()),
+        (vector(), vector()).prop_map(|(low, high)| Background::sky(low, high).unwrap()),
+    ]
+    .boxed()
+}
+
+/// What a picture is, beside its things.
+#[derive(Clone, Debug)]
+enum Setting {
+    Samples(Samples),
+    Shutter(Shutter),
+    Tone(Tone),
+    Depth(Depth),
+    Lens(Lens),
+}
+
+impl Setting {
+    fn set(&self, scene: &mut Scene) {
+        match *self {
+            Self::Samples(samples) => scene.samples = samples,
+            Self::Shutter(shutter) => scene.shutter = shutter,
+            Self::Tone(tone) => scene.tone = tone,
+            Self::Depth(depth) => scene.depth = depth,
+            Self::Lens(lens) => scene.lens = lens,
+        }
+    }
+
+    fn line(&self) -> String {
+        match self {
+            Self::Samples(samples) => format!("samples {} {:e}", samples.most(), samples.error()),
+            Self::Shutter(shutter) => format!("Shutter {}", shutter.open()),
+            Self::Tone(Tone::Plain) => "Tone PLAIN".into(),
+            Self::Tone(Tone::Srgb) => "TONE sRGB".into(),
+            Self::Depth(depth) => format!("Depth {}.0", depth.bounces()),
+            Self::Lens(lens) => {
+                let distance = lens.distance().map_or(String::new(), |d| format!("{d:e}"));
+                format!("Lens {:e} {distance}", lens.radius())
+            }
+        }
+    }
+}
+
+fn setting() -> BoxedStrategy<Setting> {
+    prop_oneof![
+        (1u32.., prop_oneof![Just(1.0), Just(0.0), size()])
+            .prop_map(|(n, e)| Setting::Samples(Samples::new(n, e).unwrap())),
+        (0.0..=1.0).prop_map(|open| Setting::Shutter(Shutter::new(open).unwrap())),
+        prop_oneof![Just(Tone::Plain), Just(Tone::Srgb)].prop_map(Setting::Tone),
+        (0..=Depth::MOST).prop_map(|n| Setting::Depth(Depth::new(n).unwrap())),
+        (prop_oneof![Just(0.0), size()], prop::option::of(size()))
+            .prop_map(|(radius, distance)| Setting::Lens(Lens::new(radius, distance).unwrap())),
+    ]
+    .boxed()
 }
 
 fn screen() -> impl Strategy<Value = Screen> {
@@ -74,36 +190,42 @@ fn screen() -> impl Strategy<Value = Screen> {
 enum Step {
     Screen(Screen),
     Camera(Camera),
-    Background(DVec3),
+    Setting(Setting),
+    Background(Background),
     Object(Object),
     Light(Light),
     Clear,
     Trace,
 }
 
-fn step() -> impl Strategy<Value = Step> {
+fn step() -> BoxedStrategy<Step> {
     prop_oneof![
         1 => screen().prop_map(Step::Screen),
         1 => camera().prop_map(Step::Camera),
-        1 => vector().prop_map(Step::Background),
+        1 => setting().prop_map(Step::Setting),
+        1 => background().prop_map(Step::Background),
         3 => object().prop_map(Step::Object),
         2 => light().prop_map(Step::Light),
         2 => Just(Step::Clear),
         3 => Just(Step::Trace),
     ]
+    .boxed()
 }
 
-/// The one line of a written scene that starts with `command`.
-fn line(scene: &Scene, command: &str) -> String {
+/// A scene of one thing as text: what must stand before its line, and the line.
+fn lines(scene: &Scene) -> (String, String) {
     let text = scene.to_string();
-    text.lines().find(|line| line.starts_with(command)).unwrap_or_default().to_string()
+    let mut lines: Vec<_> =
+        text.lines().filter(|line| !line.starts_with("Screen") && *line != "Trace").collect();
+    let last = lines.pop().unwrap_or_default().to_string();
+    (lines.join("\n"), last)
 }
 
 /// The steps as text, and the scenes that they trace, kept in the plainest way.
 fn replay(steps: &[Step]) -> (String, Vec<Scene>) {
     let empty = Scene::new(Screen::new(4, 3).unwrap(), Camera::Orthographic);
     let (mut scene, mut objects, mut lights) = (empty.clone(), Vec::new(), Vec::new());
-    let (mut text, mut frames) = (String::from("Screen 4 3\n"), Vec::new());
+    let (mut text, mut frames, mut named) = (String::from("Screen 4 3\n"), Vec::new(), 0);
     for step in steps {
         let mut one = empty.clone();
         text += &match step {
@@ -114,25 +236,36 @@ fn replay(steps: &[Step]) -> (String, Vec<Scene>) {
             Step::Camera(camera) => {
                 scene.camera = *camera;
                 one.camera = *camera;
-                line(&one, if *camera == Camera::Orthographic { "Orthocamera" } else { "Camera" })
+                if *camera == Camera::Orthographic { "ORTHOCAMERA".into() } else { lines(&one).1 }
             }
-            Step::Background(color) => {
-                scene.set_background(*color).unwrap();
-                format!("BACKGROUND {:e},{:e},{:e}", color.x, color.y, color.z)
+            Step::Setting(setting) => {
+                setting.set(&mut scene);
+                setting.line()
+            }
+            Step::Background(background) => {
+                scene.background = *background;
+                let (low, high) = background.colors();
+                let told = |c: DVec3| format!(" {:e},{:e},{:e}", c.x, c.y, c.z);
+                format!("BACKGROUND{}{}", told(low), high.map_or(String::new(), told))
             }
             Step::Object(object) => {
-                objects.push(*object);
-                one.objects = vec![*object].into();
-                let text = one.to_string();
-                text.lines().nth(2).unwrap_or_default().to_string()
+                objects.push(object.clone());
+                one.objects = vec![object.clone()].into();
+                let (materials, line) = lines(&one);
+                // Names of materials are given once.
+                named += 1;
+                let renamed = |text: String| {
+                    text.replace("m1", &format!("a{named}_")).replace("m2", &format!("b{named}"))
+                };
+                format!("{}\n{}", renamed(materials), renamed(line))
             }
             Step::Light(light) => {
                 lights.push(*light);
                 one.lights = vec![*light].into();
-                line(&one, "Ilight")
+                lines(&one).1
             }
             Step::Clear => {
-                scene.set_background(DVec3::ZERO).unwrap();
+                scene.background = Background::default();
                 objects.clear();
                 lights.clear();
                 "Clear # and go on".to_string()
@@ -154,12 +287,14 @@ proptest! {
     fn a_scene_reads_back_bit_for_bit(
         screen in screen(),
         camera in camera(),
-        background in vector(),
+        background in background(),
+        settings in prop::collection::vec(setting(), 0..6),
         objects in prop::collection::vec(object(), 0..4),
         lights in prop::collection::vec(light(), 0..4),
     ) {
         let mut scene = Scene::new(screen, camera);
-        scene.set_background(background).unwrap();
+        scene.background = background;
+        settings.iter().for_each(|setting| setting.set(&mut scene));
         scene.objects = objects.into();
         scene.lights = lights.into();
         let frames: Vec<_> = script(&scene.to_string()).frames().collect();

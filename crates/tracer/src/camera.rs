@@ -6,7 +6,7 @@
 
 use glam::{DVec2, DVec3};
 use rayfold_scene::model::unit;
-use rayfold_scene::{Camera, Scene, Screen};
+use rayfold_scene::{Camera, Look, Scene, Screen};
 
 use crate::scale::below_inverse;
 
@@ -55,6 +55,16 @@ pub(crate) fn grid(lower_left: DVec2, upper_right: DVec2, screen: Screen) -> (Ax
     )
 }
 
+/// The samples of a camera that looks at a target, in its window at distance 1: U = tan(fov/2)·(2i + 1 - nx)/ny, V =
+/// tan(fov/2)·(2j + 1 - ny)/ny.
+pub(crate) fn look_grid(look: &Look, screen: Screen) -> (Axis, Axis) {
+    let slope = (look.field_of_view().to_radians() / 2.0).tan();
+    let (width, height) = (f64::from(screen.width()), f64::from(screen.height()));
+    let step = 2.0 * slope / height;
+    let axis = |samples: f64| Axis { start: slope * (1.0 - samples) / height, step };
+    (axis(width), axis(height))
+}
+
 /// The ray of column `i` from the left and row `j` from the bottom, which may be fractions: its origin, and its direction
 /// of length 1.
 pub fn pixel_ray(scene: &Scene, i: f64, j: f64) -> (DVec3, DVec3) {
@@ -77,7 +87,16 @@ pub(crate) enum Rays {
 
 impl Rays {
     pub(crate) fn new(camera: &Camera, screen: Screen) -> Self {
-        let Camera::Pinhole(pinhole) = camera else { return Self::Parallel };
+        let pinhole = match camera {
+            Camera::Orthographic => return Self::Parallel,
+            Camera::Look(look) => {
+                let (u, v, w) = look.basis();
+                let (x, y) = look_grid(look, screen);
+                let corner = x.start * u + y.start * v - w;
+                return Self::Pinhole { eye: look.eye(), corner, right: x.step * u, up: y.step * v };
+            }
+            Camera::Pinhole(pinhole) => pinhole,
+        };
         let (u, v, w) = pinhole.basis();
         // Only the window's shape matters, so it is scaled until no product can overflow.
         let (a, b, distance) = (pinhole.lower_left(), pinhole.upper_right(), pinhole.distance());

@@ -359,10 +359,17 @@ fn equal(rng: &mut Rng) -> Result<Scene> {
     let objects: Result<Vec<_>> = (0..count)
         .map(|_| {
             let surface = matte(rng)?;
-            Ok(match &shapes[rng.usize(0..shapes.len())] {
+            let object = &shapes[rng.usize(0..shapes.len())];
+            Ok(match object {
                 Object::Sphere(s) => Object::Sphere(Sphere::new(s.radius(), s.center(), surface)?),
                 Object::Cuboid(c) => Object::Cuboid(Cuboid::new(*c.corners(), surface)?),
                 Object::Triangle(t) => Object::Triangle(Triangle::new(*t.vertices(), surface)?),
+                Object::Plane(_)
+                | Object::Disc(_)
+                | Object::Cylinder(_)
+                | Object::Cone(_)
+                | Object::Torus(_)
+                | Object::Instance(_) => unreachable!("not drawn here: {object:?}"),
             })
         })
         .collect();
@@ -470,6 +477,12 @@ fn bright(rng: &mut Rng) -> Result<Scene> {
                     let surface = Material::new(ambient, diffuse, DVec3::ZERO)?;
                     Object::Triangle(Triangle::new(*t.vertices(), surface)?)
                 }
+                Object::Plane(_)
+                | Object::Disc(_)
+                | Object::Cylinder(_)
+                | Object::Cone(_)
+                | Object::Torus(_)
+                | Object::Instance(_) => unreachable!("not drawn here: {object:?}"),
             })
         })
         .collect();

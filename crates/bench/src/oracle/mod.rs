@@ -74,7 +74,7 @@ pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
 /// The colour beside a pixel, where the ray of a fractional index goes.
 pub fn color_at(scene: &Scene, x: f64, y: f64) -> DVec3 {
     color_along(scene, &Line::of_pixel(&scene.camera, scene.screen, x, y), &Real::zero(), 0)
-        .map_or(scene.background(), |color| color.to_dvec3())
+        .map_or_else(|| plain_background(scene), |color| color.to_dvec3())
 }
 
 /// Which object a pixel shows, and its normal there.
@@ -106,7 +106,10 @@ fn color_along(scene: &Scene, line: &Line, start: &Real, bounces: u32) -> Option
     // A point on a surface is irrational: the ray that leaves it meets the surface again next to its start.
     let start = Real::from(shapes::extent(&scene.objects)).shifted(-300);
     let mut color = Vector::from(material.ambient());
-    for Light::Directional(light) in scene.lights.iter() {
+    for light in scene.lights.iter() {
+        let Light::Directional(light) = light else {
+            unreachable!("the oracle is not asked about {light:?}")
+        };
         let towards = Vector::from(light.direction()).opposite().unit();
         let cosine = hit.normal.dot(&towards);
         let shadow = Line { origin: point.clone(), direction: towards };
@@ -125,13 +128,17 @@ fn color_along(scene: &Scene, line: &Line, start: &Real, bounces: u32) -> Option
         let mirrored = reflected(&line.direction, &hit.normal);
         let next = Line { origin: point, direction: mirrored.unit() };
         let seen = color_along(scene, &next, &start, bounces + 1)
-            .unwrap_or_else(|| Vector::from(scene.background()));
+            .unwrap_or_else(|| Vector::from(plain_background(scene)));
         let mirror = Vector::from(material.mirror());
         for axis in 0..3 {
             color.0[axis] = &color.0[axis] + &(&mirror.0[axis] * &seen.0[axis]);
         }
     }
     Some(color)
+}
+
+fn plain_background(scene: &Scene) -> DVec3 {
+    scene.background.color().unwrap_or_else(|| unreachable!("the oracle is not asked about skies"))
 }
 
 /// The direction mirrored at a surface of this unit normal.

@@ -7,36 +7,74 @@ use glam::DVec3;
 use super::invalid::{Faults, InvalidValue, Parameter, finite};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 
-/// A colour, each channel in 0..=1; black unless it is set.
+/// A colour, or two between which the height of a ray chooses, each channel in 0..=1; black unless it is set.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Background(DVec3);
+pub struct Background {
+    low: DVec3,
+    high: Option<DVec3>,
+}
 
 impl Background {
     /// Each channel is clamped to 0..=1, and a zero is without a sign.
     ///
     /// # Errors
     /// When a channel is not finite.
-    pub(crate) fn new(color: DVec3) -> Result<Self, InvalidValue> {
-        let color = finite(Parameter::Background, color)?;
-        Ok(Self(color.clamp(DVec3::ZERO, DVec3::ONE) + 0.0))
+    pub fn new(color: DVec3) -> Result<Self, InvalidValue> {
+        Ok(Self { low: clamped(color)?, high: None })
     }
 
-    pub(crate) fn color(self) -> DVec3 {
-        self.0
+    /// From one colour, seen straight down, to another, seen straight up.
+    ///
+    /// # Errors
+    /// When a channel is not finite.
+    pub fn sky(low: DVec3, high: DVec3) -> Result<Self, InvalidValue> {
+        Ok(Self { low: clamped(low)?, high: Some(clamped(high)?) })
     }
+
+    /// Of all rays; `None` where it depends on their height.
+    pub fn color(self) -> Option<DVec3> {
+        if self.high.is_none() { Some(self.low) } else { None }
+    }
+
+    /// The first colour and, if there is one, the second.
+    pub fn colors(self) -> (DVec3, Option<DVec3>) {
+        (self.low, self.high)
+    }
+
+    /// What a ray of this unit direction sees: first + (second - first)·(½ + ½·y).
+    pub fn along(self, direction: DVec3) -> DVec3 {
+        match self.high {
+            Some(high) => self.low + (high - self.low) * (0.5 + 0.5 * direction.y),
+            None => self.low,
+        }
+    }
+}
+
+/// Each channel clamped to 0..=1; a zero is without a sign.
+fn clamped(color: DVec3) -> Result<DVec3, InvalidValue> {
+    Ok(finite(Parameter::Background, color)?.clamp(DVec3::ZERO, DVec3::ONE) + 0.0)
 }
 
 impl Scripted for Background {
     const FORM: Form = Form::new(
         "Background",
-        &[Field::new(Parameter::Background, &["r", "g", "b"], Kind::Color, Values::Clamped)],
+        &[
+            Field::new(Parameter::Background, &["r", "g", "b"], Kind::Color, Values::Clamped),
+            Field::new(Parameter::Background, &["R", "G", "B"], Kind::Color, Values::Clamped)
+                .optional("the first colour"),
+        ],
     );
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
-        Ok(Self::new(numbers.vector())?)
+        let low = numbers.vector();
+        Ok(match numbers.optional_vector() {
+            Some(high) => Self::sky(low, high)?,
+            None => Self::new(low)?,
+        })
     }
 
     fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
-        line.vector(self.0)
+        line.vector(self.low)?;
+        self.high.map_or(Ok(()), |high| line.vector(high))
     }
 }

@@ -34,9 +34,30 @@ pub enum InvalidValue {
     /// A number lies outside the range that makes sense for it.
     #[error("{0} must be from {1} to {2}")]
     OutOfRange(Parameter, f64, f64),
-    /// A triangle or a box was given a mirror coefficient, which the language has for spheres only.
-    #[error("only a sphere can have a mirror coefficient")]
-    MirrorOnFlat,
+    /// A number that must not be negative is.
+    #[error("{0} must not be negative")]
+    Negative(Parameter),
+    /// A number is below the least that it may be.
+    #[error("{0} must be at least {1}")]
+    TooSmall(Parameter, f64),
+    /// The ends of an axis are the same.
+    #[error("the ends of the axis must differ")]
+    NoAxis,
+    /// A cone has no radius at either end.
+    #[error("the radii must not both be zero")]
+    NoRadius,
+    /// The tube of a torus is as thick as its circle is wide.
+    #[error("the thickness r must be less than the radius R")]
+    ThickTorus,
+    /// A camera looks at the place where it is.
+    #[error("the eye and the target must differ")]
+    NoGaze,
+    /// The last frame comes before the first.
+    #[error("the first frame must not be behind the last")]
+    FramesBackwards,
+    /// A gradient has no width.
+    #[error("the ends of the gradient must differ")]
+    EmptyGradient,
 }
 
 impl InvalidValue {
@@ -46,13 +67,20 @@ impl InvalidValue {
             Self::NotFinite(about)
             | Self::NotPositive(about)
             | Self::ZeroDirection(about)
+            | Self::Negative(about)
+            | Self::TooSmall(about, _)
             | Self::Zero(about)
             | Self::NotWhole(about, ..)
             | Self::OutOfRange(about, ..) => about == parameter,
             Self::GazeParallelToUp => matches!(parameter, Parameter::Gaze | Parameter::Up),
             Self::EmptyWindowWidth => matches!(name, "au" | "bu"),
             Self::EmptyWindowHeight => matches!(name, "av" | "bv"),
-            Self::MirrorOnFlat => parameter == Parameter::Mirror,
+            Self::NoAxis => parameter == Parameter::AxisEnd,
+            Self::NoRadius => matches!(parameter, Parameter::RadiusA | Parameter::RadiusB),
+            Self::ThickTorus => parameter == Parameter::Thickness,
+            Self::NoGaze => parameter == Parameter::Target,
+            Self::FramesBackwards => matches!(parameter, Parameter::FirstFrame | Parameter::LastFrame),
+            Self::EmptyGradient => matches!(parameter, Parameter::GradientStart | Parameter::GradientEnd),
         }
     }
 }
@@ -120,6 +148,68 @@ pub enum Parameter {
     LightColor,
     /// The direction in which a light travels.
     LightDirection,
+    /// Where a camera looks.
+    Target,
+    /// A camera's vertical angle of view.
+    FieldOfView,
+    /// Radius of a lens.
+    LensRadius,
+    /// The distance at which a lens is sharp.
+    FocusDistance,
+    /// Rays a pixel.
+    Samples,
+    /// The error that a picture may have.
+    SamplingError,
+    /// How long the shutter is open.
+    Shutter,
+    /// Bounces that are followed.
+    Depth,
+    /// A point of a plane.
+    PlanePoint,
+    /// What a flat or round thing is square to.
+    Normal,
+    /// An end of an axis.
+    AxisEnd,
+    /// Radius of a cone at a.
+    RadiusA,
+    /// Radius of a cone at b.
+    RadiusB,
+    /// Radius of a torus's tube.
+    Thickness,
+    /// Where a group is drawn.
+    Translation,
+    /// How a group is turned.
+    Rotation,
+    /// How a group is scaled.
+    Scale,
+    /// The angle that a sun spans.
+    SunAngle,
+    /// Where a lamp is.
+    LampPosition,
+    /// Radius of a lamp.
+    LampRadius,
+    /// The distance at which a lamp's colour arrives.
+    Reach,
+    /// Colour of a highlight.
+    Shine,
+    /// How sharp a highlight is.
+    ShineExponent,
+    /// What glass lets through.
+    Glass,
+    /// Index of refraction.
+    Ior,
+    /// Size of a pattern's cells.
+    CellSize,
+    /// Where a gradient starts.
+    GradientStart,
+    /// Where a gradient ends.
+    GradientEnd,
+    /// From a colour to the levels of a pixel.
+    Tone,
+    /// The number of the first frame.
+    FirstFrame,
+    /// The number of the last frame.
+    LastFrame,
     /// How many frames an animation waits for.
     FrameCount,
     /// Frames a second.
@@ -146,6 +236,37 @@ impl fmt::Display for Parameter {
             Self::Mirror => "the mirror coefficient",
             Self::LightColor => "the light's colour",
             Self::LightDirection => "the light's direction",
+            Self::Target => "the target",
+            Self::FieldOfView => "the field of view",
+            Self::LensRadius => "the lens's radius",
+            Self::FocusDistance => "the lens's distance",
+            Self::Samples => "the number of samples",
+            Self::SamplingError => "the error e",
+            Self::Shutter => "the shutter",
+            Self::Depth => "the depth",
+            Self::PlanePoint => "the point",
+            Self::Normal => "the normal",
+            Self::AxisEnd => "the axis's end",
+            Self::RadiusA => "the radius Ra",
+            Self::RadiusB => "the radius Rb",
+            Self::Thickness => "the thickness r",
+            Self::Translation => "the translation",
+            Self::Rotation => "the rotation",
+            Self::Scale => "the scale",
+            Self::SunAngle => "the sun's angle",
+            Self::LampPosition => "the lamp's position",
+            Self::LampRadius => "the lamp's radius",
+            Self::Reach => "the lamp's reach",
+            Self::Shine => "the shine",
+            Self::ShineExponent => "the exponent n",
+            Self::Glass => "the glass coefficient",
+            Self::Ior => "the index of refraction",
+            Self::CellSize => "the size s",
+            Self::GradientStart => "the start a",
+            Self::GradientEnd => "the end b",
+            Self::Tone => "the tone",
+            Self::FirstFrame => "the first frame a",
+            Self::LastFrame => "the last frame b",
             Self::FrameCount => "`frames`",
             Self::FrameRate => "`fps`",
         })
@@ -163,6 +284,16 @@ pub(super) fn positive(name: Parameter, x: f64) -> Result<f64, InvalidValue> {
         Ok(x)
     } else {
         Err(InvalidValue::NotPositive(name))
+    }
+}
+
+pub(super) fn not_negative(name: Parameter, x: f64) -> Result<f64, InvalidValue> {
+    if !x.is_finite() {
+        Err(InvalidValue::NotFinite(name))
+    } else if x >= 0.0 {
+        Ok(x)
+    } else {
+        Err(InvalidValue::Negative(name))
     }
 }
 

@@ -1,31 +1,156 @@
 //! How a surface answers light.
 
 use std::fmt;
+use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::invalid::{InvalidValue, Parameter, finite};
+use super::invalid::{InvalidValue, Parameter, finite, positive};
 use crate::form::{Field, Kind, Line, Numbers, Values};
 
 /// Of an object's parameters.
-pub(super) const AMBIENT: Field =
+pub(in crate::model) const AMBIENT: Field =
     Field::new(Parameter::Ambient, &["ar", "ag", "ab"], Kind::Color, Values::Any);
 /// Of an object's parameters.
-pub(super) const DIFFUSE: Field =
+pub(in crate::model) const DIFFUSE: Field =
     Field::new(Parameter::Diffuse, &["rr", "rg", "rb"], Kind::Coefficients, Values::Any);
 /// Of an object's parameters.
-pub(super) const MIRROR: Field =
-    Field::new(Parameter::Mirror, &["sr", "sg", "sb"], Kind::Coefficients, Values::Any);
+pub(in crate::model) const MIRROR: Field =
+    Field::new(Parameter::Mirror, &["sr", "sg", "sb"], Kind::Coefficients, Values::Any).from_the_end("0");
 
 /// Coefficients of a surface, a channel each; any finite numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Material {
+pub struct Coefficients {
     ambient: DVec3,
     diffuse: DVec3,
     mirror: DVec3,
 }
 
-impl Material {
+/// Coefficients of a surface, and what few surfaces have.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Material {
+    coefficients: Coefficients,
+    finish: Option<Arc<Finish>>,
+}
+
+/// What a surface has beyond coefficients.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Finish {
+    /// Highlights.
+    pub shine: Option<Shine>,
+    /// Whether it is glass.
+    pub glass: Option<Glass>,
+    /// Other coefficients here and there.
+    pub pattern: Option<Pattern>,
+}
+
+/// Highlights: for each light that is not hidden, light·shine·max(0, N·h)ⁿ (Blinn and Phong).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shine {
+    color: DVec3,
+    exponent: f64,
+}
+
+impl Shine {
+    /// # Errors
+    /// When the exponent is less than 1 or a number is not finite.
+    pub fn new(color: DVec3, exponent: f64) -> Result<Self, InvalidValue> {
+        finite(Parameter::Shine, color)?;
+        if !exponent.is_finite() {
+            return Err(InvalidValue::NotFinite(Parameter::ShineExponent));
+        }
+        if exponent < 1.0 {
+            return Err(InvalidValue::TooSmall(Parameter::ShineExponent, 1.0));
+        }
+        Ok(Self { color, exponent })
+    }
+
+    /// What share of a light, a channel each.
+    pub fn color(&self) -> DVec3 {
+        self.color
+    }
+
+    /// n, at least 1.
+    pub fn exponent(&self) -> f64 {
+        self.exponent
+    }
+}
+
+/// A surface that light goes through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Glass {
+    color: DVec3,
+    ior: f64,
+}
+
+impl Glass {
+    /// `ior` is the index of refraction of the inside over that of the outside.
+    ///
+    /// # Errors
+    /// When the index is not positive or a number is not finite.
+    pub fn new(color: DVec3, ior: f64) -> Result<Self, InvalidValue> {
+        finite(Parameter::Glass, color)?;
+        positive(Parameter::Ior, ior)?;
+        Ok(Self { color, ior })
+    }
+
+    /// What it lets through, a channel each.
+    pub fn color(&self) -> DVec3 {
+        self.color
+    }
+
+    /// Greater than zero.
+    pub fn ior(&self) -> f64 {
+        self.ior
+    }
+}
+
+/// Where a surface has other coefficients: (1 - w)·own + w·other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pattern {
+    /// How w comes from the place.
+    pub weight: Weight,
+    /// The coefficients where w is 1.
+    pub other: Coefficients,
+}
+
+/// How much of the other coefficients there is at a place, from 0 to 1; the place in the coordinates of the script.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Weight {
+    /// 1 in every other cell of that size, greater than 0, along the three axes.
+    Checker(f64),
+    /// 1 in every other cell of that size, greater than 0, along x.
+    Stripes(f64),
+    /// Perlin's improved noise (2002) of cells of that size, greater than 0.
+    Noise(f64),
+    /// From 0 at the first height y to 1 at the second, which differ.
+    Gradient(f64, f64),
+}
+
+impl Weight {
+    /// # Errors
+    /// When a size is not positive, the ends of a gradient are the same, or a number is not finite.
+    pub fn checked(self) -> Result<Self, InvalidValue> {
+        match self {
+            Self::Checker(size) | Self::Stripes(size) | Self::Noise(size) => {
+                positive(Parameter::CellSize, size)?;
+            }
+            Self::Gradient(start, end) => {
+                for (name, x) in [(Parameter::GradientStart, start), (Parameter::GradientEnd, end)] {
+                    if !x.is_finite() {
+                        return Err(InvalidValue::NotFinite(name));
+                    }
+                }
+                if start == end {
+                    return Err(InvalidValue::EmptyGradient);
+                }
+            }
+        }
+        Ok(self)
+    }
+}
+
+impl Coefficients {
     /// # Errors
     /// When a number is not finite.
     pub fn new(ambient: DVec3, diffuse: DVec3, mirror: DVec3) -> Result<Self, InvalidValue> {
@@ -49,32 +174,71 @@ impl Material {
     pub fn mirror(&self) -> DVec3 {
         self.mirror
     }
+}
 
-    /// [`AMBIENT`], [`DIFFUSE`] and [`MIRROR`].
-    pub(super) fn read(numbers: &mut Numbers<'_>) -> Result<Self, InvalidValue> {
-        Self::new(numbers.vector(), numbers.vector(), numbers.vector())
+impl Material {
+    /// Without a finish.
+    ///
+    /// # Errors
+    /// When a number is not finite.
+    pub fn new(ambient: DVec3, diffuse: DVec3, mirror: DVec3) -> Result<Self, InvalidValue> {
+        Ok(Coefficients::new(ambient, diffuse, mirror)?.into())
     }
 
-    /// [`AMBIENT`] and [`DIFFUSE`].
-    pub(super) fn read_matte(numbers: &mut Numbers<'_>) -> Result<Self, InvalidValue> {
-        Self::new(numbers.vector(), numbers.vector(), DVec3::ZERO)
+    /// Coefficients and what there is beside them.
+    pub fn finished(coefficients: Coefficients, finish: Finish) -> Self {
+        let finish = if finish == Finish::default() { None } else { Some(Arc::new(finish)) };
+        Self { coefficients, finish }
+    }
+
+    /// Its own, where a pattern says nothing else.
+    pub fn coefficients(&self) -> Coefficients {
+        self.coefficients
+    }
+
+    /// What few surfaces have; `None` for those of version 1.
+    pub fn finish(&self) -> Option<&Finish> {
+        self.finish.as_deref()
+    }
+
+    /// The colour that needs no light.
+    pub fn ambient(&self) -> DVec3 {
+        self.coefficients.ambient
+    }
+
+    /// What is scattered of the light that arrives (Lambert).
+    pub fn diffuse(&self) -> DVec3 {
+        self.coefficients.diffuse
+    }
+
+    /// What is mirrored of the colour along the reflected ray.
+    pub fn mirror(&self) -> DVec3 {
+        self.coefficients.mirror
+    }
+
+    /// [`AMBIENT`], [`DIFFUSE`] and [`MIRROR`], or the material that was named in their place.
+    pub(super) fn read(numbers: &mut Numbers<'_>) -> Result<Self, InvalidValue> {
+        match numbers.surface() {
+            Some(material) => Ok(material.clone()),
+            None => Self::new(numbers.vector(), numbers.vector(), numbers.vector()),
+        }
     }
 
     pub(super) fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
-        self.write_matte(line)?;
+        if let Some(name) = line.surface() {
+            return line.word(name);
+        }
+        line.vector(self.ambient())?;
+        line.vector(self.diffuse())?;
+        let mirror = self.mirror();
         // A mirror of -0 is written, so that it reads back as that.
-        if self.mirror.to_array().map(f64::to_bits) == [0; 3] { Ok(()) } else { line.vector(self.mirror) }
+        if mirror.to_array().map(f64::to_bits) == [0; 3] { Ok(()) } else { line.vector(mirror) }
     }
+}
 
-    pub(super) fn write_matte(&self, line: &mut Line<'_, '_>) -> fmt::Result {
-        line.vector(self.ambient)?;
-        line.vector(self.diffuse)
-    }
-
-    /// # Errors
-    /// When it mirrors.
-    pub(super) fn must_be_matte(&self) -> Result<(), InvalidValue> {
-        if self.mirror == DVec3::ZERO { Ok(()) } else { Err(InvalidValue::MirrorOnFlat) }
+impl From<Coefficients> for Material {
+    fn from(coefficients: Coefficients) -> Self {
+        Self { coefficients, finish: None }
     }
 }
 

@@ -7,26 +7,35 @@
 
 mod background;
 mod camera;
+mod clause;
 mod invalid;
 mod lights;
+mod look;
 mod material;
+mod sampling;
 mod screen;
 mod shapes;
 mod vector;
 
 use glam::DVec3;
 
+pub use background::Background;
 pub use camera::{Camera, Pinhole};
+pub use clause::Clause;
 pub use invalid::{InvalidValue, Parameter};
-pub use lights::{DirectionalLight, Light};
-pub use material::Material;
+pub use lights::{DirectionalLight, Lamp, Light};
+pub use look::Look;
+pub use material::{Coefficients, Finish, Glass, Material, Pattern, Shine, Weight};
+pub use sampling::{Depth, Lens, Samples, Shutter, Tone};
 pub use screen::Screen;
-pub use shapes::{Cuboid, Object, Sphere, Triangle};
+pub use shapes::{Cone, Cuboid, Cylinder, Disc, Instance, Object, Placement, Plane, Sphere, Torus, Triangle};
 pub use vector::unit;
 
-pub(crate) use background::Background;
-pub(crate) use camera::ORTHOCAMERA;
+pub(crate) use camera::{ORTHOCAMERA, PARALLEL};
+pub(crate) use clause::{Clauses, MATERIAL};
 pub(crate) use invalid::{Doubt, Faults};
+pub(crate) use sampling::FrameNumbers;
+pub(crate) use shapes::USE;
 
 use crate::shared_slice::SharedSlice;
 
@@ -39,11 +48,22 @@ pub struct Scene {
     pub screen: Screen,
     /// Where the rays come from.
     pub camera: Camera,
-    pub(crate) background: Background,
+    /// What a ray sees that hits nothing.
+    pub background: Background,
     /// In the order of the script: of hits at the same distance the first object wins.
     pub objects: SharedSlice<Object>,
     /// In the order of the script, which is the order of summation.
     pub lights: SharedSlice<Light>,
+    /// Rays a pixel.
+    pub samples: Samples,
+    /// How long a frame is exposed.
+    pub shutter: Shutter,
+    /// From colours to levels.
+    pub tone: Tone,
+    /// Bounces that are followed.
+    pub depth: Depth,
+    /// The camera's lens.
+    pub lens: Lens,
 }
 
 impl Scene {
@@ -55,12 +75,12 @@ impl Scene {
             background: Background::default(),
             objects: SharedSlice::default(),
             lights: SharedSlice::default(),
+            samples: Samples::default(),
+            shutter: Shutter::default(),
+            tone: Tone::default(),
+            depth: Depth::default(),
+            lens: Lens::default(),
         }
-    }
-
-    /// Colour of a ray that hits nothing, each channel in 0..=1.
-    pub fn background(&self) -> DVec3 {
-        self.background.color()
     }
 
     /// Sets the background; each channel is clamped to 0..=1.
@@ -81,11 +101,11 @@ mod tests {
     fn a_background_is_clamped_and_finite() {
         let mut scene = Scene::new(Screen::new(1, 1).unwrap(), Camera::default());
         scene.set_background(DVec3::new(-1.0, 0.5, 7.0)).unwrap();
-        assert_eq!(scene.background(), DVec3::new(0.0, 0.5, 1.0));
+        assert_eq!(scene.background.color(), Some(DVec3::new(0.0, 0.5, 1.0)));
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             let fault = scene.set_background(DVec3::new(0.0, bad, 0.0));
             assert_eq!(fault, Err(InvalidValue::NotFinite(Parameter::Background)));
         }
-        assert_eq!(scene.background().y, 0.5, "what stood before stays");
+        assert_eq!(scene.background.along(DVec3::X).y, 0.5, "what stood before stays");
     }
 }

@@ -16,7 +16,7 @@ use super::placed::Placed;
 use super::shapes::{Shape, Solid, reach};
 use super::tree::{Branches, group};
 use crate::RenderError;
-use crate::camera::{Axis, grid};
+use crate::camera::{Axis, grid, look_grid};
 use crate::parallel::map;
 use crate::scale::below_inverse;
 
@@ -53,12 +53,13 @@ impl Geometry {
     pub(super) fn new(scene: &Scene, tree: Option<bool>) -> Result<Self, RenderError> {
         let center = match &scene.camera {
             Camera::Pinhole(pinhole) => pinhole.eye(),
+            Camera::Look(look) => look.eye(),
             Camera::Orthographic => middle(scene.screen),
         };
         let reaches = map(&scene.objects, |object| reach(object, center));
         let reach = reaches.into_iter().fold(0.0, f64::max);
         let reach = match scene.camera {
-            Camera::Pinhole(_) => reach,
+            Camera::Pinhole(_) | Camera::Look(_) => reach,
             Camera::Orthographic => reach.max(center.max_element()),
         };
         if !reach.is_finite() {
@@ -71,9 +72,11 @@ impl Geometry {
         let solids = solids.filter_map(|(order, shape)| Some(Solid { shape: shape?, order: order as u32 }));
         let mut solids: Vec<Solid> = solids.collect();
         let branches = group(&mut solids, tree);
-        let suns = scene.lights.iter().map(|Light::Directional(light)| Direction {
-            towards: -unit(light.direction()),
-            color: light.color(),
+        let suns = scene.lights.iter().filter_map(|light| match light {
+            Light::Directional(light) => {
+                Some(Direction { towards: -unit(light.direction()), color: light.color() })
+            }
+            Light::Lamp(_) => None,
         });
         Ok(Self { view, solids: solids.into(), branches, suns: suns.collect(), scale, center })
     }
@@ -101,6 +104,11 @@ fn view(scene: &Scene, scale: f64) -> View {
             let from = pinhole.lower_left() / pinhole.distance();
             let to = pinhole.upper_right() / pinhole.distance();
             let (x, y) = grid(from, to, scene.screen);
+            View::Pinhole { right, up, back, x, y }
+        }
+        Camera::Look(look) => {
+            let (right, up, back) = look.basis();
+            let (x, y) = look_grid(look, scene.screen);
             View::Pinhole { right, up, back, x, y }
         }
     }

@@ -33,6 +33,7 @@ mod search;
 mod shape;
 mod shapes;
 mod sights;
+mod supported;
 mod surfaces;
 mod tile;
 mod tree;
@@ -82,7 +83,8 @@ impl<'a> Drawing<'a> {
     /// # Errors
     /// When this build leaves out what the scene needs.
     pub fn new(scene: &'a Scene, options: &'a RenderOptions) -> Result<Self, RenderError> {
-        let geometry = if has_kernels(options) { Geometry::new(scene, options.tree).ok() } else { None };
+        let drawable = has_kernels(options) && supported::is_drawn_by_kernels(scene);
+        let geometry = if drawable { Geometry::new(scene, options.tree).ok() } else { None };
         let precision = |geometry| Some((geometry, precision::resolve(options, geometry, scene)?));
         Ok(Self(match geometry.as_ref().and_then(precision) {
             Some((geometry, Precision::F64)) => Backend::Double(Setup::new(scene, geometry, options)?),
@@ -165,7 +167,7 @@ impl<'a, E: Real> Setup<'a, E> {
     fn draw<By: Formulas<E>>(&self) -> Result<RgbImage, RenderError> {
         let Self { scene, options, prepared, window, side } = self;
         let size = (scene.screen.width(), scene.screen.height());
-        let background = crate::reference::levels(scene.background());
+        let background = crate::reference::levels(scene.background.colors().0);
         let level = options.level.unwrap_or_else(Level::new);
         let bounces = options.bounces();
         // Boxed: it is passed from band to band by value.

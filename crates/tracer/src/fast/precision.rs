@@ -6,7 +6,7 @@
 //! of the directions are. Which of two surfaces comes first is known, whatever the rounding, if they do not
 //! all but [coincide](super::coincidence). What the kernels' numbers cannot hold at all is known here too.
 
-use rayfold_scene::{Light, Scene};
+use rayfold_scene::Scene;
 
 use super::coincidence::surfaces_blur;
 use super::geometry::{Geometry, View};
@@ -98,8 +98,7 @@ struct Colors {
 
 impl Colors {
     fn of(scene: &Scene, bounces: u32) -> Self {
-        let arriving: f64 =
-            scene.lights.iter().map(|Light::Directional(light)| light.color().abs().max_element()).sum();
+        let arriving: f64 = scene.lights.iter().map(|light| light.color().abs().max_element()).sum();
         let (mut ambient, mut diffuse, mut mirror, mut least) = (0f64, 0f64, 0f64, 0f64);
         for object in scene.objects.iter() {
             let material = object.material();
@@ -109,7 +108,7 @@ impl Colors {
             let signs = material.ambient().min(material.diffuse()).min(material.mirror());
             least = least.min(signs.min_element());
         }
-        for Light::Directional(light) in scene.lights.iter() {
+        for light in scene.lights.iter() {
             least = least.min(light.color().min_element());
         }
         let scattered = arriving * diffuse;

@@ -134,7 +134,7 @@ impl<E: Real> Prepared<E> {
             counts,
             row,
             needs,
-            background: narrow(scene.background()),
+            background: narrow(scene.background.colors().0),
             tree: branches.map(|branches| Tree::new(branches, solids, |order| entries[order as usize].index)),
             sights,
             entries,

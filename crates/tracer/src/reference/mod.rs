@@ -108,13 +108,14 @@ fn moved_to_eye(scene: &Scene) -> Option<Scene> {
 /// `bounces` more mirrorings are followed.
 fn color_along(scene: &Scene, ray: Ray, bounces: u32) -> DVec3 {
     let Some(hit) = nearest(&scene.objects, ray.origin, ray.direction) else {
-        return scene.background();
+        return scene.background.along(ray.direction);
     };
     let material = scene.objects[hit.object].material();
     let normal = hit.surface.normal;
     let start = hit.surface.point + hit.surface.offset * normal;
     let mut color = material.ambient();
-    for Light::Directional(light) in scene.lights.iter() {
+    for light in scene.lights.iter() {
+        let Light::Directional(light) = light else { todo!("the reference draws {light:?}") };
         let towards = -unit(light.direction());
         let cosine = normal.dot(towards);
         let lit = cosine > 0.0

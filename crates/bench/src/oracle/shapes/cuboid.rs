@@ -86,20 +86,20 @@ mod tests {
     use super::*;
     use crate::oracle::nearest;
 
-    fn t(object: Object, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
-        nearest(&[object], origin.into(), direction.into()).map(|hit| hit.t.to_f64())
+    fn t(object: &Object, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
+        nearest(std::slice::from_ref(object), origin.into(), direction.into()).map(|hit| hit.t.to_f64())
     }
 
     #[test]
     fn a_box_owns_its_faces_edges_and_corners() {
         let corners = [DVec3::splat(-1.0), DVec3::splat(1.0)];
         let object = Object::Cuboid(Cuboid::new(corners, Material::default()).unwrap());
-        assert_eq!(t(object, [1.0, 0.0, 4.0], [-0.0, 0.0, -1.0]), Some(3.0));
-        assert_eq!(t(object, [3.0, 3.0, 3.0], [-1.0, -1.0, -1.0]), Some(2.0));
-        assert_eq!(t(object, [1.0 + 1e-15, 0.0, 4.0], [0.0, 0.0, -1.0]), None);
-        assert_eq!(t(object, [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]), Some(2.0), "from a face inwards");
-        assert_eq!(t(object, [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]), None, "from a face outwards");
+        assert_eq!(t(&object, [1.0, 0.0, 4.0], [-0.0, 0.0, -1.0]), Some(3.0));
+        assert_eq!(t(&object, [3.0, 3.0, 3.0], [-1.0, -1.0, -1.0]), Some(2.0));
+        assert_eq!(t(&object, [1.0 + 1e-15, 0.0, 4.0], [0.0, 0.0, -1.0]), None);
+        assert_eq!(t(&object, [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]), Some(2.0), "from a face inwards");
+        assert_eq!(t(&object, [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]), None, "from a face outwards");
         // An edge at a third, which no binary fraction is.
-        assert!(t(object, [2.0, 2.0 - 3.0, 0.1], [-1.0, 2.0, 0.0]).is_some());
+        assert!(t(&object, [2.0, 2.0 - 3.0, 0.1], [-1.0, 2.0, 0.0]).is_some());
     }
 }

@@ -68,20 +68,20 @@ mod tests {
     use super::*;
     use crate::oracle::nearest;
 
-    fn t(object: Object, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
-        nearest(&[object], origin.into(), direction.into()).map(|hit| hit.t.to_f64())
+    fn t(object: &Object, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
+        nearest(std::slice::from_ref(object), origin.into(), direction.into()).map(|hit| hit.t.to_f64())
     }
 
     #[test]
     fn a_triangle_is_closed_and_flat() {
         let vertices = [[0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]].map(DVec3::from);
         let triangle = Triangle::new(vertices, Material::default()).unwrap();
-        let object = Object::Triangle(triangle);
+        let object = Object::Triangle(triangle.clone());
         for [x, y] in [[1.0, 1.0], [2.0, 2.0], [0.0, 0.0], [0.0, 3.0], [4.0, 0.0]] {
-            assert_eq!(t(object, [x, y, 6.0], [0.0, 0.0, -2.0]), Some(3.0), "at {x}, {y}");
+            assert_eq!(t(&object, [x, y, 6.0], [0.0, 0.0, -2.0]), Some(3.0), "at {x}, {y}");
         }
-        assert_eq!(t(object, [2.0, 2.0 + 1e-15, 6.0], [0.0, 0.0, -2.0]), None);
-        assert_eq!(t(object, [-1.0, 1.0, 0.0], [1.0, 0.0, 0.0]), None);
+        assert_eq!(t(&object, [2.0, 2.0 + 1e-15, 6.0], [0.0, 0.0, -2.0]), None);
+        assert_eq!(t(&object, [-1.0, 1.0, 0.0], [1.0, 0.0, 0.0]), None);
         let gap = edge_clearance(&triangle, DVec3::new(1.0, 0.25, 6.0), DVec3::NEG_Z);
         assert_eq!(gap, Some(0.25));
     }

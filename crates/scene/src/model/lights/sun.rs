@@ -12,6 +12,7 @@ use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite};
 pub struct DirectionalLight {
     color: DVec3,
     direction: DVec3,
+    angle: f64,
 }
 
 impl DirectionalLight {
@@ -22,7 +23,25 @@ impl DirectionalLight {
     pub fn new(color: DVec3, direction: DVec3) -> Result<Self, InvalidValue> {
         finite(Parameter::LightColor, color)?;
         invalid::direction(Parameter::LightDirection, direction)?;
-        Ok(Self { color, direction })
+        Ok(Self { color, direction, angle: 0.0 })
+    }
+
+    /// The same, spanning an angle in degrees as it is seen; 0 for a point.
+    ///
+    /// # Errors
+    /// When the angle is not from 0 to below 180.
+    pub fn spanning(self, angle: f64) -> Result<Self, InvalidValue> {
+        if (0.0..180.0).contains(&angle) {
+            Ok(Self { angle, ..self })
+        } else {
+            Err(InvalidValue::OutOfRange(Parameter::SunAngle, 0.0, 180.0))
+        }
+    }
+
+    /// The angle that it spans, in degrees, from 0 to below 180: its points are the directions of a cone of half that
+    /// angle.
+    pub fn angle(&self) -> f64 {
+        self.angle
     }
 
     /// Its colour, any finite numbers.
@@ -42,16 +61,18 @@ impl Scripted for DirectionalLight {
         &[
             Field::new(Parameter::LightColor, &["lr", "lg", "lb"], Kind::Color, Values::Any),
             Field::new(Parameter::LightDirection, &["dx", "dy", "dz"], Kind::Direction, Values::NotZero),
+            Field::new(Parameter::SunAngle, &["angle"], Kind::Angle, Values::HalfTurn).optional("0"),
         ],
     );
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
-        Ok(Self::new(numbers.vector(), numbers.vector())?)
+        Ok(Self::new(numbers.vector(), numbers.vector())?.spanning(numbers.number())?)
     }
 
     fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
         line.vector(self.color)?;
-        line.vector(self.direction)
+        line.vector(self.direction)?;
+        if self.angle == 0.0 { Ok(()) } else { line.number(self.angle) }
     }
 }
 

@@ -9,7 +9,7 @@ use crate::model::invalid::{Faults, InvalidValue, Parameter, finite};
 use crate::model::material::{self, Material};
 
 /// An axis-aligned box, closed: its faces, edges and corners belong to it. One without thickness is a rectangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Cuboid {
     corners: [DVec3; 2],
     material: Material,
@@ -19,11 +19,10 @@ impl Cuboid {
     /// From any two opposite corners.
     ///
     /// # Errors
-    /// When a number is not finite or the material mirrors.
+    /// When a number is not finite.
     pub fn new(corners: [DVec3; 2], material: Material) -> Result<Self, InvalidValue> {
         finite(Parameter::Corner, corners[0])?;
         finite(Parameter::Corner, corners[1])?;
-        material.must_be_matte()?;
         Ok(Self { corners, material })
     }
 
@@ -48,7 +47,7 @@ impl Cuboid {
     }
 
     pub(super) fn placed(&self, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
-        Self::new(self.corners.map(place), self.material)
+        Self::new(self.corners.map(place), self.material.clone())
     }
 }
 
@@ -60,17 +59,18 @@ impl Scripted for Cuboid {
             Field::new(Parameter::Corner, &["vx", "vy", "vz"], Kind::Position, Values::Any),
             material::AMBIENT,
             material::DIFFUSE,
+            material::MIRROR,
         ],
     );
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let corners = [numbers.vector(), numbers.vector()];
-        Ok(Self::new(corners, Material::read_matte(numbers)?)?)
+        Ok(Self::new(corners, Material::read(numbers)?)?)
     }
 
     fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
         self.corners.iter().try_for_each(|corner| line.vector(*corner))?;
-        self.material.write_matte(line)
+        self.material.write(line)
     }
 }
 
@@ -79,9 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_box_is_matte_and_finite() {
-        let mirror = Material::new(DVec3::ZERO, DVec3::ZERO, DVec3::Z).unwrap();
-        assert_eq!(Cuboid::new([DVec3::ZERO; 2], mirror), Err(InvalidValue::MirrorOnFlat));
+    fn a_box_is_finite() {
         for bad in [DVec3::NAN, DVec3::INFINITY] {
             let cuboid = Cuboid::new([bad, DVec3::X], Material::default());
             assert_eq!(cuboid, Err(InvalidValue::NotFinite(Parameter::Corner)));

@@ -3,16 +3,29 @@
 //! A shape is a file: its checked constructor, and how a script writes it. Here stands only which there are; the
 //! compiler lists what a new one lacks.
 
+mod cone;
 mod cuboid;
+mod cylinder;
+mod disc;
+mod instance;
+mod plane;
 mod sphere;
+mod torus;
 mod triangle;
 
 use std::fmt::{self, Formatter};
 
 use glam::DVec3;
 
+pub use cone::Cone;
 pub use cuboid::Cuboid;
+pub use cylinder::Cylinder;
+pub use disc::Disc;
+pub(crate) use instance::USE;
+pub use instance::{Instance, Placement};
+pub use plane::Plane;
 pub use sphere::Sphere;
+pub use torus::Torus;
 pub use triangle::Triangle;
 
 use super::invalid::{Doubt, InvalidValue};
@@ -20,7 +33,7 @@ use super::material::Material;
 use crate::form::write_line;
 
 /// Something that a ray can hit.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Object {
     /// A sphere.
     Sphere(Sphere),
@@ -28,6 +41,18 @@ pub enum Object {
     Triangle(Triangle),
     /// An axis-aligned box.
     Cuboid(Cuboid),
+    /// A plane without end.
+    Plane(Plane),
+    /// A flat, round disc.
+    Disc(Disc),
+    /// A closed cylinder.
+    Cylinder(Cylinder),
+    /// A closed cone, also cut off.
+    Cone(Cone),
+    /// A ring.
+    Torus(Torus),
+    /// An object of a group, as it is drawn.
+    Instance(Instance),
 }
 
 impl Object {
@@ -37,6 +62,12 @@ impl Object {
             Self::Sphere(o) => o.material(),
             Self::Triangle(o) => o.material(),
             Self::Cuboid(o) => o.material(),
+            Self::Plane(o) => o.material(),
+            Self::Disc(o) => o.material(),
+            Self::Cylinder(o) => o.material(),
+            Self::Cone(o) => o.material(),
+            Self::Torus(o) => o.material(),
+            Self::Instance(o) => o.material(),
         }
     }
 
@@ -49,6 +80,12 @@ impl Object {
             Self::Sphere(o) => o.placed(scale, place).map(Self::from),
             Self::Triangle(o) => o.placed(place).map(Self::from),
             Self::Cuboid(o) => o.placed(place).map(Self::from),
+            Self::Plane(o) => o.placed(place).map(Self::Plane),
+            Self::Disc(o) => o.placed(scale, place).map(Self::Disc),
+            Self::Cylinder(o) => o.placed(scale, place).map(Self::Cylinder),
+            Self::Cone(o) => o.placed(scale, place).map(Self::Cone),
+            Self::Torus(o) => o.placed(scale, place).map(Self::Torus),
+            Self::Instance(o) => o.placed(scale, place).map(Self::Instance),
         }
     }
 
@@ -56,16 +93,30 @@ impl Object {
     pub(crate) fn doubt(&self) -> Option<Doubt> {
         match self {
             Self::Triangle(o) => o.is_degenerate().then_some(Doubt::DegenerateTriangle),
-            Self::Sphere(_) | Self::Cuboid(_) => None,
+            Self::Sphere(_)
+            | Self::Cuboid(_)
+            | Self::Plane(_)
+            | Self::Disc(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_)
+            | Self::Torus(_)
+            | Self::Instance(_) => None,
         }
     }
 
-    /// As a line of a script.
-    pub(crate) fn write(&self, f: &mut Formatter<'_>) -> fmt::Result {
+    /// As a line of a script; `surface` is the name of its material, if it has one.
+    pub(crate) fn write(&self, f: &mut Formatter<'_>, surface: Option<&str>) -> fmt::Result {
         match self {
-            Self::Sphere(o) => write_line(f, o),
-            Self::Triangle(o) => write_line(f, o),
-            Self::Cuboid(o) => write_line(f, o),
+            Self::Sphere(o) => write_line(f, o, surface),
+            Self::Triangle(o) => write_line(f, o, surface),
+            Self::Cuboid(o) => write_line(f, o, surface),
+            Self::Plane(o) => write_line(f, o, surface),
+            Self::Disc(o) => write_line(f, o, surface),
+            Self::Cylinder(o) => write_line(f, o, surface),
+            Self::Cone(o) => write_line(f, o, surface),
+            Self::Torus(o) => write_line(f, o, surface),
+            // An object of a group is written with its group.
+            Self::Instance(_) => Err(fmt::Error),
         }
     }
 }
@@ -85,5 +136,41 @@ impl From<Triangle> for Object {
 impl From<Cuboid> for Object {
     fn from(cuboid: Cuboid) -> Self {
         Self::Cuboid(cuboid)
+    }
+}
+
+impl From<Plane> for Object {
+    fn from(plane: Plane) -> Self {
+        Self::Plane(plane)
+    }
+}
+
+impl From<Disc> for Object {
+    fn from(disc: Disc) -> Self {
+        Self::Disc(disc)
+    }
+}
+
+impl From<Cylinder> for Object {
+    fn from(cylinder: Cylinder) -> Self {
+        Self::Cylinder(cylinder)
+    }
+}
+
+impl From<Cone> for Object {
+    fn from(cone: Cone) -> Self {
+        Self::Cone(cone)
+    }
+}
+
+impl From<Torus> for Object {
+    fn from(torus: Torus) -> Self {
+        Self::Torus(torus)
+    }
+}
+
+impl From<Instance> for Object {
+    fn from(instance: Instance) -> Self {
+        Self::Instance(instance)
     }
 }

@@ -9,7 +9,7 @@ use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, positive};
 use crate::model::material::{self, Material};
 
 /// A sphere of positive radius.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Sphere {
     radius: f64,
     center: DVec3,
@@ -41,7 +41,7 @@ impl Sphere {
     }
 
     pub(super) fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
-        Self::new(scale * self.radius, place(self.center), self.material)
+        Self::new(scale * self.radius, place(self.center), self.material.clone())
     }
 }
 
@@ -53,7 +53,7 @@ impl Scripted for Sphere {
             Field::new(Parameter::Center, &["cx", "cy", "cz"], Kind::Position, Values::Any),
             material::AMBIENT,
             material::DIFFUSE,
-            material::MIRROR.optional(),
+            material::MIRROR,
         ],
     );
 

@@ -10,7 +10,7 @@ use crate::model::material::{self, Material};
 use crate::model::vector::to_unit_scale;
 
 /// A two-sided triangle; one of no area is allowed and never hit.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Triangle {
     vertices: [DVec3; 3],
     material: Material,
@@ -18,12 +18,11 @@ pub struct Triangle {
 
 impl Triangle {
     /// # Errors
-    /// When a number is not finite or the material mirrors.
+    /// When a number is not finite.
     pub fn new(vertices: [DVec3; 3], material: Material) -> Result<Self, InvalidValue> {
         finite(Parameter::Vertex, vertices[0])?;
         finite(Parameter::Vertex, vertices[1])?;
         finite(Parameter::Vertex, vertices[2])?;
-        material.must_be_matte()?;
         Ok(Self { vertices, material })
     }
 
@@ -52,7 +51,7 @@ impl Triangle {
     }
 
     pub(super) fn placed(&self, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
-        Self::new(self.vertices.map(place), self.material)
+        Self::new(self.vertices.map(place), self.material.clone())
     }
 }
 
@@ -65,17 +64,18 @@ impl Scripted for Triangle {
             Field::new(Parameter::Vertex, &["wx", "wy", "wz"], Kind::Position, Values::Any),
             material::AMBIENT,
             material::DIFFUSE,
+            material::MIRROR,
         ],
     );
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let vertices = [numbers.vector(), numbers.vector(), numbers.vector()];
-        Ok(Self::new(vertices, Material::read_matte(numbers)?)?)
+        Ok(Self::new(vertices, Material::read(numbers)?)?)
     }
 
     fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
         self.vertices.iter().try_for_each(|vertex| line.vector(*vertex))?;
-        self.material.write_matte(line)
+        self.material.write(line)
     }
 }
 
@@ -86,9 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_triangle_is_matte_and_finite() {
-        let mirror = Material::new(DVec3::ZERO, DVec3::ZERO, DVec3::Z).unwrap();
-        assert_eq!(Triangle::new([DVec3::ZERO; 3], mirror), Err(InvalidValue::MirrorOnFlat));
+    fn a_triangle_is_finite() {
         for bad in [DVec3::NAN, DVec3::INFINITY] {
             let triangle = Triangle::new([DVec3::ZERO, DVec3::X, bad], Material::default());
             assert_eq!(triangle, Err(InvalidValue::NotFinite(Parameter::Vertex)));

@@ -73,6 +73,12 @@ impl Shape {
             Object::Sphere(sphere) => Some(Self::Sphere(sphere::Placed::new(sphere, center, scale))),
             Object::Cuboid(cuboid) => Some(Self::Cuboid(cuboid::Placed::new(cuboid, center, scale))),
             Object::Triangle(triangle) => triangle::Placed::new(triangle, center, scale).map(Self::Triangle),
+            Object::Plane(_)
+            | Object::Disc(_)
+            | Object::Cylinder(_)
+            | Object::Cone(_)
+            | Object::Torus(_)
+            | Object::Instance(_) => unreachable!("no kernel for {object:?}"),
         }
     }
 }
@@ -83,6 +89,12 @@ pub(super) fn kind(object: &Object) -> Kind {
         Object::Sphere(_) => Kind::Sphere,
         Object::Cuboid(_) => Kind::Cuboid,
         Object::Triangle(_) => Kind::Triangle,
+        Object::Plane(_)
+        | Object::Disc(_)
+        | Object::Cylinder(_)
+        | Object::Cone(_)
+        | Object::Torus(_)
+        | Object::Instance(_) => unreachable!("no kernel for {object:?}"),
     }
 }
 
@@ -92,6 +104,12 @@ pub(super) fn reach(object: &Object, center: DVec3) -> f64 {
         Object::Sphere(sphere) => sphere::reach(sphere, center),
         Object::Cuboid(cuboid) => cuboid::reach(cuboid, center),
         Object::Triangle(triangle) => triangle::reach(triangle, center),
+        Object::Plane(_)
+        | Object::Disc(_)
+        | Object::Cylinder(_)
+        | Object::Cone(_)
+        | Object::Torus(_)
+        | Object::Instance(_) => unreachable!("no kernel for {object:?}"),
     }
 }
 

@@ -32,7 +32,7 @@ impl Shape for Cuboid {
     }
 
     fn seen_from(&self, eye: DVec3) -> Option<Object> {
-        Object::from(*self).placed(1.0, |corner| corner - eye).ok()
+        Object::from(self.clone()).placed(1.0, |corner| corner - eye).ok()
     }
 }
 

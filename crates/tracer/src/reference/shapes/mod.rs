@@ -51,6 +51,12 @@ fn shape(object: &Object) -> &dyn Shape {
         Object::Sphere(sphere) => sphere,
         Object::Triangle(triangle) => triangle,
         Object::Cuboid(cuboid) => cuboid,
+        Object::Plane(_)
+        | Object::Disc(_)
+        | Object::Cylinder(_)
+        | Object::Cone(_)
+        | Object::Torus(_)
+        | Object::Instance(_) => todo!("the reference draws {object:?}"),
     }
 }
 

@@ -42,7 +42,7 @@ impl Shape for Sphere {
     }
 
     fn seen_from(&self, eye: DVec3) -> Option<Object> {
-        let placed = Self::new(self.radius(), self.center() - eye, *self.material()).ok()?;
+        let placed = Self::new(self.radius(), self.center() - eye, self.material().clone()).ok()?;
         let side = |eye, sphere| power(eye, sphere, 1.0).partial_cmp(&0.0);
         (side(eye, self) == side(DVec3::ZERO, &placed)).then_some(placed.into())
     }
@@ -110,7 +110,11 @@ mod tests {
         let exact = square(0.6) + square(0.8) - square(1.0);
         assert_eq!(just_inside, exact as f64 * 2f64.powi(-106));
         assert_eq!(
-            power(DVec3::new(3.0, 4.0, 0.0), &Sphere::new(5.0, DVec3::ZERO, *unit.material()).unwrap(), 1.0),
+            power(
+                DVec3::new(3.0, 4.0, 0.0),
+                &Sphere::new(5.0, DVec3::ZERO, unit.material().clone()).unwrap(),
+                1.0
+            ),
             0.0
         );
     }

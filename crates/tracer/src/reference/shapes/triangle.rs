@@ -38,7 +38,7 @@ impl Shape for Triangle {
     }
 
     fn seen_from(&self, eye: DVec3) -> Option<Object> {
-        let object = Object::from(*self);
+        let object = Object::from(self.clone());
         // Rounding would give it an area.
         if self.is_degenerate() { Some(object) } else { object.placed(1.0, |vertex| vertex - eye).ok() }
     }

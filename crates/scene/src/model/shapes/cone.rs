@@ -1,0 +1,84 @@
+//! Cones, also cut off.
+
+use std::fmt;
+
+use glam::DVec3;
+
+use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
+use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative};
+use crate::model::material::{self, Material};
+
+/// A round cone, or what is left when its tip is cut off; closed at both ends.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cone {
+    radii: [f64; 2],
+    ends: [DVec3; 2],
+    material: Material,
+}
+
+impl Cone {
+    /// From one end of its axis to the other, with a radius at each.
+    ///
+    /// # Errors
+    /// When a radius is negative, both are zero, the ends are the same, or a number is not finite.
+    pub fn new(radii: [f64; 2], ends: [DVec3; 2], material: Material) -> Result<Self, InvalidValue> {
+        not_negative(Parameter::RadiusA, radii[0])?;
+        not_negative(Parameter::RadiusB, radii[1])?;
+        if radii == [0.0; 2] {
+            return Err(InvalidValue::NoRadius);
+        }
+        finite(Parameter::AxisEnd, ends[0])?;
+        finite(Parameter::AxisEnd, ends[1])?;
+        if ends[0] == ends[1] {
+            return Err(InvalidValue::NoAxis);
+        }
+        Ok(Self { radii, ends, material })
+    }
+
+    /// The radii at a and b, not negative, not both zero.
+    pub fn radii(&self) -> [f64; 2] {
+        self.radii
+    }
+
+    /// The ends a and b of its axis, which differ.
+    pub fn ends(&self) -> [DVec3; 2] {
+        self.ends
+    }
+
+    /// How its surface answers light.
+    pub fn material(&self) -> &Material {
+        &self.material
+    }
+
+    pub(super) fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
+        Self::new(self.radii.map(|radius| scale * radius), self.ends.map(place), self.material.clone())
+    }
+}
+
+impl Scripted for Cone {
+    const FORM: Form = Form::new(
+        "Cone",
+        &[
+            Field::new(Parameter::RadiusA, &["Ra"], Kind::Length, Values::NotNegative),
+            Field::new(Parameter::RadiusB, &["Rb"], Kind::Length, Values::NotNegative),
+            Field::new(Parameter::AxisEnd, &["ax", "ay", "az"], Kind::Position, Values::Any),
+            Field::new(Parameter::AxisEnd, &["bx", "by", "bz"], Kind::Position, Values::Any),
+            material::AMBIENT,
+            material::DIFFUSE,
+            material::MIRROR,
+        ],
+    )
+    .with(&[Together::NotBothZero(0, 1), Together::Differ(2, 3)]);
+
+    fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        let radii = [numbers.number(), numbers.number()];
+        let ends = [numbers.vector(), numbers.vector()];
+        Ok(Self::new(radii, ends, Material::read(numbers)?)?)
+    }
+
+    fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        self.radii.iter().try_for_each(|radius| line.number(*radius))?;
+        self.ends.iter().try_for_each(|end| line.vector(*end))?;
+        self.material.write(line)
+    }
+}

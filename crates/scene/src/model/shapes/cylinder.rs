@@ -1,0 +1,78 @@
+//! Cylinders.
+
+use std::fmt;
+
+use glam::DVec3;
+
+use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
+use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, positive};
+use crate::model::material::{self, Material};
+
+/// A round cylinder, closed at both ends.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cylinder {
+    radius: f64,
+    ends: [DVec3; 2],
+    material: Material,
+}
+
+impl Cylinder {
+    /// From one end of its axis to the other.
+    ///
+    /// # Errors
+    /// When the radius is not positive, the ends are the same, or a number is not finite.
+    pub fn new(radius: f64, ends: [DVec3; 2], material: Material) -> Result<Self, InvalidValue> {
+        positive(Parameter::Radius, radius)?;
+        finite(Parameter::AxisEnd, ends[0])?;
+        finite(Parameter::AxisEnd, ends[1])?;
+        if ends[0] == ends[1] {
+            return Err(InvalidValue::NoAxis);
+        }
+        Ok(Self { radius, ends, material })
+    }
+
+    /// Greater than zero.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// The ends a and b of its axis, which differ.
+    pub fn ends(&self) -> [DVec3; 2] {
+        self.ends
+    }
+
+    /// How its surface answers light.
+    pub fn material(&self) -> &Material {
+        &self.material
+    }
+
+    pub(super) fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
+        Self::new(scale * self.radius, self.ends.map(place), self.material.clone())
+    }
+}
+
+impl Scripted for Cylinder {
+    const FORM: Form = Form::new(
+        "Cylinder",
+        &[
+            Field::new(Parameter::Radius, &["R"], Kind::Length, Values::Positive),
+            Field::new(Parameter::AxisEnd, &["ax", "ay", "az"], Kind::Position, Values::Any),
+            Field::new(Parameter::AxisEnd, &["bx", "by", "bz"], Kind::Position, Values::Any),
+            material::AMBIENT,
+            material::DIFFUSE,
+            material::MIRROR,
+        ],
+    )
+    .with(&[Together::Differ(1, 2)]);
+
+    fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        let (radius, ends) = (numbers.number(), [numbers.vector(), numbers.vector()]);
+        Ok(Self::new(radius, ends, Material::read(numbers)?)?)
+    }
+
+    fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        line.number(self.radius)?;
+        self.ends.iter().try_for_each(|end| line.vector(*end))?;
+        self.material.write(line)
+    }
+}

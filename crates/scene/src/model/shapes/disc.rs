@@ -1,0 +1,81 @@
+//! Discs.
+
+use std::fmt;
+
+use glam::DVec3;
+
+use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
+use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite, positive};
+use crate::model::material::{self, Material};
+
+/// A flat, round disc, seen from both sides, with its rim.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Disc {
+    radius: f64,
+    center: DVec3,
+    normal: DVec3,
+    material: Material,
+}
+
+impl Disc {
+    /// Around `center`, square to `normal`, which has any length but zero.
+    ///
+    /// # Errors
+    /// When the radius is not positive, the normal is zero, or a number is not finite.
+    pub fn new(radius: f64, center: DVec3, normal: DVec3, material: Material) -> Result<Self, InvalidValue> {
+        positive(Parameter::Radius, radius)?;
+        finite(Parameter::Center, center)?;
+        invalid::direction(Parameter::Normal, normal)?;
+        Ok(Self { radius, center, normal, material })
+    }
+
+    /// Greater than zero.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Its middle.
+    pub fn center(&self) -> DVec3 {
+        self.center
+    }
+
+    /// Square to it, of any length but zero.
+    pub fn normal(&self) -> DVec3 {
+        self.normal
+    }
+
+    /// How its surface answers light.
+    pub fn material(&self) -> &Material {
+        &self.material
+    }
+
+    pub(super) fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
+        Self::new(scale * self.radius, place(self.center), self.normal, self.material.clone())
+    }
+}
+
+impl Scripted for Disc {
+    const FORM: Form = Form::new(
+        "Disc",
+        &[
+            Field::new(Parameter::Radius, &["R"], Kind::Length, Values::Positive),
+            Field::new(Parameter::Center, &["cx", "cy", "cz"], Kind::Position, Values::Any),
+            Field::new(Parameter::Normal, &["nx", "ny", "nz"], Kind::Direction, Values::NotZero),
+            material::AMBIENT,
+            material::DIFFUSE,
+            material::MIRROR,
+        ],
+    );
+
+    fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        let (radius, center, normal) = (numbers.number(), numbers.vector(), numbers.vector());
+        Ok(Self::new(radius, center, normal, Material::read(numbers)?)?)
+    }
+
+    fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        line.number(self.radius)?;
+        line.vector(self.center)?;
+        line.vector(self.normal)?;
+        self.material.write(line)
+    }
+}

@@ -1,0 +1,103 @@
+//! Tori.
+
+use std::fmt;
+
+use glam::DVec3;
+
+use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
+use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite, positive};
+use crate::model::material::{self, Material};
+
+/// A ring: all that is as far as its thickness from a circle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Torus {
+    radius: f64,
+    thickness: f64,
+    center: DVec3,
+    normal: DVec3,
+    material: Material,
+}
+
+impl Torus {
+    /// The circle has the `radius` R around `center` and is square to `normal`, which has any length but zero;
+    /// `thickness` r is the radius of the tube.
+    ///
+    /// # Errors
+    /// When not 0 < r < R, the normal is zero, or a number is not finite.
+    pub fn new(
+        radius: f64,
+        thickness: f64,
+        center: DVec3,
+        normal: DVec3,
+        material: Material,
+    ) -> Result<Self, InvalidValue> {
+        positive(Parameter::Radius, radius)?;
+        positive(Parameter::Thickness, thickness)?;
+        if thickness >= radius {
+            return Err(InvalidValue::ThickTorus);
+        }
+        finite(Parameter::Center, center)?;
+        invalid::direction(Parameter::Normal, normal)?;
+        Ok(Self { radius, thickness, center, normal, material })
+    }
+
+    /// R, of the circle.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// r, of the tube around the circle: 0 < r < R.
+    pub fn thickness(&self) -> f64 {
+        self.thickness
+    }
+
+    /// Of the circle.
+    pub fn center(&self) -> DVec3 {
+        self.center
+    }
+
+    /// Square to the circle, of any length but zero.
+    pub fn normal(&self) -> DVec3 {
+        self.normal
+    }
+
+    /// How its surface answers light.
+    pub fn material(&self) -> &Material {
+        &self.material
+    }
+
+    pub(super) fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
+        let (radius, thickness) = (scale * self.radius, scale * self.thickness);
+        Self::new(radius, thickness, place(self.center), self.normal, self.material.clone())
+    }
+}
+
+impl Scripted for Torus {
+    const FORM: Form = Form::new(
+        "Torus",
+        &[
+            Field::new(Parameter::Radius, &["R"], Kind::Length, Values::Positive),
+            Field::new(Parameter::Thickness, &["r"], Kind::Length, Values::Positive),
+            Field::new(Parameter::Center, &["cx", "cy", "cz"], Kind::Position, Values::Any),
+            Field::new(Parameter::Normal, &["nx", "ny", "nz"], Kind::Direction, Values::NotZero),
+            material::AMBIENT,
+            material::DIFFUSE,
+            material::MIRROR,
+        ],
+    )
+    .with(&[Together::Greater(0, 1)]);
+
+    fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        let (radius, thickness) = (numbers.number(), numbers.number());
+        let (center, normal) = (numbers.vector(), numbers.vector());
+        Ok(Self::new(radius, thickness, center, normal, Material::read(numbers)?)?)
+    }
+
+    fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        line.number(self.radius)?;
+        line.number(self.thickness)?;
+        line.vector(self.center)?;
+        line.vector(self.normal)?;
+        self.material.write(line)
+    }
+}
