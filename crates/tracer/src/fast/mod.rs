@@ -169,7 +169,7 @@ impl<'a, E: Real> Setup<'a, E> {
         let size = (scene.screen.width(), scene.screen.height());
         let background = crate::reference::levels(scene.background.colors().0);
         let level = options.level.unwrap_or_else(Level::new);
-        let bounces = options.bounces();
+        let bounces = options.bounces(scene);
         // Boxed: it is passed from band to band by value.
         bands(
             scene.screen,
