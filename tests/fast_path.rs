@@ -277,21 +277,7 @@ fn the_reference_draws_the_same() {
         let mut scene = scene.clone();
         scene.camera = Camera::Orthographic;
         let place = |p: DVec3| p * 20.0 + DVec3::new(50.0, 50.0, -100.0);
-        scene.objects = scene
-            .objects
-            .iter()
-            .map(|object| match object {
-                Object::Sphere(o) => {
-                    Object::Sphere(Sphere::new(o.radius() * 20.0, place(o.center()), *o.material()).unwrap())
-                }
-                Object::Cuboid(o) => {
-                    Object::Cuboid(Cuboid::new(o.corners().map(place), *o.material()).unwrap())
-                }
-                Object::Triangle(o) => {
-                    Object::Triangle(Triangle::new(o.vertices().map(place), *o.material()).unwrap())
-                }
-            })
-            .collect();
+        scene.objects = scene.objects.iter().map(|object| object.placed(20.0, place).unwrap()).collect();
         scene
     };
     scenes.extend(scenes.iter().map(orthographic).collect::<Vec<_>>());
