@@ -3,7 +3,7 @@
 use anyhow::Result;
 use glam::DVec3;
 use image::RgbImage;
-use rayfold_scene::{Cuboid, Light, Material, Object, Scene, Screen, Sphere, Triangle, model::unit};
+use rayfold_scene::{Cuboid, Light, Material, Object, Scene, Screen, Sphere, Tone, Triangle, model::unit};
 use rayon::prelude::*;
 
 use super::figures::{Figures, Size};
@@ -105,7 +105,7 @@ fn without_shadows(visible: &[Option<(Material, DVec3)>], lights: &[Light]) -> V
             let cosine = normal.dot(-unit(light.direction())).max(0.0);
             sum + light.color() * material.diffuse() * cosine
         });
-        oracle::levels(color)
+        oracle::levels(Tone::Plain, color)
     };
     visible.iter().map(|seen| seen.as_ref().map(shaded)).collect()
 }

@@ -119,6 +119,9 @@ fn has_kernels(_: &RenderOptions) -> bool {
 
 /// The precision that [`Precision::Auto`] stands for in a scene.
 pub(crate) fn precision(scene: &Scene) -> Precision {
+    if !supported::is_drawn_by_kernels(scene) {
+        return Precision::F64;
+    }
     let geometry = Geometry::new(scene, None).ok();
     let resolved =
         geometry.and_then(|geometry| precision::resolve(&RenderOptions::default(), &geometry, scene));
@@ -169,7 +172,7 @@ impl<'a, E: Real> Setup<'a, E> {
         let size = (scene.screen.width(), scene.screen.height());
         let background = crate::reference::levels(scene.background.colors().0);
         let level = options.level.unwrap_or_else(Level::new);
-        let bounces = options.bounces();
+        let bounces = options.bounces(scene);
         // Boxed: it is passed from band to band by value.
         bands(
             scene.screen,

@@ -18,14 +18,23 @@ impl Shape for Cuboid {
     }
 
     /// On an edge that of the first axis which leads there.
-    fn normal(&self, line: &Line, t: &Real) -> Vector {
-        let axis = slabs(self, line).map(
-            |[(enter, first), (_, last)]| {
-                if (&enter.value() - t).sign() == 0 { first } else { last }
-            },
-        );
-        axis.map_or(DVec3::ZERO, |axis| DVec3::AXES[axis]).into()
+    fn outward(&self, line: &Line, t: &Real) -> Vector {
+        let Some((axis, entering)) = met(self, line, t) else { return DVec3::ZERO.into() };
+        let upwards = (line.direction.0[axis].sign() > 0) != entering;
+        if upwards { DVec3::AXES[axis].into() } else { (-DVec3::AXES[axis]).into() }
     }
+
+    fn face(&self, line: &Line, t: &Real) -> Option<(usize, f64)> {
+        let (axis, entering) = met(self, line, t)?;
+        let upwards = (line.direction.0[axis].sign() > 0) != entering;
+        Some((axis, if upwards { self.max()[axis] } else { self.min()[axis] }))
+    }
+}
+
+/// The axis whose face is met at `t`, and whether the line enters there.
+fn met(cuboid: &Cuboid, line: &Line, t: &Real) -> Option<(usize, bool)> {
+    let [(enter, first), (_, last)] = slabs(cuboid, line)?;
+    Some(if (&enter.value() - t).sign() == 0 { (first, true) } else { (last, false) })
 }
 
 /// A quotient that is compared without being computed; the divisor is positive.

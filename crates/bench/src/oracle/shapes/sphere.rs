@@ -26,8 +26,12 @@ impl Shape for Sphere {
         if near > *start { Some(near) } else { Some((&-&b + &root).over(&a)).filter(|far| far > start) }
     }
 
-    fn normal(&self, line: &Line, t: &Real) -> Vector {
+    fn outward(&self, line: &Line, t: &Real) -> Vector {
         line.origin.minus(&self.center().into()).plus(t, &line.direction).unit()
+    }
+
+    fn face(&self, _: &Line, _: &Real) -> Option<(usize, f64)> {
+        None
     }
 }
 

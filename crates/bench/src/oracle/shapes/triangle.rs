@@ -26,8 +26,14 @@ impl Shape for Triangle {
         Some(area.dot(&u).over(&towards)).filter(|t| t > start)
     }
 
-    fn normal(&self, _: &Line, _: &Real) -> Vector {
+    fn outward(&self, _: &Line, _: &Real) -> Vector {
         area(self).unit()
+    }
+
+    fn face(&self, _: &Line, _: &Real) -> Option<(usize, f64)> {
+        let [u, v, w] = self.vertices();
+        let axis = (0..3).find(|&axis| u[axis] == v[axis] && u[axis] == w[axis])?;
+        Some((axis, u[axis]))
     }
 }
 
