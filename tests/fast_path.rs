@@ -280,17 +280,7 @@ fn the_reference_draws_the_same() {
         scene.objects = scene
             .objects
             .iter()
-            .map(|object| match object {
-                Object::Sphere(o) => {
-                    Object::Sphere(Sphere::new(o.radius() * 20.0, place(o.center()), *o.material()).unwrap())
-                }
-                Object::Cuboid(o) => {
-                    Object::Cuboid(Cuboid::new(o.corners().map(place), *o.material()).unwrap())
-                }
-                Object::Triangle(o) => {
-                    Object::Triangle(Triangle::new(o.vertices().map(place), *o.material()).unwrap())
-                }
-            })
+            .map(|object| object.placed(20.0, place).unwrap())
             .collect();
         scene
     };

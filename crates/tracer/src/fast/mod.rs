@@ -33,9 +33,11 @@ mod search;
 mod shape;
 mod shapes;
 mod sights;
+mod sky;
 mod supported;
 mod surfaces;
 mod tile;
+mod tone;
 mod tree;
 mod window;
 
@@ -54,6 +56,7 @@ use self::real::Real;
 use self::shape::Robust;
 use self::shapes::{Formulas, Shape};
 use self::tile::Scratch;
+use self::tone::levels;
 use self::window::Window;
 use crate::parallel::{CHANNELS, bands};
 use crate::{Precision, RenderError, RenderOptions};
@@ -134,6 +137,11 @@ pub(crate) fn render_naive(scene: &Scene, options: &RenderOptions) -> Result<Rgb
     Setup::<f32>::new(scene, &Geometry::new(scene, options.tree)?, options)?.draw::<naive::Naive>()
 }
 
+/// How often light is mirrored before the mirror term is dropped.
+fn bounces(scene: &Scene, options: &RenderOptions) -> u32 {
+    options.bounces.unwrap_or(scene.depth.bounces())
+}
+
 /// What a kernel needs to draw a scene.
 struct Setup<'a, E> {
     scene: &'a Scene,
@@ -167,9 +175,9 @@ impl<'a, E: Real> Setup<'a, E> {
     fn draw<By: Formulas<E>>(&self) -> Result<RgbImage, RenderError> {
         let Self { scene, options, prepared, window, side } = self;
         let size = (scene.screen.width(), scene.screen.height());
-        let background = crate::reference::levels(scene.background.colors().0);
+        let background = levels(scene.background.colors().0, scene.tone);
         let level = options.level.unwrap_or_else(Level::new);
-        let bounces = options.bounces();
+        let bounces = bounces(scene, options);
         // Boxed: it is passed from band to band by value.
         bands(
             scene.screen,
@@ -177,7 +185,7 @@ impl<'a, E: Real> Setup<'a, E> {
             options,
             || Box::new(Scratch::new()),
             |scratch, row, bytes| {
-                let band = Band { bytes, size, background };
+                let band = Band { bytes, size, background, tone: scene.tone };
                 draw::<E, By>(&Job { prepared, window, side: *side, row, bounces }, level, band, scratch);
             },
         )

@@ -19,6 +19,7 @@ use super::rays::Rays;
 use super::real::Real;
 use super::shapes::{self, Obstacles, Shape, Shapes, Solid, Sorted};
 use super::sights::Sights;
+use super::sky::Sky;
 use super::tree::{Tree, stump};
 use crate::RenderError;
 use crate::parallel::map;
@@ -68,8 +69,10 @@ pub(super) struct Prepared<E> {
     pub(super) tree: Option<Tree<E>>,
     /// For scenes of many objects, where it helps: what the tiles show.
     pub(super) sights: Option<Sights>,
-    /// Unclamped, for mirrored rays.
+    /// Unclamped, for mirrored rays; of a sky its first colour.
     pub(super) background: [E; 3],
+    /// A background that depends on where a ray goes.
+    pub(super) sky: Option<Sky<E>>,
     /// What it has.
     pub(super) needs: Needs,
 }
@@ -135,6 +138,7 @@ impl<E: Real> Prepared<E> {
             row,
             needs,
             background: narrow(scene.background.colors().0),
+            sky: Sky::new(scene.background),
             tree: branches.map(|branches| Tree::new(branches, solids, |order| entries[order as usize].index)),
             sights,
             entries,

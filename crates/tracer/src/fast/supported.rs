@@ -1,6 +1,6 @@
 //! What of the language the kernels draw; the rest is left to [`crate::reference`].
 
-use rayfold_scene::{Light, Object, Scene, Tone};
+use rayfold_scene::{Light, Object, Scene};
 
 /// Whether the kernels know all that the scene has.
 pub(super) fn is_drawn_by_kernels(scene: &Scene) -> bool {
@@ -8,6 +8,4 @@ pub(super) fn is_drawn_by_kernels(scene: &Scene) -> bool {
     objects().all(|object| matches!(object, Object::Sphere(_) | Object::Triangle(_) | Object::Cuboid(_)))
         && objects().all(|object| object.material().finish().is_none())
         && scene.lights.iter().all(|light| matches!(light, Light::Directional(_)))
-        && scene.background.color().is_some()
-        && scene.tone == Tone::Plain
 }

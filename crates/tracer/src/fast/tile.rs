@@ -7,8 +7,9 @@
 //! steps a tile takes, and in which variants ([`fitted!`]).
 
 use fearless_simd::Simd;
+use rayfold_scene::Tone;
 
-use super::band::{Band, Tile, fill, write_pixels};
+use super::band::{Band, Tile, fill, rays_of, write_encoded, write_pixels};
 use super::bounce::{Columns, Hits, Queue, columns};
 use super::candidates::{Candidates, Picked};
 use super::features::{BUILT, Kernel, Variant, fitted};
@@ -18,6 +19,7 @@ use super::look::{aim_along_axis, look, look_from_eye};
 use super::prepare::Prepared;
 use super::rays::Rays;
 use super::real::Real;
+use super::sky::show_sky;
 use super::surfaces::{ambient, reflect, surfaces};
 
 /// Memory of a worker, used again for each of its tiles; what is in it does not matter.
@@ -54,7 +56,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     scratch: &mut Scratch<E>,
     band: &mut Band,
 ) {
-    if tile.candidates == 0 {
+    if tile.candidates == 0 && scene.sky.is_none() {
         return fill(tile, band);
     }
     let Scratch { queue, hits, next, pixels, in_the_way, sights } = scratch;
@@ -62,7 +64,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     let all = scene.all();
     let candidates = match &scene.sights {
         Some(all) if BUILT.tree && all.gather(tile.place.0, tile.place.1, sights) => {
-            if sights.is_empty() {
+            if sights.is_empty() && scene.sky.is_none() {
                 return fill(tile, band);
             }
             Candidates::listed(sights)
@@ -82,6 +84,9 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             });
             let met = Met { kinds: seen, background, queue, next: Some(&mut *next) };
             shade::<S, E, N, true>(simd, scene, met, hits, in_the_way);
+            if let Some(sky) = &scene.sky {
+                show_sky::<S, E, true>(simd, sky, rays_of::<S, E>(tile), queue, hits);
+            }
         }
         Rays::Parallel(rays) => {
             aim_along_axis::<S, E>(simd, (tile, band), rays, queue);
@@ -90,6 +95,9 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             });
             let met = Met { kinds: seen, background, queue, next: Some(&mut *next) };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
+            if let Some(sky) = &scene.sky {
+                show_sky::<S, E, false>(simd, sky, queue.count, queue, hits);
+            }
         }
     }
     if BUILT.mirrors && next.count > 0 {
@@ -105,6 +113,9 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             });
             let met = Met { kinds: all.kinds, background: scene.background, queue, next: after };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
+            if let Some(sky) = &scene.sky {
+                show_sky::<S, E, false>(simd, sky, queue.count, queue, hits);
+            }
             for ray in 0..queue.count {
                 let pixel = queue.pixel.0[ray].to_index();
                 for (sum, color) in pixels.iter_mut().zip(&hits.color) {
@@ -117,7 +128,10 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
         }
         core::mem::swap(&mut hits.color, pixels);
     }
-    write_pixels::<S, E>(simd, tile, &hits.color, band);
+    match band.tone {
+        Tone::Plain => write_pixels::<S, E>(simd, tile, &hits.color, band),
+        Tone::Srgb => write_encoded::<S, E>(tile, &hits.color, band),
+    }
 }
 
 /// Rays that have met something.

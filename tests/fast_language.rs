@@ -1,0 +1,149 @@
+//! What version 2 of the language brings is drawn by the packets as the plain tracer draws it, whatever it is drawn with.
+//!
+//! Scenes are drawn at random; a failure prints the seed. `RAYFOLD_SEED` tries another one.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+use image::RgbImage;
+use rayfold_scene::{
+    Background, Camera, Cuboid, Depth, DirectionalLight, Instance, Light, Look, Material, Object, Placement,
+    Scene, Screen, SharedSlice, Sphere, Tone, Triangle,
+};
+use rayfold_tracer::{Level, Precision, RenderOptions, reference, render};
+
+/// Pixels of all pictures that rounding may put on the other side of an outline, as a share.
+const ISOLATED: f64 = 4e-4;
+
+struct Dice(fastrand::Rng);
+
+impl Dice {
+    fn new(test: &str) -> Self {
+        let seed =
+            std::env::var("RAYFOLD_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(20_261_122);
+        println!("{test}: RAYFOLD_SEED={seed}");
+        Self(fastrand::Rng::with_seed(seed))
+    }
+
+    fn within(&mut self, from: f64, to: f64) -> f64 {
+        from + (to - from) * self.0.f64()
+    }
+
+    fn point(&mut self, size: f64) -> DVec3 {
+        DVec3::new(self.within(-size, size), self.within(-size, size), self.within(-size, size))
+    }
+
+    fn color(&mut self) -> DVec3 {
+        self.point(0.5) + 0.5
+    }
+
+    fn material(&mut self) -> Material {
+        let mirror = if self.0.bool() { 0.6 * self.color() } else { DVec3::ZERO };
+        Material::new(0.1 * self.color(), self.color(), mirror).unwrap()
+    }
+
+    /// A sphere, a box or a triangle, any of which may be a mirror.
+    fn object(&mut self) -> Object {
+        let at = self.point(3.0);
+        let material = self.material();
+        match self.0.u8(0..3) {
+            0 => Sphere::new(self.within(0.1, 0.8), at, material).unwrap().into(),
+            1 => Cuboid::new([at, at + self.point(0.8)], material).unwrap().into(),
+            _ => Triangle::new([at, at + self.point(1.5), at + self.point(1.5)], material).unwrap().into(),
+        }
+    }
+
+    fn scene(&mut self, objects: Vec<Object>) -> Scene {
+        let eye = self.point(1.0).normalize() * 9.0;
+        let up = if self.0.bool() { Some(self.point(1.0)) } else { None };
+        let look = Look::new(eye, self.point(0.5), self.within(35.0, 70.0), up).unwrap();
+        let screen = Screen::new(self.0.u32(50..90), self.0.u32(50..90)).unwrap();
+        let camera = if self.0.u8(0..4) == 0 { Camera::Orthographic } else { Camera::Look(look) };
+        let mut scene = Scene::new(screen, camera);
+        if camera == Camera::Orthographic {
+            let place = |p: DVec3| p * 12.0 + DVec3::new(35.0, 35.0, -80.0);
+            scene.objects = objects.iter().map(|object| object.placed(12.0, place).unwrap()).collect();
+        } else {
+            scene.objects = objects.into();
+        }
+        scene.background = Background::sky(self.color(), self.color()).unwrap();
+        scene.tone = if self.0.bool() { Tone::Srgb } else { Tone::Plain };
+        scene.depth = Depth::new(self.0.u32(0..8)).unwrap();
+        scene.lights = (0..self.0.usize(0..4))
+            .map(|_| Light::Directional(DirectionalLight::new(0.6 * self.color(), self.point(1.0)).unwrap()))
+            .collect();
+        scene
+    }
+}
+
+fn draw(scene: &Scene, options: RenderOptions) -> RgbImage {
+    render(scene, &options).unwrap()
+}
+
+fn levels() -> Vec<(&'static str, Level)> {
+    let best = Level::new();
+    let mut levels = vec![("the best", best)];
+    #[cfg(target_arch = "x86_64")]
+    {
+        levels.extend(best.as_avx2().map(|level| ("AVX2", Level::Avx2(level))));
+        levels.extend(best.as_sse4_2().map(|level| ("SSE4.2", Level::Sse4_2(level))));
+    }
+    levels
+}
+
+/// Pixels that are off by more than one level in a channel.
+fn off(a: &RgbImage, b: &RgbImage) -> usize {
+    assert_eq!(a.dimensions(), b.dimensions());
+    a.pixels().zip(b.pixels()).filter(|(p, q)| (0..3).any(|c| p[c].abs_diff(q[c]) > 1)).count()
+}
+
+/// Holds the packets to the plain tracer, and to themselves: in all numbers, on all instructions, for any tile and tree.
+fn hold(scenes: &[Scene]) {
+    let (mut differ, mut pixels) = (0, 0);
+    for (number, scene) in scenes.iter().enumerate() {
+        let expected = reference::render(scene, &RenderOptions::default()).unwrap();
+        for precision in [Precision::Auto, Precision::F32, Precision::F64] {
+            let options = RenderOptions { precision, ..Default::default() };
+            let drawn = draw(scene, options);
+            let wrong = off(&expected, &drawn);
+            if wrong > 0 {
+                println!("scene {number}, {precision:?}: {wrong} of {} pixels are off", drawn.pixels().len());
+            }
+            differ += wrong;
+            pixels += drawn.pixels().len();
+            for (name, level) in levels() {
+                let other = draw(scene, RenderOptions { level: Some(level), ..options });
+                if name == "SSE4.2" {
+                    differ += off(&drawn, &other);
+                } else {
+                    assert!(drawn == other, "scene {number} on {name}, {precision:?}");
+                }
+            }
+            let tiles = [(4, 4), (32, 8)].map(|tile| RenderOptions { tile: Some(tile), ..options });
+            let trees = [true, false].map(|tree| RenderOptions { tree: Some(tree), ..options });
+            for options in tiles.into_iter().chain(trees) {
+                let other = draw(scene, options);
+                assert!(drawn == other, "scene {number}, {:?} {:?} {precision:?}", options.tile, options.tree);
+            }
+        }
+    }
+    println!("{differ} of {pixels} pixels are off by more than one level");
+    assert!(differ as f64 <= ISOLATED * pixels as f64, "{differ} of {pixels} pixels");
+}
+
+#[test]
+fn skies_tones_depths_and_mirrors_of_all_kinds_are_the_references() {
+    let mut dice = Dice::new("sky");
+    let scenes: Vec<Scene> = [0, 1, 6, 30, 90]
+        .into_iter()
+        .cycle()
+        .take(10)
+        .map(|count| {
+            let objects = (0..count).map(|_| dice.object()).collect();
+            dice.scene(objects)
+        })
+        .collect();
+    hold(&scenes);
+}
