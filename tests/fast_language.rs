@@ -125,7 +125,12 @@ fn hold(scenes: &[Scene]) {
             let trees = [true, false].map(|tree| RenderOptions { tree: Some(tree), ..options });
             for options in tiles.into_iter().chain(trees) {
                 let other = draw(scene, options);
-                assert!(drawn == other, "scene {number}, {:?} {:?} {precision:?}", options.tile, options.tree);
+                assert!(
+                    drawn == other,
+                    "scene {number}, {:?} {:?} {precision:?}",
+                    options.tile,
+                    options.tree
+                );
             }
         }
     }
@@ -142,6 +147,52 @@ fn skies_tones_depths_and_mirrors_of_all_kinds_are_the_references() {
         .take(10)
         .map(|count| {
             let objects = (0..count).map(|_| dice.object()).collect();
+            dice.scene(objects)
+        })
+        .collect();
+    hold(&scenes);
+}
+
+/// An object of a group of one, moved, turned and scaled.
+fn placed(dice: &mut Dice, object: Object) -> Object {
+    let right_angles = dice.0.bool();
+    let turns = DVec3::from_array(
+        [(); 3].map(|()| if right_angles { f64::from(dice.0.u8(0..4)) } else { dice.within(0.0, 4.0) }),
+    );
+    // Right angles are exact.
+    let (cosine, sine) = (
+        turns
+            .to_array()
+            .map(|turn| if right_angles { [1.0, 0.0, -1.0, 0.0][turn as usize] } else { turn.cos() }),
+        turns
+            .to_array()
+            .map(|turn| if right_angles { [0.0, 1.0, 0.0, -1.0][turn as usize] } else { turn.sin() }),
+    );
+    let x =
+        DMat3::from_cols(DVec3::X, DVec3::new(0.0, cosine[0], sine[0]), DVec3::new(0.0, -sine[0], cosine[0]));
+    let y =
+        DMat3::from_cols(DVec3::new(cosine[1], 0.0, -sine[1]), DVec3::Y, DVec3::new(sine[1], 0.0, cosine[1]));
+    let z =
+        DMat3::from_cols(DVec3::new(cosine[2], sine[2], 0.0), DVec3::new(-sine[2], cosine[2], 0.0), DVec3::Z);
+    let placement = Placement::new(dice.point(1.0), z * y * x, dice.within(0.3, 1.5)).unwrap();
+    let objects: SharedSlice<Object> = vec![object].into();
+    Instance::new(&objects, 0, &Arc::new(placement)).into()
+}
+
+#[test]
+fn groups_are_the_references() {
+    let mut dice = Dice::new("groups");
+    let scenes: Vec<Scene> = [1, 6, 30, 90]
+        .into_iter()
+        .cycle()
+        .take(12)
+        .map(|count| {
+            let objects = (0..count)
+                .map(|_| {
+                    let object = dice.object();
+                    placed(&mut dice, object)
+                })
+                .collect();
             dice.scene(objects)
         })
         .collect();

@@ -277,11 +277,7 @@ fn the_reference_draws_the_same() {
         let mut scene = scene.clone();
         scene.camera = Camera::Orthographic;
         let place = |p: DVec3| p * 20.0 + DVec3::new(50.0, 50.0, -100.0);
-        scene.objects = scene
-            .objects
-            .iter()
-            .map(|object| object.placed(20.0, place).unwrap())
-            .collect();
+        scene.objects = scene.objects.iter().map(|object| object.placed(20.0, place).unwrap()).collect();
         scene
     };
     scenes.extend(scenes.iter().map(orthographic).collect::<Vec<_>>());

@@ -58,11 +58,17 @@ pub(crate) fn grid(lower_left: DVec2, upper_right: DVec2, screen: Screen) -> (Ax
 /// The samples of a camera that looks at a target, in its window at distance 1: U = tan(fov/2)·(2i + 1 - nx)/ny, V =
 /// tan(fov/2)·(2j + 1 - ny)/ny.
 pub(crate) fn look_grid(look: &Look, screen: Screen) -> (Axis, Axis) {
-    let slope = (look.field_of_view().to_radians() / 2.0).tan();
+    let slope = half_angle_slope(look.field_of_view());
     let (width, height) = (f64::from(screen.width()), f64::from(screen.height()));
     let step = 2.0 * slope / height;
     let axis = |samples: f64| Axis { start: slope * (1.0 - samples) / height, step };
     (axis(width), axis(height))
+}
+
+/// tan(angle/2) of an angle in degrees above 0 and below 180. The complement of a wide angle is known better than the angle.
+fn half_angle_slope(degrees: f64) -> f64 {
+    let tangent = |degrees: f64| libm::tan(degrees.to_radians() / 2.0);
+    if degrees <= 90.0 { tangent(degrees) } else { 1.0 / tangent(180.0 - degrees) }
 }
 
 /// The ray of column `i` from the left and row `j` from the bottom, which may be fractions: its origin, and its direction
@@ -111,6 +117,15 @@ impl Rays {
         }
     }
 
+    /// The same in coordinates whose origin is the eye.
+    pub(crate) fn with_eye_at_origin(mut self) -> Self {
+        match &mut self {
+            Self::Parallel => {}
+            Self::Pinhole { eye, .. } => *eye = DVec3::ZERO,
+        }
+        self
+    }
+
     /// The ray of column `i` from the left and row `j` from the bottom, which may be fractions.
     pub(crate) fn ray(&self, i: f64, j: f64) -> Ray {
         match *self {
@@ -151,6 +166,24 @@ mod tests {
         assert_eq!(rays.ray(-0.5, 1.5).direction, unit(DVec3::new(-1.5, 4.0, -1.0)));
         let parallel = Rays::new(&Camera::Orthographic, screen);
         assert_eq!(parallel.ray(1.5, 0.25).origin, DVec3::new(1.5, 0.25, 0.0));
+    }
+
+    #[test]
+    fn rays_of_a_look_go_through_square_pixels() {
+        let look = Look::new(DVec3::Z, DVec3::ZERO, 90.0, None).unwrap();
+        let rays = Rays::new(&Camera::Look(look), Screen::new(4, 2).unwrap());
+        let check = |i: f64, j: f64, x: f64, y: f64| {
+            let expected = unit(DVec3::new(x, y, -1.0));
+            assert!((rays.ray(i, j).direction - expected).length() < 1e-15, "{i} {j}");
+        };
+        check(0.0, 0.0, -1.5, -0.5);
+        check(3.0, 1.0, 1.5, 0.5);
+        check(1.5, 0.5, 0.0, 0.0);
+        for degrees in [1e-300, 1.0, 90.0, 120.0, 179.0, 179.999_999_999_999_97] {
+            let slope = half_angle_slope(degrees);
+            assert!(slope > 0.0 && slope.is_finite(), "{degrees}");
+        }
+        assert!((half_angle_slope(120.0) - 3f64.sqrt()).abs() < 1e-15);
     }
 
     #[test]

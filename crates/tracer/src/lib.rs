@@ -38,7 +38,7 @@ use rayfold_scene::Scene;
 /// Raised whenever any scene's pixels change, so that a picture can be known to be out of date.
 pub const PIXEL_VERSION: u32 = 1;
 
-/// How often light is mirrored before the mirror term is dropped, in the language.
+/// How often light is mirrored before the mirror term is dropped, where a script does not say it.
 pub const MAX_BOUNCES: u32 = 5;
 
 /// The numbers that a picture is computed with.
@@ -68,14 +68,13 @@ pub struct RenderOptions<'a> {
     pub tile: Option<(u32, u32)>,
     /// Whether to look for objects down a tree; always done for more than 64 objects.
     pub tree: Option<bool>,
-    /// How often light is mirrored before the mirror term is dropped: [`MAX_BOUNCES`], which is the language's, when not
-    /// set.
+    /// How many mirrorings and refractions are followed: the scene's own depth when not set.
     pub bounces: Option<u32>,
 }
 
 impl RenderOptions<'_> {
-    pub(crate) fn bounces(&self) -> u32 {
-        self.bounces.unwrap_or(MAX_BOUNCES)
+    pub(crate) fn bounces(&self, scene: &Scene) -> u32 {
+        self.bounces.unwrap_or(scene.depth.bounces())
     }
 }
 

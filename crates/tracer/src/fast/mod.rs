@@ -122,6 +122,9 @@ fn has_kernels(_: &RenderOptions) -> bool {
 
 /// The precision that [`Precision::Auto`] stands for in a scene.
 pub(crate) fn precision(scene: &Scene) -> Precision {
+    if !supported::is_drawn_by_kernels(scene) {
+        return Precision::F64;
+    }
     let geometry = Geometry::new(scene, None).ok();
     let resolved =
         geometry.and_then(|geometry| precision::resolve(&RenderOptions::default(), &geometry, scene));
@@ -135,11 +138,6 @@ pub(crate) fn precision(scene: &Scene) -> Precision {
 #[cfg(feature = "accuracy")]
 pub(crate) fn render_naive(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     Setup::<f32>::new(scene, &Geometry::new(scene, options.tree)?, options)?.draw::<naive::Naive>()
-}
-
-/// How often light is mirrored before the mirror term is dropped.
-fn bounces(scene: &Scene, options: &RenderOptions) -> u32 {
-    options.bounces.unwrap_or(scene.depth.bounces())
 }
 
 /// What a kernel needs to draw a scene.
@@ -177,7 +175,7 @@ impl<'a, E: Real> Setup<'a, E> {
         let size = (scene.screen.width(), scene.screen.height());
         let background = levels(scene.background.colors().0, scene.tone);
         let level = options.level.unwrap_or_else(Level::new);
-        let bounces = bounces(scene, options);
+        let bounces = options.bounces(scene);
         // Boxed: it is passed from band to band by value.
         bands(
             scene.screen,

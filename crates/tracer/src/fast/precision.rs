@@ -9,7 +9,6 @@
 use rayfold_scene::Scene;
 
 use super::coincidence::surfaces_blur;
-use super::bounces;
 use super::geometry::{Geometry, View};
 use super::placed::{Placed, Sight};
 use super::real::Real;
@@ -53,7 +52,7 @@ const DOUBLE: Range = Range { least: 1e-100, most: 1e100, count: 1 << 32 };
 
 /// The numbers that are meant by a setting: never [`Precision::Auto`], and none if no kernel can hold the scene.
 pub(super) fn resolve(options: &RenderOptions, geometry: &Geometry, scene: &Scene) -> Option<Precision> {
-    let colors = Colors::of(scene, bounces(scene, options));
+    let colors = Colors::of(scene, options.bounces(scene));
     if !DOUBLE.holds(geometry, scene, &colors) {
         return None;
     }

@@ -17,7 +17,7 @@ use super::lights::sun::{Direction, Outline, Outlines, Sun};
 use super::lists::LISTED;
 use super::rays::Rays;
 use super::real::Real;
-use super::shapes::{self, Obstacles, Shape, Shapes, Solid, Sorted};
+use super::shapes::{Obstacles, Shape, Shapes, Solid, Sorted};
 use super::sights::Sights;
 use super::sky::Sky;
 use super::tree::{Tree, stump};
@@ -108,6 +108,7 @@ impl<E: Real> Prepared<E> {
         for (place, solid) in solids.iter().enumerate() {
             let of_kind = sorted.of_mut(solid.shape.kind());
             let entry = &mut entries[solid.order as usize];
+            entry.kind = solid.shape.kind();
             entry.index = of_kind.len() as u32;
             needs.mirrors |= entry.mirrors;
             of_kind.push(place as u32);
@@ -162,10 +163,11 @@ fn narrow<E: Real>(v: DVec3) -> [E; 3] {
     v.to_array().map(E::narrow)
 }
 
+/// Its place is known once the solids are sorted; what can never be hit has none.
 fn entry<E: Real>(object: &Object) -> Entry<E> {
     let material = object.material();
     Entry {
-        kind: shapes::kind(object),
+        kind: Kind::Sphere,
         index: 0,
         mirrors: material.mirror() != DVec3::ZERO,
         ambient: narrow(material.ambient()),

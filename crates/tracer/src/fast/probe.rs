@@ -16,6 +16,7 @@ use super::prepare::Prepared;
 use super::real::{Lanes, Real, Vec3};
 use super::search::nearest;
 use super::shape::Robust;
+use super::supported::is_drawn_by_kernels;
 use super::surfaces::surface;
 use crate::{Precision, RenderError, RenderOptions};
 
@@ -42,6 +43,11 @@ pub fn nearest_hits(
     rays: &[(DVec3, DVec3)],
     options: &RenderOptions,
 ) -> Result<Vec<Option<Found>>, RenderError> {
+    let one_by_one =
+        || rays.iter().map(|&(origin, direction)| one_by_one(scene, origin, direction)).collect();
+    if !is_drawn_by_kernels(scene) {
+        return Ok(one_by_one());
+    }
     let geometry = Geometry::new(scene, options.tree)?;
     match resolve(options, &geometry, scene) {
         Some(Precision::F64) => probe::<f64>(scene, &geometry, rays, options, |batch, level, out| {
@@ -50,11 +56,11 @@ pub fn nearest_hits(
         Some(_) => probe::<f32>(scene, &geometry, rays, options, |batch, level, out| {
             on!(level, simd => batch.nearest(simd, out));
         }),
-        None => Ok(rays.iter().map(|&(origin, direction)| one_by_one(scene, origin, direction)).collect()),
+        None => Ok(one_by_one()),
     }
 }
 
-/// As pictures are traced whose numbers no kernel can hold.
+/// As pictures are traced that have something, or numbers, that no kernel can hold.
 fn one_by_one(scene: &Scene, origin: DVec3, direction: DVec3) -> Option<Found> {
     let hit = crate::reference::nearest(&scene.objects, origin, direction)?;
     Some(Found { object: hit.object, distance: hit.distance, normal: hit.surface.normal })

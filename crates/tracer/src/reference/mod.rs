@@ -15,20 +15,28 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod glass;
+mod light;
+mod noise;
+mod pattern;
+mod shading;
 mod shapes;
-
-use std::borrow::Cow;
+mod tone;
+mod world;
 
 use glam::DVec3;
 use image::RgbImage;
-use rayfold_scene::{Camera, Light, Object, Pinhole, Scene, model::unit};
+use rayfold_scene::{Object, Scene};
 
 pub use shapes::Surface;
 pub(crate) use shapes::{normal_and_width, power, triangle_normal};
+pub(crate) use tone::levels;
 
-use crate::camera::{Ray, Rays};
+use crate::camera::Ray;
 use crate::parallel::{CHANNELS, bands};
-use crate::{MAX_BOUNCES, RenderError, RenderOptions};
+use crate::{RenderError, RenderOptions};
+use shading::Shader;
+use world::World;
 
 /// Where a ray meets an object first.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,9 +54,9 @@ pub struct Hit {
 /// # Errors
 /// Those of [`crate::render`].
 pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    let scene = &*recentred(scene);
-    let rays = Rays::new(&scene.camera, scene.screen);
-    bands(
+    let world = World::new(scene);
+    let shader = Shader { world: &world, cancel: options.cancel };
+    let image = bands(
         scene.screen,
         1,
         options,
@@ -56,97 +64,35 @@ pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, Render
         |(), row, band| {
             let j = scene.screen.height() - 1 - row;
             for (pixel, i) in band.chunks_exact_mut(CHANNELS).zip(0u32..) {
-                pixel.copy_from_slice(&levels(color_along(
-                    scene,
-                    rays.ray(f64::from(i), f64::from(j)),
-                    options.bounces(),
-                )));
+                let ray = world.rays.ray(f64::from(i), f64::from(j));
+                let color = shader.color(ray, options.bounces(scene));
+                pixel.copy_from_slice(&tone::toned(scene.tone, color));
             }
         },
-    )
+    )?;
+    // A pixel of much glass is given up halfway.
+    if shader.is_cancelled() { Err(RenderError::Cancelled) } else { Ok(image) }
 }
 
 /// The colour of a pixel, unclamped; `i` counts from the left, `j` from the bottom.
 pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
-    let scene = &*recentred(scene);
-    color_along(scene, Rays::new(&scene.camera, scene.screen).ray(f64::from(i), f64::from(j)), MAX_BOUNCES)
+    let world = World::new(scene);
+    let ray = world.rays.ray(f64::from(i), f64::from(j));
+    Shader { world: &world, cancel: None }.color(ray, scene.depth.bounces())
 }
 
-/// The nearest hit of a ray; of hits at the same distance, that of the object which comes first.
+/// The nearest hit of a ray; of hits at the same distance one without glass, and of those that of the object which comes
+/// first.
 ///
 /// `direction` is of unit length.
 pub fn nearest(objects: &[Object], origin: DVec3, direction: DVec3) -> Option<Hit> {
     let ray = Ray { origin, direction };
-    let mut best: Option<(usize, f64)> = None;
-    for (index, object) in objects.iter().enumerate() {
-        if let Some(distance) = shapes::distance(object, ray)
-            && best.is_none_or(|(_, least)| distance < least)
-        {
-            best = Some((index, distance));
-        }
+    if objects.iter().any(|object| matches!(object, Object::Instance(_))) {
+        let objects: Vec<Object> = objects.iter().map(|o| shapes::in_world(o).into_owned()).collect();
+        world::nearest(&objects, ray)
+    } else {
+        world::nearest(objects, ray)
     }
-    let (object, distance) = best?;
-    Some(Hit { object, distance, surface: shapes::surface(&objects[object], ray, distance) })
-}
-
-/// The scene with the eye at the origin: what is seen then has coordinates as small as it is near, wherever all of it
-/// lies. As it is, where it cannot be moved, or where rounding would take the eye through a sphere's surface.
-fn recentred(scene: &Scene) -> Cow<'_, Scene> {
-    moved_to_eye(scene).map_or(Cow::Borrowed(scene), Cow::Owned)
-}
-
-fn moved_to_eye(scene: &Scene) -> Option<Scene> {
-    let Camera::Pinhole(p) = scene.camera else { return None };
-    let mut moved = scene.clone();
-    let objects = scene.objects.iter().map(|object| shapes::seen_from(object, p.eye()));
-    moved.objects = objects.collect::<Option<Vec<_>>>()?.into();
-    let eye = Pinhole::new(DVec3::ZERO, p.gaze(), p.up(), p.distance(), p.lower_left(), p.upper_right());
-    moved.camera = Camera::Pinhole(eye.ok()?);
-    Some(moved)
-}
-
-/// `bounces` more mirrorings are followed.
-fn color_along(scene: &Scene, ray: Ray, bounces: u32) -> DVec3 {
-    let Some(hit) = nearest(&scene.objects, ray.origin, ray.direction) else {
-        return scene.background.along(ray.direction);
-    };
-    let material = scene.objects[hit.object].material();
-    let normal = hit.surface.normal;
-    let start = hit.surface.point + hit.surface.offset * normal;
-    let mut color = material.ambient();
-    for light in scene.lights.iter() {
-        let Light::Directional(light) = light else { todo!("the reference draws {light:?}") };
-        let towards = -unit(light.direction());
-        let cosine = normal.dot(towards);
-        let lit = cosine > 0.0
-            && !scene
-                .objects
-                .iter()
-                .any(|object| shapes::distance(object, Ray { origin: start, direction: towards }).is_some());
-        if lit {
-            color = held(color + light.color() * material.diffuse() * cosine);
-        }
-    }
-    if bounces > 0 && material.mirror() != DVec3::ZERO {
-        // The normal faces the ray; where rounding says otherwise, the ray grazes.
-        let towards_surface = ray.direction.dot(normal).min(0.0);
-        let direction = (ray.direction - 2.0 * towards_surface * normal).normalize();
-        let mirrored = color_along(scene, Ray { origin: start, direction }, bounces - 1);
-        color = held(color + material.mirror() * mirrored);
-    }
-    color
-}
-
-/// The largest number instead of infinity, from which nothing could be taken away.
-fn held(color: DVec3) -> DVec3 {
-    color.clamp(DVec3::MIN, DVec3::MAX)
-}
-
-/// Display values to the levels of a channel.
-pub(crate) fn levels(color: DVec3) -> [u8; CHANNELS] {
-    #[cfg(feature = "accuracy")]
-    crate::nans::add(color.is_nan_mask().bitmask().count_ones());
-    color.to_array().map(|channel| (255.0 * channel.clamp(0.0, 1.0)).round() as u8)
 }
 
 #[cfg(test)]
@@ -154,7 +100,7 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use glam::DVec2;
-    use rayfold_scene::{DirectionalLight, Material, Screen, Sphere};
+    use rayfold_scene::{Camera, DirectionalLight, Light, Material, Pinhole, Screen, Sphere};
 
     use super::*;
 
@@ -221,12 +167,6 @@ mod tests {
             scene.camera = Camera::Pinhole(away);
             assert_eq!(color(&scene, 0, 0) == DVec3::splat(0.5), inside, "{radius}");
         }
-    }
-
-    #[test]
-    fn levels_are_rounded_and_clamped() {
-        assert_eq!(levels(DVec3::new(-1.0, 0.499 / 255.0, 0.501 / 255.0)), [0, 0, 1]);
-        assert_eq!(levels(DVec3::new(2.0, f64::INFINITY, f64::NEG_INFINITY)), [255, 255, 0]);
     }
 
     #[test]

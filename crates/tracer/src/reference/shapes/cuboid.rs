@@ -28,7 +28,7 @@ impl Shape for Cuboid {
         point[axis] = if forwards == entering { min[axis] } else { max[axis] };
         let normal = if forwards { -DVec3::AXES[axis] } else { DVec3::AXES[axis] };
         let largest = min.abs().max(max.abs()).max_element();
-        Surface { point, normal, offset: 16.0 * ROUNDOFF * largest }
+        Surface { point, normal, offset: 16.0 * ROUNDOFF * largest, flat: true, within: !entering }
     }
 
     fn seen_from(&self, eye: DVec3) -> Option<Object> {

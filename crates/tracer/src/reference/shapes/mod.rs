@@ -3,13 +3,22 @@
 //! A shape is a file. Bounds on rounding errors are multiples of the unit roundoff and of the largest number that took
 //! part.
 
+mod cone;
 mod cuboid;
+mod cylinder;
+mod disc;
+mod frustum;
+mod instance;
+mod plane;
 mod sphere;
+mod torus;
 mod triangle;
+mod twofold;
 
 use glam::DVec3;
 use rayfold_scene::Object;
 
+pub(crate) use instance::in_world;
 pub(crate) use sphere::power;
 pub(crate) use triangle::{normal_and_width, triangle_normal};
 
@@ -28,6 +37,10 @@ pub struct Surface {
     pub normal: DVec3,
     /// `point + offset * normal` lies outside the object for certain, whatever the rounding.
     pub offset: f64,
+    /// Whether it is a face, a cap or a flat object.
+    pub flat: bool,
+    /// Whether the ray came there from within the object; never for what has no inside.
+    pub within: bool,
 }
 
 /// What the tracer asks of a shape.
@@ -51,12 +64,12 @@ fn shape(object: &Object) -> &dyn Shape {
         Object::Sphere(sphere) => sphere,
         Object::Triangle(triangle) => triangle,
         Object::Cuboid(cuboid) => cuboid,
-        Object::Plane(_)
-        | Object::Disc(_)
-        | Object::Cylinder(_)
-        | Object::Cone(_)
-        | Object::Torus(_)
-        | Object::Instance(_) => todo!("the reference draws {object:?}"),
+        Object::Plane(plane) => plane,
+        Object::Disc(disc) => disc,
+        Object::Cylinder(cylinder) => cylinder,
+        Object::Cone(cone) => cone,
+        Object::Torus(torus) => torus,
+        Object::Instance(instance) => instance,
     }
 }
 

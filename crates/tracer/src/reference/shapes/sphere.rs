@@ -35,10 +35,11 @@ impl Shape for Sphere {
 
     fn surface(&self, ray: Ray, distance: f64) -> Surface {
         let outward = (ray.origin - self.center() + distance * ray.direction).normalize();
-        let normal = if power(ray.origin, self, 1.0) > 0.0 { outward } else { -outward };
+        let outside = power(ray.origin, self, 1.0) > 0.0;
+        let normal = if outside { outward } else { -outward };
         let largest = self.center().abs().max_element() + self.radius();
         let point = self.center() + self.radius() * outward;
-        Surface { point, normal, offset: 16.0 * ROUNDOFF * largest }
+        Surface { point, normal, offset: 16.0 * ROUNDOFF * largest, flat: false, within: !outside }
     }
 
     fn seen_from(&self, eye: DVec3) -> Option<Object> {
@@ -110,7 +111,11 @@ mod tests {
         let exact = square(0.6) + square(0.8) - square(1.0);
         assert_eq!(just_inside, exact as f64 * 2f64.powi(-106));
         assert_eq!(
-            power(DVec3::new(3.0, 4.0, 0.0), &Sphere::new(5.0, DVec3::ZERO, *unit.material()).unwrap(), 1.0),
+            power(
+                DVec3::new(3.0, 4.0, 0.0),
+                &Sphere::new(5.0, DVec3::ZERO, unit.material().clone()).unwrap(),
+                1.0
+            ),
             0.0
         );
     }

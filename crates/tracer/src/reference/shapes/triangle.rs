@@ -34,7 +34,7 @@ impl Shape for Triangle {
         let near = ray.origin + distance * ray.direction;
         let point = near - (near - corner).dot(normal) * normal;
         let largest = self.vertices().iter().fold(ray.origin.abs(), |m, v| m.max(v.abs())).max_element();
-        Surface { point, normal, offset: 32.0 * ROUNDOFF * largest }
+        Surface { point, normal, offset: 32.0 * ROUNDOFF * largest, flat: true, within: false }
     }
 
     fn seen_from(&self, eye: DVec3) -> Option<Object> {

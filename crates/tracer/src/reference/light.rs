@@ -1,0 +1,145 @@
+//! What arrives at a surface from a light.
+
+use glam::DVec3;
+use rayfold_scene::model::unit;
+use rayfold_scene::{Lamp, Light, Object, Shine};
+
+use super::shapes::{self, Surface};
+use super::world::{World, glass, nearest};
+use crate::camera::Ray;
+use crate::scale::below_inverse;
+
+/// The rounding of a lamp's place beside that of a surface, in roundoffs.
+const LAMP: f64 = 8.0 * f64::EPSILON;
+
+/// Where light comes from, seen from a hit.
+pub(super) struct Arriving {
+    /// Unit vector towards the light.
+    pub(super) towards: DVec3,
+    /// If nothing stands in its way.
+    pub(super) color: DVec3,
+    /// Where it ends; `None` for a light at infinity.
+    lamp: Option<DVec3>,
+}
+
+/// `None` for a lamp at the hit itself.
+pub(super) fn arriving(light: &Light, surface: &Surface) -> Option<Arriving> {
+    match light {
+        Light::Directional(sun) => {
+            Some(Arriving { towards: -unit(sun.direction()), color: sun.color(), lamp: None })
+        }
+        Light::Lamp(lamp) => from_lamp(lamp, lamp.position(), surface),
+    }
+}
+
+/// From a `place` of the lamp's ball.
+fn from_lamp(lamp: &Lamp, place: DVec3, surface: &Surface) -> Option<Arriving> {
+    let towards = place - surface.point;
+    if length(towards) <= surface.offset {
+        return None;
+    }
+    let color = if lamp.reach() > 0.0 {
+        let distance = length(lamp.position() - surface.point);
+        if distance <= surface.offset {
+            return None;
+        }
+        let part = lamp.reach() / distance;
+        held(lamp.color() * (part * part).min(f64::MAX))
+    } else {
+        lamp.color()
+    };
+    Some(Arriving { towards: unit(towards), color, lamp: Some(place) })
+}
+
+/// The length of a vector whose square may be beyond all numbers.
+fn length(v: DVec3) -> f64 {
+    let scale = below_inverse(v.abs().max_element());
+    (v * scale).length() / scale
+}
+
+impl Arriving {
+    /// What is left of white light on its way to `start`, which is off the surface; `None` if something stands in the way.
+    pub(super) fn let_through(&self, world: &World, start: DVec3) -> Option<DVec3> {
+        if !world.has_glass {
+            let hidden = world.objects.iter().any(|object| self.is_hidden_by(object, self.ray(start)));
+            return (!hidden).then_some(DVec3::ONE);
+        }
+        let mut left = DVec3::ONE;
+        let mut ray = self.ray(start);
+        while let Some(hit) = nearest(&world.objects, ray) {
+            let object = &world.objects[hit.object];
+            if !self.is_before(ray, hit.distance, &hit.surface) {
+                break;
+            }
+            left = held(left * glass(object)?.color());
+            // Surfaces at the same distance are passed with it.
+            let Surface { point, normal, offset, .. } = hit.surface;
+            ray.origin = point - offset * normal;
+        }
+        Some(left)
+    }
+
+    fn ray(&self, start: DVec3) -> Ray {
+        Ray { origin: start, direction: self.lamp.map_or(self.towards, |lamp| unit(lamp - start)) }
+    }
+
+    fn is_hidden_by(&self, object: &Object, ray: Ray) -> bool {
+        shapes::distance(object, ray).is_some_and(|distance| {
+            self.lamp.is_none() || self.is_before(ray, distance, &shapes::surface(object, ray, distance))
+        })
+    }
+
+    /// Whether a surface lies before the light: one at the very place of a lamp does not.
+    fn is_before(&self, ray: Ray, distance: f64, surface: &Surface) -> bool {
+        let Some(lamp) = self.lamp else { return true };
+        let apart = (lamp - surface.point).dot(surface.normal).abs();
+        distance < length(lamp - ray.origin) && apart > 2.0 * surface.offset + LAMP * lamp.abs().max_element()
+    }
+}
+
+/// The highlight of light `towards` which is seen from `towards_eye`, both unit vectors: max(0, N·h)ⁿ for the vector h
+/// halfway between them.
+pub(super) fn highlight(shine: &Shine, normal: DVec3, towards: DVec3, towards_eye: DVec3) -> f64 {
+    let sum = towards + towards_eye;
+    if sum == DVec3::ZERO {
+        return 0.0;
+    }
+    let halfway = unit(sum);
+    let cosine = normal.dot(halfway);
+    if cosine <= 0.0 {
+        0.0
+    } else if cosine < STEEP {
+        libm::pow(cosine, shine.exponent())
+    } else {
+        // From the sine, which is small and therefore known better: cosⁿ = (1 - sin²)^(n/2).
+        let sine = normal.cross(halfway).length_squared();
+        libm::exp(0.5 * shine.exponent() * libm::log1p(-sine.min(1.0)))
+    }
+}
+
+/// The largest number instead of infinity, from which nothing could be taken away.
+pub(super) fn held(color: DVec3) -> DVec3 {
+    color.clamp(DVec3::MIN, DVec3::MAX)
+}
+
+/// Above this cosine the sine says more.
+const STEEP: f64 = 0.9;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_highlight_is_sharp_however_large_its_exponent() {
+        let at = |exponent: f64, angle: f64| {
+            let shine = Shine::new(DVec3::ONE, exponent).unwrap();
+            let towards = DVec3::new(libm::sin(angle), libm::cos(angle), 0.0);
+            highlight(&shine, DVec3::Y, towards, towards)
+        };
+        assert!((at(2.0, 1.0) - libm::cos(1.0).powi(2)).abs() < 1e-15);
+        assert!((at(3.0, 0.1) - libm::cos(0.1).powi(3)).abs() < 1e-15);
+        assert_eq!((at(1e300, 0.0), at(1e300, 1e-9), at(5.0, 2.0)), (1.0, 0.0, 0.0));
+        // cosⁿ(1e-6) for n = 1e12 is e^(-1/2).
+        assert!((at(1e12, 1e-6) - libm::exp(-0.5)).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,110 @@
+//! A scene as the plain tracer sees it: with the eye at the origin, and groups written out where that is exact.
+
+use std::borrow::Cow;
+
+use glam::DVec3;
+use rayfold_scene::{Camera, Glass, Lamp, Light, Object, Scene};
+
+use super::Hit;
+use super::shapes::{self, Surface};
+use crate::camera::{Ray, Rays};
+
+/// What rays are sent through.
+pub(super) struct World<'a> {
+    /// As the script has it.
+    pub(super) scene: &'a Scene,
+    pub(super) rays: Rays,
+    /// In the order of the script, in coordinates whose origin is `center`.
+    pub(super) objects: Cow<'a, [Object]>,
+    /// The same.
+    pub(super) lights: Cow<'a, [Light]>,
+    /// Where the origin of these coordinates lies in those of the script.
+    center: DVec3,
+    pub(super) has_glass: bool,
+}
+
+impl<'a> World<'a> {
+    /// With the eye at the origin: what is seen then has coordinates as small as it is near, wherever all of it lies. As it
+    /// is, where it cannot be moved, or where rounding would take the eye through a surface.
+    pub(super) fn new(scene: &'a Scene) -> Self {
+        let rays = Rays::new(&scene.camera, scene.screen);
+        let has_groups = scene.objects.iter().any(|object| matches!(object, Object::Instance(_)));
+        let objects: Cow<[Object]> = if has_groups {
+            scene.objects.iter().map(|object| shapes::in_world(object).into_owned()).collect()
+        } else {
+            Cow::Borrowed(&scene.objects)
+        };
+        let world = Self {
+            scene,
+            rays,
+            objects,
+            lights: Cow::Borrowed(&scene.lights),
+            center: DVec3::ZERO,
+            has_glass: scene.objects.iter().any(|object| glass(object).is_some()),
+        };
+        world.seen_from_eye().unwrap_or(world)
+    }
+
+    fn seen_from_eye(&self) -> Option<Self> {
+        let eye = match &self.scene.camera {
+            Camera::Orthographic => return None,
+            Camera::Pinhole(pinhole) => pinhole.eye(),
+            Camera::Look(look) => look.eye(),
+        };
+        let objects = self.objects.iter().map(|object| shapes::seen_from(object, eye));
+        let lights = self.lights.iter().map(|light| match light {
+            Light::Directional(_) => Some(*light),
+            Light::Lamp(lamp) => {
+                let position = lamp.position() - eye;
+                Lamp::new(lamp.color(), position, lamp.radius(), lamp.reach()).ok().map(Light::Lamp)
+            }
+        });
+        Some(Self {
+            objects: objects.collect::<Option<Vec<_>>>()?.into(),
+            lights: lights.collect::<Option<Vec<_>>>()?.into(),
+            rays: self.rays.with_eye_at_origin(),
+            center: eye,
+            ..*self
+        })
+    }
+
+    pub(super) fn nearest(&self, ray: Ray) -> Option<Hit> {
+        nearest(&self.objects, ray)
+    }
+
+    /// Where a surface is hit, and its normal, in the coordinates of its object's numbers; and the object, which is not an
+    /// instance.
+    pub(super) fn in_script(&self, object: usize, surface: &Surface) -> (&Object, DVec3, DVec3) {
+        let Object::Instance(of_group) = &self.scene.objects[object] else {
+            return (&self.scene.objects[object], surface.point + self.center, surface.normal);
+        };
+        // As it is drawn, where it is drawn as an instance: nearer to the eye.
+        let placed = match &self.objects[object] {
+            Object::Instance(drawn) => drawn.placement().local_point(surface.point),
+            _ => of_group.placement().local_point(surface.point + self.center),
+        };
+        (of_group.object(), placed, of_group.placement().rotation().transpose() * surface.normal)
+    }
+}
+
+/// The nearest hit; see [`super::nearest`]. No object is an instance that could be moved into the world.
+pub(super) fn nearest(objects: &[Object], ray: Ray) -> Option<Hit> {
+    let mut best: Option<(usize, f64)> = None;
+    for (index, object) in objects.iter().enumerate() {
+        let Some(distance) = shapes::distance(object, ray) else { continue };
+        let is_before = best.is_none_or(|(other, least)| {
+            distance < least
+                || distance == least && glass(object).is_none() && glass(&objects[other]).is_some()
+        });
+        if is_before {
+            best = Some((index, distance));
+        }
+    }
+    let (object, distance) = best?;
+    Some(Hit { object, distance, surface: shapes::surface(&objects[object], ray, distance) })
+}
+
+/// What an object lets through.
+pub(super) fn glass(object: &Object) -> Option<Glass> {
+    object.material().finish().and_then(|finish| finish.glass)
+}
