@@ -70,6 +70,9 @@ pub(super) trait Features<E: Real>: 'static {
     /// Whether it looks on lists and down a tree, and not by masks.
     const TREE: bool;
 
+    /// Whether surfaces can be those of bodies.
+    const BODIES: bool = false;
+
     /// A kind that is one of [`Self::KINDS`], so that the compiler knows that it is.
     #[inline(always)]
     fn one_of_these(kind: Kind) -> Kind {
@@ -99,6 +102,17 @@ impl<E: Real, By: Formulas<E>, const CUBOIDS: bool, const TRIANGLES: bool, const
 
 /// All kinds, any number.
 pub(super) type Everything<By> = Variant<By, true, true, true>;
+
+/// All kinds, any number, and bodies.
+pub(super) struct Anything<By>(PhantomData<By>);
+
+impl<E: Real, By: Formulas<E>> Features<E> for Anything<By> {
+    type By = By;
+
+    const KINDS: ByKind<bool> = BUILT.kinds;
+    const TREE: bool = BUILT.tree;
+    const BODIES: bool = true;
+}
 
 /// What pictures are drawn with.
 pub(super) trait Kernel<E: Real>: 'static {

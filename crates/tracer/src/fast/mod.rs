@@ -5,6 +5,8 @@
 //! [`geometry`] has recentred and scaled it.
 
 mod band;
+mod beyond;
+mod bodies;
 mod bounce;
 mod bounds;
 mod candidates;
@@ -12,6 +14,7 @@ mod coincidence;
 mod dispatch;
 mod exact;
 mod features;
+mod finish;
 mod geometry;
 mod kind;
 mod light;

@@ -6,8 +6,9 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use rayfold_scene::{Object, Scene};
+use rayfold_scene::{Material, Object, Scene};
 
+use super::beyond::Beyond;
 use super::candidates::{Candidates, MASKED, Masks};
 use super::features::Needs;
 use super::geometry::{Geometry, View};
@@ -51,6 +52,8 @@ pub(super) struct Entry<E> {
     /// Position in the array of its kind.
     pub(super) index: u32,
     pub(super) mirrors: bool,
+    /// Whether the position is that of a body.
+    pub(super) is_body: bool,
     pub(super) ambient: [E; 3],
     pub(super) diffuse: [E; 3],
     pub(super) mirror: [E; 3],
@@ -75,6 +78,8 @@ pub(super) struct Prepared<E> {
     pub(super) sky: Option<Sky<E>>,
     /// What it has.
     pub(super) needs: Needs,
+    /// What few scenes have.
+    pub(super) beyond: Option<Beyond<E>>,
 }
 
 impl<E: Real> Prepared<E> {
@@ -113,6 +118,13 @@ impl<E: Real> Prepared<E> {
             needs.mirrors |= entry.mirrors;
             of_kind.push(place as u32);
         }
+        let beyond = Beyond::new(scene, geometry);
+        for (order, at) in beyond.iter().flat_map(|beyond| beyond.bodies.places()) {
+            let entry = &mut entries[order];
+            entry.is_body = true;
+            entry.index = at as u32;
+            needs.mirrors |= entry.mirrors;
+        }
         let counts = ByKind::new(|kind| sorted.of(kind).len());
         let row = Row::new(counts);
         needs.kinds = ByKind::new(|kind| *counts.of(kind) > 0);
@@ -140,10 +152,19 @@ impl<E: Real> Prepared<E> {
             needs,
             background: narrow(scene.background.colors().0),
             sky: Sky::new(scene.background),
-            tree: branches.map(|branches| Tree::new(branches, solids, |order| entries[order as usize].index)),
+            tree: branches.map(|branches| {
+                Tree::new(branches, solids, |place| entries[solids[place].order as usize].index)
+            }),
             sights,
             entries,
+            beyond,
         })
+    }
+
+    /// Whether there is nothing to be seen but what masks, lists and trees hold, on a background of one colour.
+    #[inline(always)]
+    pub(super) fn is_plain(&self) -> bool {
+        self.sky.is_none() && self.beyond.is_none()
     }
 
     /// All objects: by masks, or by all that is in the tree.
@@ -169,11 +190,18 @@ fn entry<E: Real>(object: &Object) -> Entry<E> {
     Entry {
         kind: Kind::Sphere,
         index: 0,
-        mirrors: material.mirror() != DVec3::ZERO,
+        is_body: false,
+        mirrors: mirrors(material),
         ambient: narrow(material.ambient()),
         diffuse: narrow(material.diffuse()),
         mirror: narrow(material.mirror()),
     }
+}
+
+/// Whether it is a mirror anywhere.
+fn mirrors(material: &Material) -> bool {
+    let other = || material.finish()?.pattern.map(|pattern| pattern.other.mirror());
+    material.mirror() != DVec3::ZERO || other().is_some_and(|mirror| mirror != DVec3::ZERO)
 }
 
 /// The solids as they stand in a row, kind after kind.
