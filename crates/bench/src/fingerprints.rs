@@ -249,7 +249,7 @@ impl Dice {
         let mut objects: Vec<Object> = objects.collect::<Result<_>>()?;
         if self.one_in(5) {
             // Twice in one place: the first counts.
-            let again = objects[self.0.usize(0..count)];
+            let again = objects[self.0.usize(0..count)].clone();
             objects.push(again);
         }
         if matches!(scene.camera, Camera::Orthographic) {
@@ -307,6 +307,12 @@ mod tests {
                     Object::Sphere(_) => 0,
                     Object::Cuboid(_) => 1,
                     Object::Triangle(_) => 2,
+                    Object::Plane(_)
+                    | Object::Disc(_)
+                    | Object::Cylinder(_)
+                    | Object::Cone(_)
+                    | Object::Torus(_)
+                    | Object::Instance(_) => unreachable!("not drawn here: {object:?}"),
                 }] += 1;
             }
             few += usize::from(scene.objects.len() <= 64);

@@ -74,7 +74,7 @@ fn subjects() -> Result<Vec<Subject>> {
     let whole = table(320, 240)?;
     let only = |keep: fn(&Object) -> bool| {
         let mut scene = whole.clone();
-        scene.objects = whole.objects.iter().filter(|o| keep(o)).copied().collect();
+        scene.objects = whole.objects.iter().filter(|o| keep(o)).cloned().collect();
         scene
     };
     let unlit = |scene: &Scene| {
@@ -83,9 +83,9 @@ fn subjects() -> Result<Vec<Subject>> {
         scene
     };
     let mut one = only(is_ball);
-    one.objects = one.objects.iter().filter(|o| !is_mirror(o)).take(1).copied().collect();
+    one.objects = one.objects.iter().filter(|o| !is_mirror(o)).take(1).cloned().collect();
     let mut together = rock(1280, 320, 240)?;
-    together.objects = together.objects.iter().chain(whole.objects.iter().skip(1)).copied().collect();
+    together.objects = together.objects.iter().chain(whole.objects.iter().skip(1)).cloned().collect();
     let mut blocks = cloud(200, 320, 240)?;
     blocks.objects = blocks.objects.iter().map(boxed).collect::<Result<Vec<_>>>()?.into();
     let scenes = [

@@ -149,7 +149,7 @@ pub fn rock(count: usize, width: u32, height: u32) -> Result<Scene> {
     let faces = icosphere(count);
     let objects: Result<Vec<_>> = faces
         .iter()
-        .map(|face| Ok(Object::Triangle(Triangle::new(face.map(|p| single(wrinkled(p))), surface)?)))
+        .map(|face| Ok(Object::Triangle(Triangle::new(face.map(|p| single(wrinkled(p))), surface.clone())?)))
         .collect();
     scene.objects = objects?.into();
     scene.lights = vec![light(0.9, [-1.0, -2.0, -1.5])?].into();

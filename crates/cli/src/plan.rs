@@ -7,7 +7,7 @@ use std::ops::RangeInclusive;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use rayfold_scene::{AnimationSettings, Camera, Limits, SETTINGS_FILE, Scene, Screen, Script};
+use rayfold_scene::{AnimationSettings, Limits, SETTINGS_FILE, Scene, Screen, Script};
 use rayfold_tracer::Precision;
 
 use crate::console::Console;
@@ -233,15 +233,15 @@ impl Plan {
 impl Part {
     fn new(file: ScriptFile, script: Script, keep: bool) -> Self {
         let mut runs: Vec<(usize, Shape)> = Vec::new();
-        for scene in script.frames() {
+        for shot in script.shots() {
             let shape = Shape {
-                screen: scene.screen,
-                orthographic: matches!(scene.camera, Camera::Orthographic),
-                objects: scene.objects.len().next_power_of_two(),
+                screen: shot.screen,
+                orthographic: shot.is_orthographic,
+                objects: shot.objects.next_power_of_two(),
             };
             match runs.last_mut() {
-                Some((count, last)) if *last == shape => *count += 1,
-                _ => runs.push((1, shape)),
+                Some((count, last)) if *last == shape => *count += shot.frame_count,
+                _ => runs.push((shot.frame_count, shape)),
             }
         }
         let frames = script.frame_count();

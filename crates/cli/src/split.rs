@@ -53,9 +53,10 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let ours: BTreeSet<String> = (1..=script.frame_count()).map(name).collect();
     refuse_strangers(folder, &ours)?;
-    for (scene, number) in script.frames().zip(1..) {
+    for number in 1..=script.frame_count() {
         anyhow::ensure!(!interrupt::stopping(), "interrupted");
-        OutputFile::write(folder.join(name(number)), scene.to_string().as_bytes(), false)?;
+        let frame = script.only(number - 1).context("a frame of the script is missing")?;
+        OutputFile::write(folder.join(name(number)), frame.to_string().as_bytes(), false)?;
     }
     let first = folder.join(name(1));
     console.note(format_args!(

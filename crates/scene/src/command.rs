@@ -2,15 +2,64 @@
 //!
 //! The one list of them: each refers to its [`Form`], which stands with what the command makes.
 
-use crate::form::{Form, Scripted};
+use std::fmt;
+
+use crate::form::{Form, Names, Numbers, Scripted, Subject};
 use crate::model::{
-    Background, Cone, Cuboid, Cylinder, DirectionalLight, Disc, Lamp, Look, ORTHOCAMERA, Pinhole, Plane,
-    Screen, Sphere, Torus, Triangle,
+    Background, Camera, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Faults, FrameNumbers, Lamp,
+    Lens, Light, Look, MATERIAL, ORTHOCAMERA, Object, Pinhole, Plane, Samples, Screen, Shutter, Sphere, Tone,
+    Torus, Triangle, USE,
 };
+
+/// What a command does.
+#[derive(Clone, Copy)]
+pub(crate) enum Act {
+    /// Sets the size of the image.
+    Screen,
+    /// Sets the camera.
+    Camera(Reader<Camera>),
+    /// Sets what a ray sees that hits nothing.
+    Background,
+    /// Sets the lens.
+    Lens,
+    /// Sets the rays of a pixel.
+    Samples,
+    /// Sets how long a frame is exposed.
+    Shutter,
+    /// Sets how colours become levels.
+    Tone,
+    /// Sets how many bounces are followed.
+    Depth,
+    /// Sets which frames a `Trace` is.
+    Frames,
+    /// Names a material.
+    Material,
+    /// Starts a group.
+    Group,
+    /// Ends a group.
+    End,
+    /// Draws a group.
+    Use,
+    /// Adds an object.
+    Object(Reader<Object>),
+    /// Adds a light.
+    Light(Reader<Light>),
+    /// Removes objects and lights.
+    Clear,
+    /// Renders frames.
+    Trace,
+}
+
+/// From the numbers of a line; all that is wrong with them.
+pub(crate) type Reader<T> = fn(&mut Numbers<'_>) -> Result<T, Faults>;
+
+fn read<T: Scripted + Into<U>, U>(numbers: &mut Numbers<'_>) -> Result<U, Faults> {
+    T::read(numbers).map(Into::into)
+}
 
 /// Defines [`Command`] from its names, so that the list of all is whole.
 macro_rules! commands {
-    ($($command:ident: $form:expr, $about:literal;)*) => {
+    ($($command:ident: $form:expr, $act:expr, $about:literal;)*) => {
         /// A command of the scene language.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Command {
@@ -27,35 +76,69 @@ macro_rules! commands {
                     $(Self::$command => &const { $form },)*
                 }
             }
+
+            /// What it is for, in a few words.
+            pub const fn about(self) -> &'static str {
+                match self {
+                    $(Self::$command => $about,)*
+                }
+            }
+
+            /// What it does.
+            pub(crate) const fn act(self) -> Act {
+                match self {
+                    $(Self::$command => $act,)*
+                }
+            }
         }
     };
 }
 
+const fn group(name: &'static str) -> Form {
+    Form::new(name, &[]).with_subject(Subject::Defines(Names::Groups))
+}
+
 commands! {
-    Screen: Screen::FORM, "The size of the image.";
-    Orthocamera: ORTHOCAMERA, "A parallel projection.";
-    Camera: Pinhole::FORM, "A pinhole camera.";
-    Look: Look::FORM, "A camera that looks at a target.";
-    Background: Background::FORM, "What a ray sees that hits nothing.";
-    Sphere: Sphere::FORM, "A sphere.";
-    Triangle: Triangle::FORM, "A triangle.";
-    Cuboid: Cuboid::FORM, "A box along the axes.";
-    Plane: Plane::FORM, "A plane without end.";
-    Disc: Disc::FORM, "A flat, round disc.";
-    Cylinder: Cylinder::FORM, "A closed cylinder.";
-    Cone: Cone::FORM, "A closed cone, also cut off.";
-    Torus: Torus::FORM, "A ring.";
-    Ilight: DirectionalLight::FORM, "A light at infinity.";
-    Plight: Lamp::FORM, "A light at a place.";
-    Clear: Form::new("Clear", &[]), "Removes objects and lights.";
-    Trace: Form::new("Trace", &[]), "Renders a frame.";
+    Screen: Screen::FORM, Act::Screen, "The size of the image.";
+    Orthocamera: ORTHOCAMERA, Act::Camera(|_| Ok(Camera::Orthographic)), "A parallel projection.";
+    Camera: Pinhole::FORM, Act::Camera(read::<Pinhole, _>), "A pinhole camera.";
+    Look: Look::FORM, Act::Camera(read::<Look, _>), "A camera that looks at a target.";
+    Lens: Lens::FORM, Act::Lens, "A lens that is sharp at one distance.";
+    Background: Background::FORM, Act::Background, "What a ray sees that hits nothing.";
+    Samples: Samples::FORM, Act::Samples, "Rays of a pixel.";
+    Shutter: Shutter::FORM, Act::Shutter, "The share of a frame's time that it is exposed.";
+    Tone: Tone::FORM, Act::Tone, "From colours to levels.";
+    Depth: Depth::FORM, Act::Depth, "How many bounces are followed.";
+    Sphere: Sphere::FORM, Act::Object(read::<Sphere, _>), "A sphere.";
+    Triangle: Triangle::FORM, Act::Object(read::<Triangle, _>), "A triangle.";
+    Cuboid: Cuboid::FORM, Act::Object(read::<Cuboid, _>), "A box along the axes.";
+    Plane: Plane::FORM, Act::Object(read::<Plane, _>), "A plane without end.";
+    Disc: Disc::FORM, Act::Object(read::<Disc, _>), "A flat, round disc.";
+    Cylinder: Cylinder::FORM, Act::Object(read::<Cylinder, _>), "A closed cylinder.";
+    Cone: Cone::FORM, Act::Object(read::<Cone, _>), "A closed cone, also cut off.";
+    Torus: Torus::FORM, Act::Object(read::<Torus, _>), "A ring.";
+    Material: MATERIAL, Act::Material, "How a surface answers light, by name.";
+    Group: group("Group"), Act::Group, "Names the objects up to its `End`.";
+    End: Form::new("End", &[]), Act::End, "Ends a group.";
+    Use: USE, Act::Use, "Draws a group.";
+    Ilight: DirectionalLight::FORM, Act::Light(read::<DirectionalLight, _>), "A light at infinity.";
+    Plight: Lamp::FORM, Act::Light(read::<Lamp, _>), "A light at a place.";
+    Frames: FrameNumbers::FORM, Act::Frames, "Which frames a `Trace` is.";
+    Clear: Form::new("Clear", &[]), Act::Clear, "Removes objects and lights.";
+    Trace: Form::new("Trace", &[]), Act::Trace, "Renders a frame.";
+}
+
+impl fmt::Display for Command {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
 }
 
 /// The most numbers that a command takes.
 pub(crate) const MAX_NUMBERS: usize = {
     let (mut most, mut i) = (0, 0);
     while i < Command::ALL.len() {
-        let count = *Command::ALL[i].form().arity().end();
+        let (_, count) = Command::ALL[i].form().arity();
         most = if count > most { count } else { most };
         i += 1;
     }
@@ -84,7 +167,7 @@ impl Command {
         let distance = |c: &Self| strsim::osa_distance(&name, &c.name().to_lowercase());
         let cut_short = |c: &Self| name.chars().count() >= 3 && c.name().to_lowercase().starts_with(&name);
         let near = Self::ALL.iter().copied().min_by_key(distance)?;
-        let slips = near.name().len().div_ceil(3);
+        let slips = if near.name().len() < 5 { 1 } else { near.name().len().div_ceil(3) };
         if distance(&near) <= slips.min(name.chars().count().saturating_sub(1)) {
             return Some(near);
         }

@@ -65,6 +65,30 @@ pub enum Code {
     Unused,
     /// A number that was probably written with a comma for a point, and is two.
     DecimalComma,
+    /// A curve that is not written as one.
+    MalformedCurve,
+    /// A curve where none may stand.
+    UnwantedCurve,
+    /// A curve whose numbers become too large.
+    CurveOverflow,
+    /// A name that is not written as one, or is missing.
+    MalformedName,
+    /// A name that nothing has, or nothing before it.
+    UnknownName,
+    /// A name that is given twice.
+    DuplicateName,
+    /// A word that is no clause of a material.
+    UnknownClause,
+    /// A clause that a material has already.
+    DuplicateClause,
+    /// A pattern of a material that has more than coefficients.
+    UnfitMaterial,
+    /// A command where it may not stand: in a group, or an `End` outside of one.
+    Misplaced,
+    /// A group without an `End`.
+    UnclosedGroup,
+    /// A picture that is wider or narrower than what it shows.
+    SquashedImage,
     /// More faults than are described one by one.
     TooManyFaults,
     /// Settings that are not JSON, or not an object.

@@ -14,6 +14,7 @@
 //! ```
 
 mod command;
+mod curve;
 pub mod diagnostic;
 mod form;
 mod limits;
@@ -21,23 +22,23 @@ pub mod model;
 mod natural;
 mod parse;
 mod report;
+mod row;
 mod script;
 mod settings;
 mod shared_slice;
 mod shown;
-mod write;
 
 pub use command::Command;
 pub use diagnostic::{Code, Diagnostic, Severity};
-pub use form::{Field, Form, Kind, Unit, Values};
+pub use form::{Field, Form, Kind, Names, Presence, Subject, Together, Unit, Values};
 pub use limits::Limits;
 pub use model::{
-    Background, Camera, Coefficients, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Finish, Glass,
-    Instance, InvalidValue, Lamp, Lens, Light, Look, Material, Object, Parameter, Pattern, Pinhole,
+    Background, Camera, Clause, Coefficients, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Finish,
+    Glass, Instance, InvalidValue, Lamp, Lens, Light, Look, Material, Object, Parameter, Pattern, Pinhole,
     Placement, Plane, Samples, Scene, Screen, Shine, Shutter, Sphere, Tone, Torus, Triangle, Weight,
 };
 pub use natural::{SETTINGS_FILE, natural_cmp, script_name};
 pub use parse::{Parsed, parse};
-pub use script::Script;
+pub use script::{Script, ShotSummary};
 pub use settings::{AnimationSettings, ParsedSettings, parse_settings};
 pub use shared_slice::SharedSlice;

@@ -18,7 +18,8 @@ pub struct Limits {
     pub max_lights: usize,
     /// Pixels of an image, width times height.
     pub max_pixels: u64,
-    /// `Trace` commands of one script; `None` for any number.
+    /// Frames of one script; with `None` it may have any number of `Trace` commands, and up to [`Self::FRAMES`] frames
+    /// where `Frames` makes many of one.
     pub max_frames: Option<usize>,
     /// How many errors, and how many warnings, are described one by one. Those beyond are counted.
     pub max_described: usize,
@@ -33,6 +34,8 @@ impl Limits {
     pub const LIGHTS: usize = 1024;
     /// 64 megapixels, 8000 x 8000.
     pub const PIXELS: u64 = 64_000_000;
+    /// Eleven hours at 24 frames a second: more is a slip of the finger.
+    pub const FRAMES: u64 = 1_000_000;
     /// More than anybody reads, less than what fills the memory when every line of a large file is wrong.
     pub const DESCRIBED: usize = 100_000;
 }

@@ -85,6 +85,10 @@ impl<'a> Report<'a> {
         Self { file, max_described, kept: Vec::new(), errors: Tally::default(), warnings: Tally::default() }
     }
 
+    pub(crate) fn error_count(&self) -> usize {
+        self.errors.count
+    }
+
     pub(crate) fn has_errors(&self) -> bool {
         self.errors.count > 0
     }

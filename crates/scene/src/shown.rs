@@ -33,6 +33,21 @@ pub(crate) fn grouped(count: u64) -> String {
     grouped
 }
 
+/// The word that was probably meant: a slip or two away, in any letter case.
+pub(crate) fn nearest<'a>(word: &str, words: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    // Longer than that and it is no slip; the distance is quadratic in the length.
+    if word.len() > 40 {
+        return None;
+    }
+    let word = word.to_lowercase();
+    let near = words.map(|known| (strsim::osa_distance(&word, &known.to_lowercase()), known));
+    near.min_by_key(|(distance, _)| *distance)
+        .filter(|(distance, known)| {
+            *distance <= known.len().div_ceil(3).min(word.chars().count().saturating_sub(1))
+        })
+        .map(|(_, known)| known)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -36,13 +36,13 @@ fn a_word_that_is_like_no_command() {
     check(
         "Screen 4 3\nRotate 90 0 1 0\nTrace",
         expect![[r#"
-        error: unknown command `Rotate`
-         --> a.txt:2:1
-          |
-        2 | Rotate 90 0 1 0
-          | ^^^^^^ expected a command
-          |
-          = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Background`, `Sphere`, `Triangle`, `Box`, `Ilight`, `Clear`, `Trace`"#]],
+            error: unknown command `Rotate`
+             --> a.txt:2:1
+              |
+            2 | Rotate 90 0 1 0
+              | ^^^^^^ expected a command
+              |
+              = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Samples`, `Shutter`, `Tone`, `Depth`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`"#]],
     );
 }
 
@@ -51,29 +51,29 @@ fn a_command_that_cannot_be_seen_to_be_misspelt() {
     check(
         "Screen 4 3\n\u{feff}Clear\nTrace\u{1b}[31m",
         expect![[r#"
-        error: unknown command `\u{feff}Clear`
-         --> a.txt:2:1
-          |
-        2 | ﻿Clear
-          | ^^^^^ expected a command
-          |
-          = help: did you mean `Clear`?
+            error: unknown command `\u{feff}Clear`
+             --> a.txt:2:1
+              |
+            2 | ﻿Clear
+              | ^^^^^ expected a command
+              |
+              = help: did you mean `Clear`?
 
-        error: unknown command `Trace\u{1b}[31m`
-         --> a.txt:3:1
-          |
-        3 | Trace␛[31m
-          | ^^^^^^^^^^ expected a command
-          |
-          = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Background`, `Sphere`, `Triangle`, `Box`, `Ilight`, `Clear`, `Trace`
+            error: unknown command `Trace\u{1b}[31m`
+             --> a.txt:3:1
+              |
+            3 | Trace␛[31m
+              | ^^^^^^^^^^ expected a command
+              |
+              = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Samples`, `Shutter`, `Tone`, `Depth`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`
 
-        error: nothing is rendered: there is no `Trace`
-         --> a.txt:3:11
-          |
-        3 | Trace␛[31m
-          |           ^ expected a `Trace`
-          |
-          = help: `Trace` renders a frame of everything that stands before it"#]],
+            error: nothing is rendered: there is no `Trace`
+             --> a.txt:3:11
+              |
+            3 | Trace␛[31m
+              |           ^ expected a `Trace`
+              |
+              = help: `Trace` renders a frame of everything that stands before it"#]],
     );
 }
 
@@ -120,52 +120,52 @@ fn missing_parameters() {
     check(
         "Screen\nBackground 1 1 # red\nTrace",
         expect![[r#"
-        error: `Screen` takes 2 numbers, found none
-         --> a.txt:1:7
-          |
-        1 | Screen
-          |       ^ expected `nx` here
-          |
-          = help: write `Screen nx ny`
+            error: `Screen` takes 2 numbers, found none
+             --> a.txt:1:7
+              |
+            1 | Screen
+              |       ^ expected `nx` here
+              |
+              = help: write `Screen nx ny`
 
-        error: `Background` takes 3 numbers, found 2
-         --> a.txt:2:15
-          |
-        2 | Background 1 1 # red
-          |               ^ expected `b` here
-          |
-          = help: write `Background r g b`"#]],
+            error: `Background` takes 3 or 6 numbers, found 2
+             --> a.txt:2:15
+              |
+            2 | Background 1 1 # red
+              |               ^ expected `b` here
+              |
+              = help: write `Background r g b [R G B]`"#]],
     );
 }
 
 #[test]
 fn surplus_parameters() {
     check(
-        "Screen 4 3 Trace\nTriangle 0 0 0 1 0 0 0 1 0 1 1 1 0 0 0 .5 .5 .5\nTrace 1",
+        "Screen 4 3 Trace\nTriangle 0 0 0 1 0 0 0 1 0 1 1 1 0 0 0 .5 .5 .5 .5\nTrace 1",
         expect![[r#"
-        error: `Screen` takes 2 numbers, found 3
-         --> a.txt:1:12
-          |
-        1 | Screen 4 3 Trace
-          |            ^^^^^ expected the end of the line
-          |
-          = help: every command stands on a line of its own
+            error: `Screen` takes 2 numbers, found 3
+             --> a.txt:1:12
+              |
+            1 | Screen 4 3 Trace
+              |            ^^^^^ expected the end of the line
+              |
+              = help: every command stands on a line of its own
 
-        error: `Triangle` takes 15 numbers, found 18
-         --> a.txt:2:48
-          |
-        2 | Triangle 0 0 0 1 0 0 0 1 0 1 1 1 0 0 0 .5 .5 .5
-          |                                                ^ expected the end of the line
-          |
-          = help: write `Triangle ux uy uz vx vy vz wx wy wz ar ag ab rr rg rb`
+            error: `Triangle` takes 15 to 18 numbers, found 19
+             --> a.txt:2:51
+              |
+            2 | Triangle 0 0 0 1 0 0 0 1 0 1 1 1 0 0 0 .5 .5 .5 .5
+              |                                                   ^ expected the end of the line
+              |
+              = help: write `Triangle ux uy uz vx vy vz wx wy wz ar ag ab rr rg rb [sr sg sb]`
 
-        error: `Trace` takes no parameters, found 1
-         --> a.txt:3:7
-          |
-        3 | Trace 1
-          |       ^ expected the end of the line
-          |
-          = help: write `Trace`"#]],
+            error: `Trace` takes no parameters, found 1
+             --> a.txt:3:7
+              |
+            3 | Trace 1
+              |       ^ expected the end of the line
+              |
+              = help: write `Trace`"#]],
     );
 }
 
@@ -217,29 +217,29 @@ fn signs_and_blanks_of_a_word_processor() {
     check(
         "Screen 4 3\nBackground \u{2212}1 1\u{a0}0 0,5 0\nTrace",
         expect![[r#"
-        error: `−1` is not a number
-         --> a.txt:2:12
-          |
-        2 | Background −1 1 0 0,5 0
-          |            ^^ expected `r`, a number such as 2, -.5 or 1e-3
-          |
-          = help: the minus sign is `-`, this one is U+2212
+            error: `−1` is not a number
+             --> a.txt:2:12
+              |
+            2 | Background −1 1 0 0,5 0
+              |            ^^ expected `r`, a number such as 2, -.5 or 1e-3
+              |
+              = help: the minus sign is `-`, this one is U+2212
 
-        error: `1\u{a0}0` is not a number
-         --> a.txt:2:15
-          |
-        2 | Background −1 1 0 0,5 0
-          |               ^^^ expected `g`, a number such as 2, -.5 or 1e-3
-          |
-          = help: blanks, tabs and commas separate parameters, U+00A0 does not
+            error: `1\u{a0}0` is not a number
+             --> a.txt:2:15
+              |
+            2 | Background −1 1 0 0,5 0
+              |               ^^^ expected `g`, a number such as 2, -.5 or 1e-3
+              |
+              = help: blanks, tabs and commas separate parameters, U+00A0 does not
 
-        error: `Background` takes 3 numbers, found 5
-         --> a.txt:2:21
-          |
-        2 | Background −1 1 0 0,5 0
-          |                     ^^^ expected the end of the line
-          |
-          = help: write `Background r g b`"#]],
+            error: `Background` takes 3 or 6 numbers, found 5
+             --> a.txt:2:24
+              |
+            2 | Background −1 1 0 0,5 0
+              |                        ^ expected `B` here
+              |
+              = help: write `Background r g b [R G B]`"#]],
     );
 }
 
@@ -615,13 +615,13 @@ fn a_place_counts_in_characters() {
     check(
         "\u{feff}# ä\r\nScreen 4 3\r\n\tÄÖÜ 日本\r\nTrace\r\n",
         expect![[r#"
-        error: unknown command `ÄÖÜ`
-         --> a.txt:3:2
-          |
-        3 |     ÄÖÜ 日本
-          |     ^^^ expected a command
-          |
-          = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Background`, `Sphere`, `Triangle`, `Box`, `Ilight`, `Clear`, `Trace`"#]],
+            error: unknown command `ÄÖÜ`
+             --> a.txt:3:2
+              |
+            3 |     ÄÖÜ 日本
+              |     ^^^ expected a command
+              |
+              = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Samples`, `Shutter`, `Tone`, `Depth`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`"#]],
     );
 }
 
@@ -666,13 +666,21 @@ fn what_a_clear_removes_before_a_trace_has_no_effect() {
     check(
         "Screen 4 3\nBackground 1 1 1\nCamera 0 0 5 0 0 -1 0 1 0 1 -1 -1 1 1\nClear\nTrace",
         expect![[r#"
-        warning: this has no effect: a `Clear` removes it before a `Trace` shows it
-         --> a.txt:2:1
-          |
-        2 | Background 1 1 1
-          | ^^^^^^^^^^ expected a `Trace` between this and the `Clear`
-          |
-          = help: `Trace` renders a frame of everything that stands before it"#]],
+            warning: this has no effect: a `Clear` removes it before a `Trace` shows it
+             --> a.txt:2:1
+              |
+            2 | Background 1 1 1
+              | ^^^^^^^^^^ expected a `Trace` between this and the `Clear`
+              |
+              = help: `Trace` renders a frame of everything that stands before it
+
+            warning: the picture is squashed: a ball is no circle in it
+             --> a.txt:3:29
+              |
+            3 | Camera 0 0 5 0 0 -1 0 1 0 1 -1 -1 1 1
+              |                             ^^^^^^^^^ expected a window of the shape 4 : 3
+              |
+              = help: write for example `-1.33333 -1 1.33333 1`"#]],
     );
     check(
         "Screen 4 3\nTrace\nCamera 0 0 5 0 0 -1 0 1 0 1 -1 -1 1 1\nClear",
@@ -693,13 +701,13 @@ fn a_comma_as_decimal_sign() {
     check(
         "Screen 4 3\nBackground 0,5 1 0\nTrace",
         expect![[r#"
-        error: `Background` takes 3 numbers, found 4
-         --> a.txt:2:18
-          |
-        2 | Background 0,5 1 0
-          |                  ^ expected the end of the line
-          |
-          = help: a comma separates numbers: if `0,5` is to be one, it is `0.5`; write `Background r g b`"#]],
+            error: `Background` takes 3 or 6 numbers, found 4
+             --> a.txt:2:19
+              |
+            2 | Background 0,5 1 0
+              |                   ^ expected `G` here
+              |
+              = help: a comma separates numbers: if `0,5` is to be one, it is `0.5`; write `Background r g b [R G B]`"#]],
     );
     check(
         "Screen 4 3\nSphere 1,5 0 0 -5 1 0 0 0 0 0 # as 1.5\nTrace",
@@ -734,12 +742,12 @@ fn commas_that_separate_are_no_decimal_signs() {
     check(
         "Screen,4,3\nSphere,1,0,0,-5,1,0,0,0,0,0,1\nBackground 0,5,1,0\nTrace",
         expect![[r#"
-        error: `Background` takes 3 numbers, found 4
-         --> a.txt:3:18
-          |
-        3 | Background 0,5,1,0
-          |                  ^ expected the end of the line
-          |
-          = help: write `Background r g b`"#]],
+            error: `Background` takes 3 or 6 numbers, found 4
+             --> a.txt:3:19
+              |
+            3 | Background 0,5,1,0
+              |                   ^ expected `G` here
+              |
+              = help: write `Background r g b [R G B]`"#]],
     );
 }

@@ -49,14 +49,14 @@ fn every_command_is_written_as_the_table_says() {
 fn every_parameter_is_told_with_what_it_counts_by_and_may_be() {
     let rows: Vec<_> = table("### Parameters").iter().map(|row| row.join(" | ")).collect();
     let told = |command: Command, field: &Field| {
-        let optional = if field.optional { ", may be left out" } else { "" };
         format!(
-            "`{}` | `{}` | {} | {} | {}{optional}",
+            "`{}` | `{}` | {} | {} | {} | {}",
             command.name(),
             field.names.join(" "),
             field.kind,
             field.kind.unit(),
-            field.values
+            field.values,
+            field.presence
         )
     };
     let fields = Command::ALL.iter().flat_map(|command| command.form().fields.iter().map(|f| (*command, f)));

@@ -1,6 +1,6 @@
 //! The table of commands tells the truth: what it says of each parameter is what the parser takes and refuses.
 
-use rayfold_scene::{Code, Command, Diagnostic, Field, Limits, Values, parse};
+use rayfold_scene::{Code, Command, Diagnostic, Field, Limits, Presence, Values, parse};
 
 /// A line of the command that is in order, with all of its numbers.
 fn sample(command: Command) -> &'static str {
@@ -8,11 +8,28 @@ fn sample(command: Command) -> &'static str {
         Command::Screen => "Screen 4 3",
         Command::Orthocamera => "Orthocamera",
         Command::Camera => "Camera 1 2 3 4 5 -6 .3 .5 .7 2 -3 -4 5 6",
-        Command::Background => "Background .1 .2 .3",
+        Command::Look => "Look 1 2 3 4 5 -6 40 .3 .5 .1",
+        Command::Lens => "Lens .1 5",
+        Command::Background => "Background .1 .2 .3 .4 .5 .6",
+        Command::Samples => "Samples 16 .5",
+        Command::Shutter => "Shutter .5",
+        Command::Tone => "Tone srgb",
+        Command::Depth => "Depth 3",
         Command::Sphere => "Sphere 1 2 3 4 .1 .2 .3 .4 .5 .6 .7 .8 .9",
-        Command::Triangle => "Triangle 1 2 3 4 5 7 8 8 9 .1 .2 .3 .4 .5 .6",
-        Command::Cuboid => "Box 1 2 3 4 5 6 .1 .2 .3 .4 .5 .6",
-        Command::Ilight => "Ilight .1 .2 .3 4 5 6",
+        Command::Triangle => "Triangle 1 2 3 4 5 7 8 8 9 .1 .2 .3 .4 .5 .6 .7 .8 .9",
+        Command::Cuboid => "Box 1 2 3 4 5 6 .1 .2 .3 .4 .5 .6 .7 .8 .9",
+        Command::Plane => "Plane 1 2 3 4 5 6 .1 .2 .3 .4 .5 .6 .7 .8 .9",
+        Command::Disc => "Disc 1 2 3 4 5 6 7 .1 .2 .3 .4 .5 .6 .7 .8 .9",
+        Command::Cylinder => "Cylinder 1 2 3 4 5 6 7 .1 .2 .3 .4 .5 .6 .7 .8 .9",
+        Command::Cone => "Cone 1 2 3 4 5 6 7 8 .1 .2 .3 .4 .5 .6 .7 .8 .9",
+        Command::Torus => "Torus 3e300 2e-323 3 4 5 6 7 8 .1 .2 .3 .4 .5 .6 .7 .8 .9",
+        Command::Material => "Material red diffuse 1 0 0",
+        Command::Group => "Group ball",
+        Command::End => "End",
+        Command::Use => "Use ball 1 2 3 4 5 6 7",
+        Command::Ilight => "Ilight .1 .2 .3 4 5 6 7",
+        Command::Plight => "Plight .1 .2 .3 4 5 6 7 8",
+        Command::Frames => "Frames 1 4294967295",
         Command::Clear => "Clear",
         Command::Trace => "Trace",
     }
@@ -20,7 +37,13 @@ fn sample(command: Command) -> &'static str {
 
 /// What is wrong with a line that stands in a script which is otherwise in order.
 fn told(line: &str) -> Vec<Diagnostic> {
-    let script = format!("Screen 4 3\n{line}\nTrace\n");
+    let (before, behind) = match line.split(' ').next() {
+        Some("Group") => ("", "End\n"),
+        Some("End") => ("Group ball\n", ""),
+        Some("Use") => ("Group ball\nEnd\n", ""),
+        _ => ("", ""),
+    };
+    let script = format!("Screen 4 3\n{before}{line}\n{behind}Trace\n");
     let mut told = parse("a.txt", script.as_bytes(), &Limits::default()).diagnostics;
     told.retain(|d| d.is_error() && d.code != Code::LimitExceeded);
     told
@@ -39,8 +62,9 @@ fn replaced(command: Command, first: usize, numbers: &[String]) -> String {
 fn fields() -> impl Iterator<Item = (Command, usize, &'static Field)> {
     Command::ALL.iter().flat_map(|&command| {
         let mut first = 0;
-        command.form().fields.iter().map(move |field| {
-            let place = first;
+        let form = command.form();
+        form.fields.iter().map(move |field| {
+            let place = first + usize::from(form.subject.is_some());
             first += field.names.len();
             (command, place, field)
         })
@@ -59,6 +83,17 @@ fn edges(field: &Field) -> (Vec<Vec<String>>, Vec<Vec<String>>) {
     match field.values {
         Values::Any | Values::Clamped => ([wide(), vec![alike("0"), alike("-0")]].concat(), vec![]),
         Values::Positive => (vec![alike("5e-324"), alike("1e300")], ["0", "-0", "-1"].map(alike).to_vec()),
+        Values::NotNegative => {
+            (vec![alike("0"), alike("-0"), alike("1e300")], vec![alike("-5e-324"), alike("-1")])
+        }
+        Values::AtLeastOne => (vec![alike("1"), alike("1e300")], vec![alike(".999"), alike("-1")]),
+        Values::Share => (vec![alike("0"), alike("1")], vec![alike("-1e-9"), alike("1.001")]),
+        Values::HalfTurn => (vec![alike("0"), alike("179.999")], vec![alike("-1e-9"), alike("180")]),
+        Values::FieldOfView => (vec![alike("1e-9"), alike("179.999")], vec![alike("0"), alike("180")]),
+        Values::OneOf(words) => (
+            words.iter().flat_map(|word| [alike(word), alike(&word.to_uppercase())]).collect(),
+            vec![alike("0"), alike("1"), alike("gamma"), alike("(1:0)")],
+        ),
         Values::NotZero => {
             let axes = (0..field.names.len()).flat_map(|axis| ["1e-300", "-1"].map(|x| along(axis, x)));
             (axes.collect(), vec![alike("0"), alike("-0")])
@@ -79,7 +114,11 @@ fn the_samples_are_in_order_and_whole() {
     for &command in Command::ALL {
         let line = sample(command);
         assert_eq!(told(line), [], "{line}");
-        assert_eq!(line.split(' ').count() - 1, *command.form().arity().end(), "{line}");
+        if command != Command::Material {
+            let form = command.form();
+            let names = usize::from(form.subject.is_some());
+            assert_eq!(line.split(' ').count() - 1 - names, form.arity().1, "{line}");
+        }
     }
 }
 
@@ -105,17 +144,30 @@ fn parameters_take_and_refuse_what_the_table_says() {
 }
 
 #[test]
-fn optional_parameters_may_be_left_out_number_by_number() {
-    for &command in Command::ALL {
-        let (least, most) = command.form().arity().into_inner();
+fn optional_parameters_may_be_left_out_whole_or_number_by_number() {
+    for &command in Command::ALL.iter().filter(|&&command| command != Command::Material) {
+        let form = command.form();
+        let (least, most) = form.arity();
         let words: Vec<_> = sample(command).split(' ').collect();
+        let names = usize::from(form.subject.is_some());
         for count in 0..=most {
-            let faults: Vec<_> = told(&words[..=count].join(" ")).into_iter().map(|d| d.code).collect();
-            let expect: &[Code] = if count < least { &[Code::TooFewParameters] } else { &[] };
+            let faults: Vec<_> =
+                told(&words[..=names + count].join(" ")).into_iter().map(|d| d.code).collect();
+            let mut end = 0;
+            let is_taken = count >= least
+                && (count == 0
+                    || form.fields.iter().any(|field| {
+                        let start = end;
+                        end += field.names.len();
+                        count == end
+                            || matches!(field.presence, Presence::FromTheEnd(_))
+                                && (start..end).contains(&count)
+                    }));
+            let expect: &[Code] = if is_taken { &[] } else { &[Code::TooFewParameters] };
             assert_eq!(faults, expect, "{count} numbers of {}", command.name());
         }
-        let missing: usize =
-            command.form().fields.iter().filter(|field| field.optional).map(|field| field.names.len()).sum();
-        assert_eq!(most - least, missing, "{}", command.name());
+        let is_required = |field: &&Field| field.presence == Presence::Required;
+        let required: usize = form.fields.iter().filter(is_required).map(|field| field.names.len()).sum();
+        assert_eq!(least, required, "{}", command.name());
     }
 }

@@ -121,8 +121,8 @@ fn replay(steps: &[Step]) -> (String, Vec<Scene>) {
                 format!("BACKGROUND {:e},{:e},{:e}", color.x, color.y, color.z)
             }
             Step::Object(object) => {
-                objects.push(*object);
-                one.objects = vec![*object].into();
+                objects.push(object.clone());
+                one.objects = vec![object.clone()].into();
                 let text = one.to_string();
                 text.lines().nth(2).unwrap_or_default().to_string()
             }

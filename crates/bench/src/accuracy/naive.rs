@@ -53,6 +53,12 @@ impl From<&Object> for Shape {
                 Self::Triangle { corner: u, edges: [v - u, w - u] }
             }
             Object::Cuboid(c) => Self::Cuboid { min: c.min().as_vec3(), max: c.max().as_vec3() },
+            Object::Plane(_)
+            | Object::Disc(_)
+            | Object::Cylinder(_)
+            | Object::Cone(_)
+            | Object::Torus(_)
+            | Object::Instance(_) => unreachable!("the scenes that are compared have no {object:?}"),
         }
     }
 }
@@ -125,13 +131,16 @@ fn render(scene: &Scene) -> RgbImage {
 fn color(scene: &Scene, objects: &[Shape], origin: Vec3, direction: Vec3, bounces: u32) -> Vec3 {
     let start = if bounces == 0 { 0.0 } else { EPSILON };
     let Some((object, t)) = nearest(objects, origin, direction, start) else {
-        return scene.background().as_vec3();
+        return scene.background.along(direction.as_dvec3()).as_vec3();
     };
     let point = origin + t * direction;
     let normal = objects[object].normal(point, direction);
     let material = scene.objects[object].material();
     let mut sum = material.ambient().as_vec3();
-    for Light::Directional(light) in scene.lights.iter() {
+    for light in scene.lights.iter() {
+        let Light::Directional(light) = light else {
+            unreachable!("the scenes that are compared have no {light:?}")
+        };
         let towards = -light.direction().as_vec3().normalize();
         let cosine = normal.dot(towards);
         if cosine > 0.0 && !objects.iter().any(|o| o.meet(point, towards, EPSILON).is_some()) {

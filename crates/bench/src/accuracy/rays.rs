@@ -20,9 +20,11 @@ pub(crate) fn count(scene: &Scene, backend: &Backend, bounces: u32) -> Result<Ve
         for (ray, hit) in rays.iter().zip(backend.nearest(scene, &rays)?) {
             let Some(hit) = hit else { continue };
             let normal = hit.normal;
-            let lit = |light: &&Light| {
-                let Light::Directional(light) = light;
-                normal.dot(-unit(light.direction())) > 0.0
+            let lit = |light: &&Light| match light {
+                Light::Directional(light) => normal.dot(-unit(light.direction())) > 0.0,
+                Light::Lamp(light) => {
+                    normal.dot(light.position() - (ray.origin + hit.t * ray.direction)) > 0.0
+                }
             };
             total += scene.lights.iter().filter(lit).count() as u64;
             if scene.objects[hit.object].material().mirror() != DVec3::ZERO {

@@ -29,7 +29,7 @@ fn exact(objects: &[Object], origin: &Vector, direction: &Vector) -> Option<Vect
 pub(super) fn face_to_face(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let surface = Material::new(DVec3::ZERO, DVec3::ZERO, DVec3::ONE)?;
     let objects = [
-        Object::Sphere(Sphere::new(100.0, DVec3::new(0.0, 0.0, -101.0), surface)?),
+        Object::Sphere(Sphere::new(100.0, DVec3::new(0.0, 0.0, -101.0), surface.clone())?),
         Object::Sphere(Sphere::new(1.0, DVec3::new(0.0, 0.0, 2.0), surface)?),
     ];
     let scene = objects_only(objects.to_vec())?;

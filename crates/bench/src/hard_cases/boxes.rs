@@ -55,8 +55,9 @@ fn wrong(backends: &[Backend], boxes: &[[DVec3; 2]], figures: &mut Figures) -> R
         for &corners in boxes {
             let object = cuboid(corners)?;
             let rays = along_faces(corners);
-            let truths = truths(&[object], &rays);
-            for ((ray, truth), hit) in rays.iter().zip(truths).zip(from_eyes(backend, object, &rays)?) {
+            let truths = truths(std::slice::from_ref(&object), &rays);
+            for ((ray, truth), hit) in rays.iter().zip(truths).zip(from_eyes(backend, object.clone(), &rays)?)
+            {
                 count += 1;
                 match (truth, hit) {
                     (Some(truth), Some(hit)) => {

@@ -174,7 +174,7 @@ fn mesh(rng: &mut Rng) -> Result<Scene> {
     let skin = surface(rng, false)?;
     for face in icosphere(count) {
         let vertices = face.map(|p| (p + 0.2 * (3.0 * p.dot(turn)).sin() * p) * size + DVec3::Y * size);
-        objects.push(Object::Triangle(Triangle::new(vertices, skin)?));
+        objects.push(Object::Triangle(Triangle::new(vertices, skin.clone())?));
     }
     for _ in 0..rng.usize(1..4) {
         let (radius, at) = (tenths(rng, 3, 10), place(rng));

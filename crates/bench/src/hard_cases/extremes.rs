@@ -89,19 +89,19 @@ fn bright_and_dim() -> Result<Vec<(&'static str, Scene)>> {
     Ok(vec![
         (
             "a light of subnormal direction",
-            lit(camera, 1.0, DVec3::ZERO, matte, light(1.0, [-tiny, -tiny, -tiny])?)?,
+            lit(camera, 1.0, DVec3::ZERO, matte.clone(), light(1.0, [-tiny, -tiny, -tiny])?)?,
         ),
         (
             "a light of huge direction",
-            lit(camera, 1.0, DVec3::ZERO, matte, light(1.0, [-1e308, -1e308, -1e308])?)?,
+            lit(camera, 1.0, DVec3::ZERO, matte.clone(), light(1.0, [-1e308, -1e308, -1e308])?)?,
         ),
         (
             "a sphere of subnormal radius",
-            lit(camera, tiny, DVec3::ZERO, matte, light(1.0, [0.0, -1.0, 0.0])?)?,
+            lit(camera, tiny, DVec3::ZERO, matte.clone(), light(1.0, [0.0, -1.0, 0.0])?)?,
         ),
         (
             "a sphere of huge radius around all",
-            lit(camera, 1e308, DVec3::ZERO, matte, light(1.0, [0.0, -1.0, 0.0])?)?,
+            lit(camera, 1e308, DVec3::ZERO, matte.clone(), light(1.0, [0.0, -1.0, 0.0])?)?,
         ),
         (
             "a sphere of huge radius far off",

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use glam::DVec3;
 use image::RgbImage;
-use rayfold_scene::{Cuboid, Light, Material, Object, Scene, Screen, Sphere, Triangle, model::unit};
+use rayfold_scene::{Cuboid, Light, Material, Object, Scene, Screen, Sphere, Tone, Triangle, model::unit};
 use rayon::prelude::*;
 
 use super::figures::{Figures, Size};
@@ -92,19 +92,20 @@ fn visible(scene: &Scene) -> Vec<Option<(Material, DVec3)>> {
             let row = width as usize;
             let neighbours = [k.wrapping_sub(1), k + 1, k.wrapping_sub(row), k + row];
             let inner = neighbours.iter().all(|&n| object(n) == object(k));
-            hit.filter(|_| inner).map(|(object, normal)| (*scene.objects[object].material(), normal))
+            hit.filter(|_| inner).map(|(object, normal)| (scene.objects[object].material().clone(), normal))
         })
         .collect()
 }
 
 /// What one convex body shows in these lights: no point that faces a light can be in its shadow.
 fn without_shadows(visible: &[Option<(Material, DVec3)>], lights: &[Light]) -> Vec<Option<[u8; 3]>> {
-    let shaded = |&(material, normal): &(Material, DVec3)| {
-        let color = lights.iter().fold(material.ambient(), |sum, Light::Directional(light)| {
+    let shaded = |(material, normal): &(Material, DVec3)| {
+        let color = lights.iter().fold(material.ambient(), |sum, light| {
+            let Light::Directional(light) = light else { unreachable!("only suns light these bodies") };
             let cosine = normal.dot(-unit(light.direction())).max(0.0);
             sum + light.color() * material.diffuse() * cosine
         });
-        oracle::levels(color)
+        oracle::levels(Tone::Plain, color)
     };
     visible.iter().map(|seen| seen.as_ref().map(shaded)).collect()
 }
@@ -122,11 +123,13 @@ pub(super) fn acne(backends: &[Backend], size: Size, figures: &mut Figures) -> R
     let surface = matte()?;
     let corners = [[1.0, 1.0, 1.0], [-1.0, -1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0]].map(DVec3::from);
     let tetrahedron = (0..4)
-        .map(|k| Triangle::new([1, 2, 3].map(|n| corners[(k + n) % 4]), surface).map(Object::Triangle))
+        .map(|k| {
+            Triangle::new([1, 2, 3].map(|n| corners[(k + n) % 4]), surface.clone()).map(Object::Triangle)
+        })
         .collect::<Result<Vec<_>, _>>()?;
     let bodies = [
-        vec![Object::Sphere(Sphere::new(1.0, DVec3::ZERO, surface)?)],
-        vec![Object::Cuboid(Cuboid::new([DVec3::splat(-0.8), DVec3::splat(0.8)], surface)?)],
+        vec![Object::Sphere(Sphere::new(1.0, DVec3::ZERO, surface.clone())?)],
+        vec![Object::Cuboid(Cuboid::new([DVec3::splat(-0.8), DVec3::splat(0.8)], surface.clone())?)],
         tetrahedron,
     ];
     let side = size.pick(32, 256);
@@ -163,7 +166,7 @@ pub(super) fn grazing_light(backends: &[Backend], size: Size, figures: &mut Figu
     let mut scene = Scene::new(screen, looking_at(DVec3::new(0.3, 0.4, 4.0), DVec3::ZERO, 0.6, screen)?);
     scene.objects = icosphere(80)
         .into_iter()
-        .map(|face| Triangle::new(face.map(single), surface).map(Object::Triangle))
+        .map(|face| Triangle::new(face.map(single), surface.clone()).map(Object::Triangle))
         .collect::<Result<Vec<_>, _>>()?
         .into();
     let lights = [[-1.0, 0.0, 0.0], [0.3, -1.0, 0.05], [-1.0, 0.0, 0.35]];
@@ -190,9 +193,9 @@ pub(super) fn contact_shadow(backends: &[Backend], size: Size, figures: &mut Fig
     let surface = matte()?;
     let side = size.pick(64, 384);
     let screen = Screen::new(side, side)?;
-    let floor = Cuboid::new([DVec3::new(-4.0, -1.0, -4.0), DVec3::new(4.0, 0.0, 4.0)], surface)?;
-    let hovering = Cuboid::new([DVec3::new(-0.5, 1e-4, -0.5), DVec3::new(0.5, 1.0, 0.5)], surface)?;
-    let ball = Sphere::new(0.5, DVec3::new(1.5, 0.5 + 1e-4, 0.0), surface)?;
+    let floor = Cuboid::new([DVec3::new(-4.0, -1.0, -4.0), DVec3::new(4.0, 0.0, 4.0)], surface.clone())?;
+    let hovering = Cuboid::new([DVec3::new(-0.5, 1e-4, -0.5), DVec3::new(0.5, 1.0, 0.5)], surface.clone())?;
+    let ball = Sphere::new(0.5, DVec3::new(1.5, 0.5 + 1e-4, 0.0), surface.clone())?;
     let mut scene = Scene::new(screen, looking_at(DVec3::new(0.7, 1.2, 3.0), DVec3::X * 0.7, 0.9, screen)?);
     scene.objects = vec![Object::Cuboid(floor), Object::Cuboid(hovering), Object::Sphere(ball)].into();
     scene.lights = vec![light(0.9, [-0.5, -1.0, -0.7])?].into();

@@ -8,6 +8,7 @@
 mod bounces;
 mod boxes;
 mod everyday;
+mod everything;
 mod extremes;
 mod figures;
 mod images;
@@ -206,5 +207,11 @@ pub const CASES: &[Case] = &[
         title: "random scenes searched in every way",
         asked: "the same picture bit for bit",
         run: searched::scenes,
+    },
+    Case {
+        number: "28",
+        title: "random scenes of all that the language has",
+        asked: "at most 0.01 % of the pixels other than the oracle's",
+        run: everything::scenes,
     },
 ];

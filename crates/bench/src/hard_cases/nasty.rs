@@ -86,7 +86,19 @@ pub(super) fn judge_kinds(
     size: Size,
     figures: &mut Figures,
 ) -> Result<()> {
-    let rounds = size.pick(2, 60);
+    judge_rounds(kinds, few, backends, size.pick(2, 60), size.pick(30, 100), figures)
+}
+
+/// The same for so many scenes of each kind, and so many pixels of each at random.
+pub(super) fn judge_rounds(
+    kinds: &[Kind],
+    few: f64,
+    backends: &[Backend],
+    rounds: usize,
+    samples: usize,
+    figures: &mut Figures,
+) -> Result<()> {
+    let rounds = rounds as u64;
     let first = first_seed() / kinds.len() as u64 * kinds.len() as u64;
     for (kind, (name, make)) in (0..).zip(kinds) {
         let mut wrong = vec![Vec::new(); backends.len()];
@@ -96,7 +108,7 @@ pub(super) fn judge_kinds(
             let scene = make(&mut Rng::with_seed(seed))?;
             pixels += scene.screen.pixels() as usize;
             let drawn = backends.iter().map(|backend| backend.render(&scene)).collect::<Result<Vec<_>>>()?;
-            for (wrong, count) in wrong.iter_mut().zip(judge(&scene, &drawn, size.pick(30, 100), seed)?) {
+            for (wrong, count) in wrong.iter_mut().zip(judge(&scene, &drawn, samples, seed)?) {
                 if count > 0 {
                     wrong.push((seed, count));
                 }
@@ -160,31 +172,31 @@ fn judge(scene: &Scene, images: &[RgbImage], samples: usize, seed: u64) -> Resul
 
 /// The oracle's colour as levels before rounding.
 fn shown(scene: &Scene, x: f64, y: f64) -> DVec3 {
-    255.0 * oracle::color_at(scene, x, y).clamp(DVec3::ZERO, DVec3::ONE)
+    oracle::shown(scene.tone, oracle::color_at(scene, x, y))
 }
 
 fn apart(a: &image::Rgb<u8>, b: &image::Rgb<u8>) -> u8 {
     a.0.iter().zip(b.0).map(|(a, b)| a.abs_diff(b)).max().unwrap_or(0)
 }
 
-fn within(rng: &mut Rng, from: f64, to: f64) -> f64 {
+pub(super) fn within(rng: &mut Rng, from: f64, to: f64) -> f64 {
     from + (to - from) * rng.f64()
 }
 
 /// Each power of ten between as likely as any other.
-fn power(rng: &mut Rng, from: f64, to: f64) -> f64 {
+pub(super) fn power(rng: &mut Rng, from: f64, to: f64) -> f64 {
     10f64.powf(within(rng, from, to))
 }
 
-fn point(rng: &mut Rng, size: f64) -> DVec3 {
+pub(super) fn point(rng: &mut Rng, size: f64) -> DVec3 {
     DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, rng.f64() - 0.5) * 2.0 * size
 }
 
-fn color(rng: &mut Rng) -> DVec3 {
+pub(super) fn color(rng: &mut Rng) -> DVec3 {
     DVec3::new(rng.f64(), rng.f64(), rng.f64())
 }
 
-fn matte(rng: &mut Rng) -> Result<Material> {
+pub(super) fn matte(rng: &mut Rng) -> Result<Material> {
     Ok(Material::new(0.3 * color(rng), 0.6 * color(rng), DVec3::ZERO)?)
 }
 
@@ -237,7 +249,7 @@ fn picture(rng: &mut Rng, objects: Vec<Object>, eye: DVec3, target: DVec3) -> Re
     Ok(scene)
 }
 
-fn heap(rng: &mut Rng, count: usize) -> Result<Vec<Object>> {
+pub(super) fn heap(rng: &mut Rng, count: usize) -> Result<Vec<Object>> {
     (0..count)
         .map(|_| {
             let (at, size) = (point(rng, 2.0), within(rng, 0.3, 1.5));
@@ -359,10 +371,17 @@ fn equal(rng: &mut Rng) -> Result<Scene> {
     let objects: Result<Vec<_>> = (0..count)
         .map(|_| {
             let surface = matte(rng)?;
-            Ok(match &shapes[rng.usize(0..shapes.len())] {
+            let object = &shapes[rng.usize(0..shapes.len())];
+            Ok(match object {
                 Object::Sphere(s) => Object::Sphere(Sphere::new(s.radius(), s.center(), surface)?),
                 Object::Cuboid(c) => Object::Cuboid(Cuboid::new(*c.corners(), surface)?),
                 Object::Triangle(t) => Object::Triangle(Triangle::new(*t.vertices(), surface)?),
+                Object::Plane(_)
+                | Object::Disc(_)
+                | Object::Cylinder(_)
+                | Object::Cone(_)
+                | Object::Torus(_)
+                | Object::Instance(_) => unreachable!("not drawn here: {object:?}"),
             })
         })
         .collect();
@@ -470,6 +489,12 @@ fn bright(rng: &mut Rng) -> Result<Scene> {
                     let surface = Material::new(ambient, diffuse, DVec3::ZERO)?;
                     Object::Triangle(Triangle::new(*t.vertices(), surface)?)
                 }
+                Object::Plane(_)
+                | Object::Disc(_)
+                | Object::Cylinder(_)
+                | Object::Cone(_)
+                | Object::Torus(_)
+                | Object::Instance(_) => unreachable!("not drawn here: {object:?}"),
             })
         })
         .collect();

@@ -36,7 +36,7 @@ pub(super) fn from_eyes(backend: &Backend, object: Object, rays: &[Ray]) -> Resu
     let mut hits = Vec::new();
     for rays in rays.chunk_by(|a, b| a.origin == b.origin) {
         let eye = rays[0].origin;
-        let scene = objects_seen(vec![object], eye, eye + DVec3::new(0.3, 0.2, -1.0), 1.0)?;
+        let scene = objects_seen(vec![object.clone()], eye, eye + DVec3::new(0.3, 0.2, -1.0), 1.0)?;
         hits.extend(backend.nearest(&scene, rays)?);
     }
     Ok(hits)

@@ -24,7 +24,7 @@ pub(super) fn distant(backends: &[Backend], size: Size, figures: &mut Figures) -
         for _ in 0..spheres {
             let origin = single(direction(&mut rng));
             let ball = sphere(1.0, single(origin + distance * direction(&mut rng)))?;
-            let objects = [Object::Sphere(ball)];
+            let objects = [Object::Sphere(ball.clone())];
             let rays: Vec<Ray> = (0..each)
                 .map(|k| {
                     // Every other ray goes for the limb, where the others seldom pass.
@@ -108,7 +108,7 @@ pub(super) fn tangent(backends: &[Backend], size: Size, figures: &mut Figures) -
         let mut rng = random(4);
         for radius in [1.0, 3.0, single(DVec3::splat(0.1)).x, 1e3, 12_345.0] {
             let ball = sphere(radius, DVec3::ZERO)?;
-            let objects = [Object::Sphere(ball)];
+            let objects = [Object::Sphere(ball.clone())];
             let scene = objects_only(objects.to_vec())?;
             let ulp = backend.ulp(radius);
             let mut rays = Vec::new();
@@ -205,9 +205,10 @@ pub(super) fn inside(backends: &[Backend], size: Size, figures: &mut Figures) ->
     for backend in backends {
         let (mut wrong, mut count) = (0, 0);
         for (object, rays) in &sets {
-            for (ray, hit) in rays.iter().zip(from_eyes(backend, *object, rays)?) {
+            for (ray, hit) in rays.iter().zip(from_eyes(backend, object.clone(), rays)?) {
                 count += 1;
-                let truth = nearest(&[*object], ray.origin, ray.direction).map(|hit| hit.t.to_f64());
+                let truth = nearest(std::slice::from_ref(object), ray.origin, ray.direction)
+                    .map(|hit| hit.t.to_f64());
                 let right = match (truth, hit) {
                     (Some(t), Some(hit)) => (hit.t - t).abs() * ray.direction.length() < 1e-4,
                     (None, None) => true,

@@ -26,7 +26,7 @@ pub(super) fn identical(backends: &[Backend], size: Size, figures: &mut Figures)
         }
         let mut order: Vec<usize> = (0..kinds.len() * copies).map(|k| k % kinds.len()).collect();
         rng.shuffle(&mut order);
-        let scene = objects_only(order.iter().map(|&kind| kinds[kind]).collect())?;
+        let scene = objects_only(order.iter().map(|&kind| kinds[kind].clone()).collect())?;
         let rays: Vec<_> = (0..size.pick(4000, 1_000_000))
             .map(|_| aimed(7.0 * direction(&mut rng), 3.0 * direction(&mut rng)))
             .collect();
@@ -104,7 +104,8 @@ fn pictures(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<(
 /// Faces of two boxes and two triangles in one plane that is square to the rays: computed distances are equal.
 fn faces(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let surface = Material::default();
-    let cuboid = |u: [f64; 3], v: [f64; 3]| Cuboid::new([u.into(), v.into()], surface).map(Object::Cuboid);
+    let cuboid =
+        |u: [f64; 3], v: [f64; 3]| Cuboid::new([u.into(), v.into()], surface.clone()).map(Object::Cuboid);
     let big = cuboid([-4.0, -4.0, -2.0], [4.0, 4.0, 0.0])?;
     let small = cuboid([-1.0, -1.0, -1.0], [1.0, 1.0, 0.0])?;
     let ball = Object::Sphere(Sphere::new(1.0, DVec3::new(3.0, 3.0, -1.0), surface)?);
@@ -118,12 +119,13 @@ fn faces(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> 
         .collect();
     for backend in backends {
         let mut late = 0;
-        for objects in [vec![big, small, ball], vec![small, ball, big], vec![ball, small, big]] {
-            let at = |object: Object| objects.iter().position(|&o| o == object);
+        for order in [[&big, &small, &ball], [&small, &ball, &big], [&ball, &small, &big]] {
+            let objects = order.map(Object::clone).to_vec();
+            let at = |object: &Object| objects.iter().position(|o| o == object);
             let scene = objects_only(objects.clone())?;
             for (ray, hit) in rays.iter().zip(backend.nearest(&scene, &rays)?) {
-                let other = if ray.origin.x == 3.0 { ball } else { small };
-                late += usize::from(hit.map(|hit| hit.object) != at(big).min(at(other)));
+                let other = if ray.origin.x == 3.0 { &ball } else { &small };
+                late += usize::from(hit.map(|hit| hit.object) != at(&big).min(at(other)));
             }
         }
         figures.add(backend, "not the first of those in one plane", 3 * rays.len(), late as f64, 0.0);

@@ -116,7 +116,7 @@ pub(super) fn needles(backends: &[Backend], size: Size, figures: &mut Figures) -
         if needle.is_degenerate() {
             continue;
         }
-        let objects = [Object::Triangle(needle)];
+        let objects = [Object::Triangle(needle.clone())];
         let eye = single(3.0 * direction(&mut rng));
         let scene = objects_seen(objects.to_vec(), eye, tip, 1e-3)?;
         let rays: Vec<Ray> = (0..each)

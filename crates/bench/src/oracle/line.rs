@@ -1,7 +1,7 @@
 //! Rays without rounding, and which of them is a pixel.
 
 use glam::DVec3;
-use rayfold_scene::{Camera, Screen};
+use rayfold_scene::{Camera, Look, Screen};
 
 use super::real::{Real, Vector};
 
@@ -17,8 +17,12 @@ pub struct Line {
 impl Line {
     /// The ray of a pixel, in the words of the language; indices may be fractions.
     pub(super) fn of_pixel(camera: &Camera, screen: Screen, x: f64, y: f64) -> Self {
-        let Camera::Pinhole(pinhole) = camera else {
-            return Self { origin: DVec3::new(x, y, 0.0).into(), direction: DVec3::NEG_Z.into() };
+        let pinhole = match camera {
+            Camera::Orthographic => {
+                return Self { origin: DVec3::new(x, y, 0.0).into(), direction: DVec3::NEG_Z.into() };
+            }
+            Camera::Look(look) => return Self::of_look(look, screen, x, y),
+            Camera::Pinhole(pinhole) => pinhole,
         };
         let w = Vector::from(pinhole.gaze()).opposite().unit();
         let u = Vector::from(pinhole.up()).cross(&w).unit();
@@ -38,5 +42,24 @@ impl Line {
         let direction =
             nowhere.plus(&across, &u).plus(&upward, &v).plus(&-&Real::from(pinhole.distance()), &w);
         Self { origin: pinhole.eye().into(), direction: direction.unit() }
+    }
+
+    fn of_look(look: &Look, screen: Screen, x: f64, y: f64) -> Self {
+        let w = Vector::from(look.eye()).minus(&look.target().into()).unit();
+        let u = Vector::from(look.up()).cross(&w).unit();
+        let v = w.cross(&u);
+        let (width, height) = (f64::from(screen.width()), f64::from(screen.height()));
+        let slope = Real::tangent_of_half(look.field_of_view());
+        // Indices and sizes are exact.
+        let part = |index: f64, count: f64| {
+            &slope * &Real::from(2.0 * index + 1.0 - count).over(&Real::from(height))
+        };
+        let direction = w.opposite().plus(&part(x, width), &u).plus(&part(y, height), &v);
+        Self { origin: look.eye().into(), direction: direction.unit() }
+    }
+
+    /// The point so many lengths of the direction away.
+    pub(super) fn at(&self, t: &Real) -> Vector {
+        self.origin.plus(t, &self.direction)
     }
 }

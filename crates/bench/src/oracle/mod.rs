@@ -2,7 +2,8 @@
 //!
 //! A second implementation of hits, normals and shading, in numbers of 640 bits and the most direct formulas. Where a
 //! tracer and the oracle differ, the tracer has rounded. It shares no code with the tracers, is slow (some 10 µs an
-//! object and ray) and knows nothing of how they work.
+//! object and ray, a torus a hundred times that) and knows nothing of how they work. Only what may err by 2⁻²⁰ (noise,
+//! powers, the sRGB curve) is left to `f64`.
 //!
 //! ```
 //! use glam::DVec3;
@@ -15,16 +16,20 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod glass;
+mod light;
 mod line;
+mod noise;
+mod pattern;
 mod real;
 mod shapes;
 
 use glam::DVec3;
 use image::RgbImage;
-use rayfold_scene::{Light, Object, Scene};
-use rayfold_tracer::MAX_BOUNCES;
+use rayfold_scene::{Glass, Object, Scene, Tone};
 use rayon::prelude::*;
 
+pub use glass::reflected;
 pub use line::Line;
 pub use real::{Real, Vector};
 pub use shapes::{edge_clearance, sphere_clearance};
@@ -36,8 +41,10 @@ pub struct Hit {
     pub object: usize,
     /// In lengths of the direction.
     pub t: Real,
-    /// Unit normal, facing the ray. On the edge of a box that of the first axis which leads there.
+    /// Unit normal, facing the ray. On the edge of a box that of the first axis which leads there, on a rim the side's.
     pub normal: Vector,
+    /// Whether normals that point out of the object point along the ray.
+    leaves: bool,
 }
 
 /// The nearest hit of the ray exactly as given.
@@ -50,20 +57,24 @@ pub fn nearest_beyond(objects: &[Object], origin: &Vector, direction: &Vector, s
     nearest_on(objects, &Line { origin: origin.clone(), direction: direction.clone() }, start)
 }
 
-/// The nearest hit farther away than `start`; of hits at the same distance that of the first object. Distances that
-/// differ by less than one part in 2^400 are the same: roots are rounded.
+/// The nearest hit farther away than `start`; of hits at the same distance that of the first object without glass, or else of
+/// the first. Distances that differ by less than one part in 2^400 are the same: roots are rounded.
 fn nearest_on(objects: &[Object], line: &Line, start: &Real) -> Option<Hit> {
     let mut best: Option<(usize, Real)> = None;
     for (index, object) in objects.iter().enumerate() {
         let Some(t) = shapes::first(object, line, start) else { continue };
-        let nearer = best.as_ref().is_none_or(|(_, least)| t < *least && &t + &t.shifted(-400) < *least);
-        if nearer {
+        let is_before = best.as_ref().is_none_or(|(other, least)| {
+            let hair = t.shifted(-400);
+            let before_glass = glass_of(object).is_none() && glass_of(&objects[*other]).is_some();
+            if before_glass { t <= least + &hair } else { &t + &hair < *least }
+        });
+        if is_before {
             best = Some((index, t));
         }
     }
     let (object, t) = best?;
-    let normal = shapes::normal(&objects[object], line, &t);
-    Some(Hit { object, t, normal })
+    let (normal, leaves) = shapes::normal(&objects[object], line, &t);
+    Some(Hit { object, t, normal, leaves })
 }
 
 /// The colour of a pixel, unclamped; `i` counts from the left, `j` from the bottom.
@@ -73,8 +84,9 @@ pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
 
 /// The colour beside a pixel, where the ray of a fractional index goes.
 pub fn color_at(scene: &Scene, x: f64, y: f64) -> DVec3 {
-    color_along(scene, &Line::of_pixel(&scene.camera, scene.screen, x, y), &Real::zero(), 0)
-        .map_or(scene.background(), |color| color.to_dvec3())
+    let line = Line::of_pixel(&scene.camera, scene.screen, x, y);
+    let path = Path { start: Real::zero(), bounces: 0, weight: DVec3::ONE.into(), has_met_glass: false };
+    color_along(scene, &line, &path).to_dvec3()
 }
 
 /// Which object a pixel shows, and its normal there.
@@ -88,54 +100,100 @@ pub fn image(scene: &Scene) -> RgbImage {
     let (width, height) = (scene.screen.width(), scene.screen.height());
     let pixels: Vec<_> = (0..width * height)
         .into_par_iter()
-        .flat_map_iter(|k| levels(color(scene, k % width, height - 1 - k / width)))
+        .flat_map_iter(|k| levels(scene.tone, color(scene, k % width, height - 1 - k / width)))
         .collect();
     RgbImage::from_raw(width, height, pixels).unwrap_or_default()
 }
 
-/// Display values as the language makes levels of them.
-pub fn levels(color: DVec3) -> [u8; 3] {
-    color.to_array().map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8)
+/// Colours as the language makes levels of them, before they are rounded.
+pub fn shown(tone: Tone, color: DVec3) -> DVec3 {
+    let encoded = |light: f64| match tone {
+        Tone::Plain => light,
+        Tone::Srgb if light <= 0.003_130_8 => 12.92 * light,
+        Tone::Srgb => 1.055 * light.powf(1.0 / 2.4) - 0.055,
+    };
+    255.0 * DVec3::from_array(color.to_array().map(|c| encoded(c.clamp(0.0, 1.0))))
 }
 
-/// `None` where the ray meets nothing.
-fn color_along(scene: &Scene, line: &Line, start: &Real, bounces: u32) -> Option<Vector> {
-    let hit = nearest_on(&scene.objects, line, start)?;
-    let material = scene.objects[hit.object].material();
-    let point = line.origin.plus(&hit.t, &line.direction);
+/// The levels of a pixel.
+pub fn levels(tone: Tone, color: DVec3) -> [u8; 3] {
+    shown(tone, color).to_array().map(|level| level.round() as u8)
+}
+
+/// What an object lets through.
+fn glass_of(object: &Object) -> Option<Glass> {
+    object.material().finish().and_then(|finish| finish.glass)
+}
+
+/// How a ray has come where it starts.
+struct Path {
+    /// What it meets nearer than that it has passed.
+    start: Real,
+    bounces: u32,
+    /// The product of all factors, without signs.
+    weight: Vector,
+    has_met_glass: bool,
+}
+
+fn color_along(scene: &Scene, line: &Line, path: &Path) -> Vector {
+    let Some(hit) = nearest_on(&scene.objects, line, &path.start) else {
+        let (low, high) = scene.background.colors();
+        let height = 0.5 + 0.5 * line.direction.unit().0[1].to_f64();
+        return (low + (high.unwrap_or(low) - low) * height).into();
+    };
+    let object = &scene.objects[hit.object];
+    let material = object.material();
+    let (place, face) = shapes::place(object, line, &hit.t);
+    let [ambient, diffuse, mirror] = pattern::coefficients(material, &place, face);
+    let point = line.at(&hit.t);
     // A point on a surface is irrational: the ray that leaves it meets the surface again next to its start.
-    let start = Real::from(shapes::extent(&scene.objects)).shifted(-300);
-    let mut color = Vector::from(material.ambient());
-    for Light::Directional(light) in scene.lights.iter() {
-        let towards = Vector::from(light.direction()).opposite().unit();
-        let cosine = hit.normal.dot(&towards);
-        let shadow = Line { origin: point.clone(), direction: towards };
-        if cosine.sign() > 0
-            && !scene.objects.iter().any(|object| shapes::first(object, &shadow, &start).is_some())
-        {
-            let scattered = Vector::from(material.diffuse());
-            let arriving = Vector::from(light.color());
-            for axis in 0..3 {
-                let term = &(&arriving.0[axis] * &scattered.0[axis]) * &cosine;
-                color.0[axis] = &color.0[axis] + &term;
-            }
-        }
-    }
-    if bounces < MAX_BOUNCES && material.mirror() != DVec3::ZERO {
-        let mirrored = reflected(&line.direction, &hit.normal);
-        let next = Line { origin: point, direction: mirrored.unit() };
-        let seen = color_along(scene, &next, &start, bounces + 1)
-            .unwrap_or_else(|| Vector::from(scene.background()));
-        let mirror = Vector::from(material.mirror());
-        for axis in 0..3 {
-            color.0[axis] = &color.0[axis] + &(&mirror.0[axis] * &seen.0[axis]);
-        }
-    }
-    Some(color)
-}
+    let farthest = point.to_dvec3().abs().max_element();
+    let start = Real::from(shapes::extent(&scene.objects).max(farthest)).shifted(-300);
 
-/// The direction mirrored at a surface of this unit normal.
-pub fn reflected(direction: &Vector, normal: &Vector) -> Vector {
-    let twice = direction.dot(normal).shifted(1);
-    direction.plus(&-&twice, normal)
+    let mut color = ambient;
+    let shine = material.finish().and_then(|finish| finish.shine);
+    for light in scene.lights.iter() {
+        let Some(arriving) = light::arriving(scene, light, &point, &hit.normal, &start) else { continue };
+        let cosine = hit.normal.dot(&arriving.towards);
+        let mut answer = diffuse.times(&Vector([cosine.clone(), cosine.clone(), cosine]));
+        if let Some(shine) = shine {
+            let towards_eye = line.direction.unit().opposite();
+            let part = light::highlight(shine.exponent(), &hit.normal, &arriving.towards, &towards_eye);
+            answer = answer.plus(&Real::from(part), &shine.color().into());
+        }
+        color = color.plus(&Real::from(1.0), &arriving.color.times(&answer));
+    }
+
+    let one = Real::from(1.0);
+    let mut mirrored = mirror;
+    let mut through = None;
+    let glass = glass_of(object);
+    if let Some(glass) = glass {
+        let ior = Real::from(glass.ior());
+        let index = if hit.leaves && shapes::has_inside(object) { one.over(&ior) } else { ior };
+        let direction = line.direction.unit();
+        let (share, bent) = glass::refracted(&direction, &hit.normal, &index);
+        mirrored = Vector(mirrored.0.map(|channel| &channel + &share));
+        through = bent.map(|bent| {
+            let factor = Vector::from(DVec3::ZERO).plus(&(&one - &share), &glass.color().into());
+            (factor, if shapes::has_inside(object) { bent } else { direction })
+        });
+    }
+    let onwards = [Some((mirrored, reflected(&line.direction, &hit.normal).unit())), through];
+    for (factor, direction) in onwards.into_iter().flatten() {
+        let weight = path.weight.times(&factor.magnitude());
+        let has_met_glass = path.has_met_glass || glass.is_some();
+        let least = match scene.tone {
+            Tone::Plain => 2f64.powi(-12),
+            Tone::Srgb => 2f64.powi(-16),
+        };
+        let counts =
+            weight.0.iter().any(|w| if has_met_glass { *w >= Real::from(least) } else { w.sign() > 0 });
+        if path.bounces < scene.depth.bounces() && counts {
+            let next = Line { origin: point.clone(), direction };
+            let path = Path { start: start.clone(), bounces: path.bounces + 1, weight, has_met_glass };
+            color = color.plus(&one, &factor.times(&color_along(scene, &next, &path)));
+        }
+    }
+    color
 }

@@ -6,7 +6,7 @@
 use std::cmp::Ordering;
 use std::ops::{Add, Mul, Neg, Sub};
 
-use astro_float_num::{BigFloat, RoundingMode, Sign};
+use astro_float_num::{BigFloat, Consts, RoundingMode, Sign};
 use glam::DVec3;
 
 /// Bits of the significand: what `b² - a·c` of a sphere needs for exactness, with room for scenes of wide range.
@@ -31,6 +31,21 @@ impl Real {
     /// Square root of a number that is not negative.
     pub fn root(&self) -> Self {
         Self(self.0.sqrt(BITS, ROUNDING))
+    }
+
+    /// The tangent of half an angle in degrees.
+    pub(super) fn tangent_of_half(degrees: f64) -> Self {
+        // The cache of constants is only a matter of time.
+        let Ok(mut constants) = Consts::new() else { return Self(BigFloat::nan(None)) };
+        let half_turn = Self(constants.pi(BITS, ROUNDING));
+        let angle = (&Self::from(degrees) * &half_turn).over(&Self::from(360.0));
+        Self(angle.0.tan(BITS, ROUNDING, &mut constants))
+    }
+
+    /// The smallest whole number that is not less, for numbers below 2^50.
+    pub(super) fn ceiling(&self) -> f64 {
+        let near = self.to_f64().ceil();
+        [near - 1.0, near, near + 1.0].into_iter().find(|&whole| Self::from(whole) >= *self).unwrap_or(near)
     }
 
     /// -1, 0 or 1.
@@ -162,6 +177,16 @@ impl Vector {
     pub fn unit(&self) -> Self {
         let length = self.dot(self).root();
         Self(std::array::from_fn(|axis| self.0[axis].over(&length)))
+    }
+
+    /// Componentwise.
+    pub(super) fn times(&self, other: &Self) -> Self {
+        Self(std::array::from_fn(|axis| &self.0[axis] * &other.0[axis]))
+    }
+
+    /// Without signs.
+    pub(super) fn magnitude(&self) -> Self {
+        Self(std::array::from_fn(|axis| self.0[axis].magnitude()))
     }
 
     /// Away from this one.

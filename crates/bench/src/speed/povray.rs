@@ -75,13 +75,14 @@ fn translated(scene: &Scene) -> Result<String> {
          background {{ rgb {} }}\n\
          camera {{ perspective location {} direction {} right {} up {} }}\n",
         MAX_BOUNCES + 1,
-        vector(scene.background()),
+        vector(scene.background.color().context("a sky is not translated")?),
         vector(pinhole.eye()),
         vector(direction),
         vector(right),
         vector(up)
     );
-    for Light::Directional(light) in scene.lights.iter() {
+    for light in scene.lights.iter() {
+        let Light::Directional(light) = light else { anyhow::bail!("{light:?} is not translated") };
         let from = vector(-1e4 * light.direction());
         writeln!(text, "light_source {{ {from} rgb {} parallel point_at 0 }}", vector(light.color()))?;
     }
@@ -98,6 +99,12 @@ fn translated(scene: &Scene) -> Result<String> {
                 let [u, v, w] = t.vertices().map(vector);
                 writeln!(text, "triangle {{ {u}, {v}, {w} {surface} }}")?;
             }
+            Object::Plane(_)
+            | Object::Disc(_)
+            | Object::Cylinder(_)
+            | Object::Cone(_)
+            | Object::Torus(_)
+            | Object::Instance(_) => anyhow::bail!("{object:?} is not translated"),
         }
     }
     Ok(text)

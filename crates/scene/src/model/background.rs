@@ -60,12 +60,17 @@ impl Scripted for Background {
         "Background",
         &[
             Field::new(Parameter::Background, &["r", "g", "b"], Kind::Color, Values::Clamped),
-            Field::new(Parameter::Background, &["R", "G", "B"], Kind::Color, Values::Clamped).optional(),
+            Field::new(Parameter::Background, &["R", "G", "B"], Kind::Color, Values::Clamped)
+                .optional("the first colour"),
         ],
     );
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
-        Ok(Self::new(numbers.vector())?)
+        let low = numbers.vector();
+        Ok(match numbers.optional_vector() {
+            Some(high) => Self::sky(low, high)?,
+            None => Self::new(low)?,
+        })
     }
 
     fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {

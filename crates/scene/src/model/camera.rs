@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use super::invalid::{Faults, InvalidValue, Parameter, direction, finite, positive};
 use super::look::Look;
 use super::vector::{to_unit_scale, unit};
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values, write_line};
+use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values, write_line};
 
 /// The command of the orthographic camera.
 pub(crate) const ORTHOCAMERA: Form = Form::new("Orthocamera", &[]);
@@ -29,9 +29,21 @@ impl Camera {
     pub(crate) fn write(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {
             Self::Orthographic => writeln!(f, "{}", ORTHOCAMERA.name),
-            Self::Pinhole(pinhole) => write_line(f, pinhole),
-            Self::Look(look) => write_line(f, look),
+            Self::Pinhole(pinhole) => write_line(f, pinhole, None),
+            Self::Look(look) => write_line(f, look, None),
         }
+    }
+}
+
+impl From<Pinhole> for Camera {
+    fn from(pinhole: Pinhole) -> Self {
+        Self::Pinhole(pinhole)
+    }
+}
+
+impl From<Look> for Camera {
+    fn from(look: Look) -> Self {
+        Self::Look(look)
     }
 }
 
@@ -149,7 +161,8 @@ impl Scripted for Pinhole {
             Field::new(Parameter::WindowCorner, &["au", "av"], Kind::WindowPosition, Values::Any),
             Field::new(Parameter::WindowCorner, &["bu", "bv"], Kind::WindowPosition, Values::Any),
         ],
-    );
+    )
+    .with(&[Together::NotParallel(1, 2), Together::DifferEverywhere(4, 5)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let [eye, gaze, up] = [numbers.vector(), numbers.vector(), numbers.vector()];
@@ -166,7 +179,7 @@ impl Scripted for Pinhole {
 
 /// Directions whose sine is below this are taken for parallel: what is parallel as written in decimals is only nearly
 /// so once it is rounded to floats.
-const PARALLEL: f64 = 4.0 * f64::EPSILON;
+pub(crate) const PARALLEL: f64 = 4.0 * f64::EPSILON;
 
 pub(super) fn is_parallel(a: DVec3, b: DVec3) -> bool {
     let (a, b) = (level(a), level(b));

@@ -52,6 +52,9 @@ pub enum InvalidValue {
     /// A camera looks at the place where it is.
     #[error("the eye and the target must differ")]
     NoGaze,
+    /// The last frame comes before the first.
+    #[error("the first frame must not be behind the last")]
+    FramesBackwards,
     /// A gradient has no width.
     #[error("the ends of the gradient must differ")]
     EmptyGradient,
@@ -76,6 +79,7 @@ impl InvalidValue {
             Self::NoRadius => matches!(parameter, Parameter::RadiusA | Parameter::RadiusB),
             Self::ThickTorus => parameter == Parameter::Thickness,
             Self::NoGaze => parameter == Parameter::Target,
+            Self::FramesBackwards => matches!(parameter, Parameter::FirstFrame | Parameter::LastFrame),
             Self::EmptyGradient => matches!(parameter, Parameter::GradientStart | Parameter::GradientEnd),
         }
     }
@@ -200,6 +204,12 @@ pub enum Parameter {
     GradientStart,
     /// Where a gradient ends.
     GradientEnd,
+    /// From a colour to the levels of a pixel.
+    Tone,
+    /// The number of the first frame.
+    FirstFrame,
+    /// The number of the last frame.
+    LastFrame,
     /// How many frames an animation waits for.
     FrameCount,
     /// Frames a second.
@@ -254,6 +264,9 @@ impl fmt::Display for Parameter {
             Self::CellSize => "the size s",
             Self::GradientStart => "the start a",
             Self::GradientEnd => "the end b",
+            Self::Tone => "the tone",
+            Self::FirstFrame => "the first frame a",
+            Self::LastFrame => "the last frame b",
             Self::FrameCount => "`frames`",
             Self::FrameRate => "`fps`",
         })

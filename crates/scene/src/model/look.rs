@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::camera::{cross, is_parallel, level};
 use super::invalid::{Faults, InvalidValue, Parameter, finite};
 use super::vector::unit;
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
+use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
 
 /// A pinhole camera at an eye that looks at a target, with square pixels: the ray of column i and row j goes
 /// tan(fov/2)·((2i + 1 - nx)·u + (2j + 1 - ny)·v)/ny - w, in the frame of [`Look::basis`].
@@ -100,15 +100,15 @@ impl Scripted for Look {
             Field::new(Parameter::Eye, &["ex", "ey", "ez"], Kind::Position, Values::Any),
             Field::new(Parameter::Target, &["tx", "ty", "tz"], Kind::Position, Values::Any),
             Field::new(Parameter::FieldOfView, &["fov"], Kind::Angle, Values::FieldOfView),
-            Field::new(Parameter::Up, &["upx", "upy", "upz"], Kind::Direction, Values::NotZero).optional(),
+            Field::new(Parameter::Up, &["upx", "upy", "upz"], Kind::Direction, Values::NotZero)
+                .optional("0 1 0, or 0 0 -1 for a gaze along y"),
         ],
-    );
+    )
+    .with(&[Together::Differ(0, 1), Together::LooksAside(0, 1, 3)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let (eye, target, field_of_view) = (numbers.vector(), numbers.vector(), numbers.number());
-        // What was left out is zero.
-        let up = numbers.vector();
-        let up = if up == DVec3::ZERO { None } else { Some(up) };
+        let up = numbers.optional_vector();
         Self::checked(eye, target, field_of_view, up).map_err(Faults)
     }
 

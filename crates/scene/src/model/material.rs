@@ -9,14 +9,14 @@ use super::invalid::{InvalidValue, Parameter, finite, positive};
 use crate::form::{Field, Kind, Line, Numbers, Values};
 
 /// Of an object's parameters.
-pub(super) const AMBIENT: Field =
+pub(in crate::model) const AMBIENT: Field =
     Field::new(Parameter::Ambient, &["ar", "ag", "ab"], Kind::Color, Values::Any);
 /// Of an object's parameters.
-pub(super) const DIFFUSE: Field =
+pub(in crate::model) const DIFFUSE: Field =
     Field::new(Parameter::Diffuse, &["rr", "rg", "rb"], Kind::Coefficients, Values::Any);
 /// Of an object's parameters.
-pub(super) const MIRROR: Field =
-    Field::new(Parameter::Mirror, &["sr", "sg", "sb"], Kind::Coefficients, Values::Any);
+pub(in crate::model) const MIRROR: Field =
+    Field::new(Parameter::Mirror, &["sr", "sg", "sb"], Kind::Coefficients, Values::Any).from_the_end("0");
 
 /// Coefficients of a surface, a channel each; any finite numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -216,12 +216,18 @@ impl Material {
         self.coefficients.mirror
     }
 
-    /// [`AMBIENT`], [`DIFFUSE`] and [`MIRROR`].
+    /// [`AMBIENT`], [`DIFFUSE`] and [`MIRROR`], or the material that was named in their place.
     pub(super) fn read(numbers: &mut Numbers<'_>) -> Result<Self, InvalidValue> {
-        Self::new(numbers.vector(), numbers.vector(), numbers.vector())
+        match numbers.surface() {
+            Some(material) => Ok(material.clone()),
+            None => Self::new(numbers.vector(), numbers.vector(), numbers.vector()),
+        }
     }
 
     pub(super) fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        if let Some(name) = line.surface() {
+            return line.word(name);
+        }
         line.vector(self.ambient())?;
         line.vector(self.diffuse())?;
         let mirror = self.mirror();

@@ -7,6 +7,7 @@
 
 mod background;
 mod camera;
+mod clause;
 mod invalid;
 mod lights;
 mod look;
@@ -20,6 +21,7 @@ use glam::DVec3;
 
 pub use background::Background;
 pub use camera::{Camera, Pinhole};
+pub use clause::Clause;
 pub use invalid::{InvalidValue, Parameter};
 pub use lights::{DirectionalLight, Lamp, Light};
 pub use look::Look;
@@ -29,8 +31,11 @@ pub use screen::Screen;
 pub use shapes::{Cone, Cuboid, Cylinder, Disc, Instance, Object, Placement, Plane, Sphere, Torus, Triangle};
 pub use vector::unit;
 
-pub(crate) use camera::ORTHOCAMERA;
+pub(crate) use camera::{ORTHOCAMERA, PARALLEL};
+pub(crate) use clause::{Clauses, MATERIAL};
 pub(crate) use invalid::{Doubt, Faults};
+pub(crate) use sampling::FrameNumbers;
+pub(crate) use shapes::USE;
 
 use crate::shared_slice::SharedSlice;
 
@@ -96,11 +101,11 @@ mod tests {
     fn a_background_is_clamped_and_finite() {
         let mut scene = Scene::new(Screen::new(1, 1).unwrap(), Camera::default());
         scene.set_background(DVec3::new(-1.0, 0.5, 7.0)).unwrap();
-        assert_eq!(scene.background(), DVec3::new(0.0, 0.5, 1.0));
+        assert_eq!(scene.background.color(), Some(DVec3::new(0.0, 0.5, 1.0)));
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             let fault = scene.set_background(DVec3::new(0.0, bad, 0.0));
             assert_eq!(fault, Err(InvalidValue::NotFinite(Parameter::Background)));
         }
-        assert_eq!(scene.background().y, 0.5, "what stood before stays");
+        assert_eq!(scene.background.along(DVec3::X).y, 0.5, "what stood before stays");
     }
 }

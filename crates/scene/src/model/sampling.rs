@@ -1,6 +1,10 @@
 //! What light in a pixel is: how it is sampled in the pixel, the lens and time, and how it is shown.
 
-use super::invalid::{InvalidValue, Parameter, not_negative};
+use std::fmt;
+
+use super::invalid::{Faults, InvalidValue, Parameter, not_negative};
+use super::screen::whole;
+use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Unit, Values};
 
 /// How many rays a pixel gets at most, and to which error.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,6 +38,31 @@ impl Samples {
     }
 }
 
+impl Scripted for Samples {
+    const FORM: Form = Form::new(
+        "Samples",
+        &[
+            Field::new(Parameter::Samples, &["n"], Kind::Count(Unit::Rays), Values::Whole(1, u32::MAX)),
+            Field::new(Parameter::SamplingError, &["e"], Kind::Error, Values::NotNegative).optional("1"),
+        ],
+    )
+    .fixed();
+
+    fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        let most = whole(Parameter::Samples, 1, u32::MAX, numbers.number());
+        let error = numbers.optional_number().unwrap_or(Self::default().error);
+        match (most, not_negative(Parameter::SamplingError, error)) {
+            (Ok(most), Ok(error)) => Ok(Self::new(most, error)?),
+            (most, error) => Err(Faults(most.err().into_iter().chain(error.err()).collect())),
+        }
+    }
+
+    fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        line.number(self.most.into())?;
+        if *self == (Self { most: self.most, ..Self::default() }) { Ok(()) } else { line.number(self.error) }
+    }
+}
+
 /// One ray a pixel.
 impl Default for Samples {
     fn default() -> Self {
@@ -62,6 +91,19 @@ impl Shutter {
     }
 }
 
+impl Scripted for Shutter {
+    const FORM: Form =
+        Form::new("Shutter", &[Field::new(Parameter::Shutter, &["f"], Kind::Plain, Values::Share)]).fixed();
+
+    fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        Ok(Self::new(numbers.number())?)
+    }
+
+    fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        line.number(self.0)
+    }
+}
+
 /// From a colour to the levels of a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tone {
@@ -70,6 +112,28 @@ pub enum Tone {
     Plain,
     /// Colours are linear light, which the sRGB curve encodes.
     Srgb,
+}
+
+impl Tone {
+    /// Their words, in the order of the numbers that stand for them.
+    const WORDS: &[&str] = &["plain", "srgb"];
+}
+
+impl Scripted for Tone {
+    const FORM: Form =
+        Form::new("Tone", &[Field::new(Parameter::Tone, &["tone"], Kind::Word, Values::OneOf(Self::WORDS))])
+            .fixed();
+
+    fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        Ok(if numbers.number() == 0.0 { Self::Plain } else { Self::Srgb })
+    }
+
+    fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        line.word(match self {
+            Self::Plain => Self::WORDS[0],
+            Self::Srgb => Self::WORDS[1],
+        })
+    }
 }
 
 /// How many mirrorings and refractions are followed, from 0 to 16.
@@ -93,6 +157,22 @@ impl Depth {
     /// How many.
     pub fn bounces(self) -> u32 {
         self.0
+    }
+}
+
+impl Scripted for Depth {
+    const FORM: Form = Form::new(
+        "Depth",
+        &[Field::new(Parameter::Depth, &["n"], Kind::Count(Unit::Bounces), Values::Whole(0, Self::MOST))],
+    )
+    .fixed();
+
+    fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        Ok(Self::new(whole(Parameter::Depth, 0, Self::MOST, numbers.number())?)?)
+    }
+
+    fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        line.number(self.0.into())
     }
 }
 
@@ -132,5 +212,82 @@ impl Lens {
     /// Where it is sharp, along the gaze; `None` for the camera's own distance.
     pub fn distance(self) -> Option<f64> {
         self.distance
+    }
+}
+
+impl Scripted for Lens {
+    const FORM: Form = Form::new(
+        "Lens",
+        &[
+            Field::new(Parameter::LensRadius, &["radius"], Kind::Length, Values::NotNegative),
+            Field::new(Parameter::FocusDistance, &["distance"], Kind::Length, Values::Positive)
+                .optional("the target's, or the window's"),
+        ],
+    );
+
+    fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        let (radius, distance) = (numbers.number(), numbers.optional_number());
+        let faults = [
+            not_negative(Parameter::LensRadius, radius).err(),
+            distance.and_then(|x| super::invalid::positive(Parameter::FocusDistance, x).err()),
+        ];
+        let faults: Vec<_> = faults.into_iter().flatten().collect();
+        if faults.is_empty() { Ok(Self { radius, distance }) } else { Err(Faults(faults)) }
+    }
+
+    fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        line.number(self.radius)?;
+        self.distance.map_or(Ok(()), |distance| line.number(distance))
+    }
+}
+
+/// The frames that a `Trace` is, by their numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct FrameNumbers {
+    pub(crate) first: u32,
+    pub(crate) last: u32,
+}
+
+impl FrameNumbers {
+    /// How many frames.
+    pub(crate) fn count(self) -> u64 {
+        u64::from(self.last - self.first) + 1
+    }
+}
+
+impl Scripted for FrameNumbers {
+    const FORM: Form = Form::new(
+        "Frames",
+        &[
+            Field::new(Parameter::FirstFrame, &["a"], Kind::Count(Unit::Frames), Values::Whole(1, u32::MAX)),
+            Field::new(Parameter::LastFrame, &["b"], Kind::Count(Unit::Frames), Values::Whole(1, u32::MAX))
+                .optional("1 to a"),
+        ],
+    )
+    .with(&[Together::InOrder(0, 1)])
+    .fixed();
+
+    fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        let first = whole(Parameter::FirstFrame, 1, u32::MAX, numbers.number());
+        let last = numbers.optional_number().map(|x| whole(Parameter::LastFrame, 1, u32::MAX, x));
+        match (first, last) {
+            (Ok(count), None) => Ok(Self { first: 1, last: count }),
+            (Ok(first), Some(Ok(last))) if first <= last => Ok(Self { first, last }),
+            (Ok(_), Some(Ok(_))) => Err(InvalidValue::FramesBackwards.into()),
+            (first, last) => Err(Faults(first.err().into_iter().chain(last.and_then(Result::err)).collect())),
+        }
+    }
+
+    fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        if self.first > 1 {
+            line.number(self.first.into())?;
+        }
+        line.number(self.last.into())
+    }
+}
+
+impl Default for FrameNumbers {
+    fn default() -> Self {
+        Self { first: 1, last: 1 }
     }
 }

@@ -58,14 +58,12 @@ impl Scripted for Screen {
                 Values::Whole(1, u32::MAX),
             ),
         ],
-    );
+    )
+    .fixed();
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
-        let [width, height] = [Parameter::ScreenWidth, Parameter::ScreenHeight].map(|side| {
-            let value = numbers.number();
-            let whole = value.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&value);
-            if whole { Ok(value as u32) } else { Err(InvalidValue::NotWhole(side, 1, u32::MAX)) }
-        });
+        let [width, height] = [Parameter::ScreenWidth, Parameter::ScreenHeight]
+            .map(|side| whole(side, 1, u32::MAX, numbers.number()));
         match (width, height) {
             (Ok(width), Ok(height)) => Ok(Self::new(width, height)?),
             (width, height) => Err(Faults([width, height].into_iter().filter_map(Result::err).collect())),
@@ -76,6 +74,12 @@ impl Scripted for Screen {
         line.number(self.width.into())?;
         line.number(self.height.into())
     }
+}
+
+/// A whole number of a range.
+pub(super) fn whole(name: Parameter, least: u32, most: u32, x: f64) -> Result<u32, InvalidValue> {
+    let fits = x.fract() == 0.0 && (f64::from(least)..=f64::from(most)).contains(&x);
+    if fits { Ok(x as u32) } else { Err(InvalidValue::NotWhole(name, least, most)) }
 }
 
 #[cfg(test)]

@@ -1,29 +1,39 @@
 //! Script text to frames and diagnostics.
 //!
-//! Parsing never stops at a fault: what can be said about a text is said in one go. A line is understood alone; only
-//! `Trace` looks at what came before. Nothing is allocated for a line that is in order, and nothing is kept of a
+//! Parsing never stops at a fault: what can be said about a text is said in one go. A line is understood alone, but for
+//! the names that it refers to; `Trace` looks at what came before, and the end at when lines with curves are seen
+//! (`seen`). Nothing is allocated for a line that is in order and has neither curves nor names, and nothing is kept of a
 //! script that has an error. A fault is told once: what follows from one that was told is not.
 //!
 //! Follows `docs/language.md`, where the forms of numbers, blanks and line ends are decided.
 
+mod curve;
+mod definitions;
+mod line;
+mod names;
 mod number;
+mod picture;
+mod seen;
 mod text;
 mod wording;
 
 use std::ops::Range;
-use std::str::Utf8Error;
 
-use crate::command::{Command, MAX_NUMBERS};
+use crate::command::{Act, Command, Reader};
 use crate::diagnostic::Diagnostic;
-use crate::form::{Numbers, Scripted};
+use crate::form::{Names as Kinds, Numbers, Scripted};
 use crate::limits::Limits;
 use crate::model::{
-    Camera, Cone, Cuboid, Cylinder, DirectionalLight, Disc, InvalidValue, Lamp, Light, Object, Plane, Screen,
-    Sphere, Torus, Triangle,
+    Background, Camera, Faults, InvalidValue, Lens, Light, Material, Object, Placement, Screen,
 };
-use crate::report::{Fault, Line, Report};
-use crate::script::{Recorder, Script};
-use text::{Words, lines};
+use crate::report::{Line, Report};
+use crate::script::{Drawn, Recorder, Script, Template, Value};
+use definitions::{GroupInfo, MaterialInfo, OpenGroup, Pending};
+use line::Statement;
+use names::Names;
+use picture::Picture;
+use seen::{Exposure, Moving, Origin};
+use text::lines;
 
 /// What a text turned out to be.
 #[derive(Clone, Debug)]
@@ -56,20 +66,34 @@ struct Parser<'a> {
     report: Report<'a>,
     recorder: Recorder,
     screen: ScreenState,
-    /// Objects of the scene as it stands.
+    picture: Picture<'a>,
+    /// Objects of the scene as it stands, as drawn.
     objects: usize,
+    /// Groups that are drawn in the scene as it stands, each as often as it is drawn.
+    uses: usize,
     /// Lights of the scene as it stands.
     lights: usize,
-    traces: usize,
-    /// Whether a word was probably meant to be a `Trace`.
+    /// Frames so far.
+    frames: u64,
+    exposures: Vec<Exposure>,
     trace_misspelt: bool,
+    /// Whether a line could not be read: an `End` may have stood there, or a `Group`.
+    line_lost: bool,
     /// Where the first command since the last `Trace` stands that has no effect if no other `Trace` comes.
     unseen: Unseen<(Line<'a>, Range<usize>)>,
+    materials: Names<'a, MaterialInfo>,
+    groups: Names<'a, GroupInfo>,
+    group: Option<OpenGroup<'a>>,
+    /// All lines with curves, and what was not seen yet of the scene as it stands.
+    moving: Vec<Moving<'a>>,
+    pending: Pending,
+    /// Names that nothing before them had, of what, and where.
+    unresolved: Vec<(Kinds, Line<'a>, Range<usize>)>,
 }
 
 /// What no `Trace` has shown yet.
 struct Unseen<T> {
-    /// Of what a `Clear` leaves: screen and camera.
+    /// Of what a `Clear` leaves: screen, camera and other settings.
     lasting: Option<T>,
     /// Of what a `Clear` removes.
     removable: Option<T>,
@@ -87,43 +111,6 @@ enum ScreenState {
     Set(Screen),
 }
 
-/// A command whose words are numbers, and as many as it takes.
-struct Statement<'a> {
-    line: Line<'a>,
-    command: Command,
-    words: Words,
-    /// Of the parameters; 0 for optional ones that are missing.
-    values: [f64; MAX_NUMBERS],
-}
-
-/// The first parameter that was probably written with a comma for a point: `1,5`, in a line that would have as many
-/// numbers as its command takes if only blanks separated them.
-fn decimal_comma(text: &str, command: Command, words: &Words) -> Option<Range<usize>> {
-    // Most lines have no comma, which is quickly seen.
-    if !text.contains(',') {
-        return None;
-    }
-    let start = words.command.end;
-    let parameters = text[start..].split('#').next().unwrap_or_default();
-    let is_decimal = |part: &&str| {
-        let digits = |part: &str| part.bytes().all(|b| b.is_ascii_digit()) && !part.is_empty();
-        part.split_once(',')
-            .is_some_and(|(whole, fraction)| digits(whole.trim_start_matches(['+', '-'])) && digits(fraction))
-    };
-    let parts = || parameters.split([' ', '\t']).filter(|part| !part.is_empty());
-    let first = parts().find(is_decimal)?;
-    let at = first.as_ptr().addr() - text.as_ptr().addr();
-    let count = parts().filter(|part| *part != ",").count();
-    command.form().arity().contains(&count).then_some(at..at + first.len())
-}
-
-impl<'a> Statement<'a> {
-    /// Of its command.
-    fn place(&self) -> (Line<'a>, Range<usize>) {
-        (self.line, self.words.command.clone())
-    }
-}
-
 impl<'a> Parser<'a> {
     fn new(limits: &'a Limits, report: Report<'a>) -> Self {
         Self {
@@ -131,27 +118,36 @@ impl<'a> Parser<'a> {
             report,
             recorder: Recorder::default(),
             screen: ScreenState::Unset,
+            picture: Picture::default(),
             objects: 0,
+            uses: 0,
             lights: 0,
-            traces: 0,
+            frames: 0,
+            exposures: Vec::new(),
             trace_misspelt: false,
+            line_lost: false,
             unseen: Unseen::NOTHING,
+            materials: Names::new(),
+            groups: Names::new(),
+            group: None,
+            moving: Vec::new(),
+            pending: Pending::default(),
+            unresolved: Vec::new(),
         }
     }
 
     fn text(mut self, bytes: &'a [u8]) -> Parsed {
         let mut last = Line { number: 1, offset: 0, bytes: &[] };
         for line in lines(bytes) {
-            if let Some(statement) = self.statement(line) {
-                self.run(&statement);
-            }
+            self.line(line);
             last = line;
         }
         self.finish(last)
     }
 
     fn finish(mut self, last: Line<'a>) -> Parsed {
-        if self.traces == 0 && !self.trace_misspelt {
+        self.close_forgotten_group();
+        if self.exposures.is_empty() && !self.trace_misspelt {
             let end = last.bytes.len();
             self.report.error(last, end..end, wording::no_trace);
         } else {
@@ -161,171 +157,96 @@ impl<'a> Parser<'a> {
                 self.report.warning(line, span, wording::unused);
             }
         }
+        self.tell_unused_names();
+        self.settle_all();
+        seen::check(&self.moving, &self.exposures, &mut self.report);
         let script = if self.report.has_errors() { None } else { self.recorder.finish() };
         Parsed { script, diagnostics: self.report.finish() }
     }
 
-    /// `None` for a line without a command and for one with a fault, which is reported.
-    fn statement(&mut self, line: Line<'a>) -> Option<Statement<'a>> {
-        let text = match std::str::from_utf8(line.bytes) {
-            Ok(text) => text,
-            Err(error) => self.not_utf8(line, error)?,
-        };
-        if let Some(at) = text.find('\r') {
-            self.report.error(line, at..at + 1, wording::lone_carriage_return);
-            self.expect_no_more();
-            return None;
-        }
-        let words = Words::of(text.as_bytes())?;
-        let name = &text[words.command.clone()];
-        let Some(command) = Command::from_name(name) else {
-            self.unknown_command(line, name, words.command);
-            return None;
-        };
-        let values = self.values(line, text, command, &words);
-        if values.is_none() {
-            self.expect_no_more_of(command);
-        } else if words.count() > *command.form().arity().start()
-            && let Some(comma) = decimal_comma(text, command, &words)
-        {
-            self.report.warning(line, comma.clone(), || wording::decimal_comma(&text[comma]));
-        }
-        values.map(|values| Statement { line, command, words, values })
-    }
-
-    /// The readable start of the line if only its comment is faulty.
-    fn not_utf8(&mut self, line: Line<'a>, error: Utf8Error) -> Option<&'a str> {
-        let start = error.valid_up_to();
-        let end = error.error_len().map_or(line.bytes.len(), |length| start + length);
-        self.report.error(line, start..end, || Fault::not_utf8(line, start..end, "script"));
-        let text = std::str::from_utf8(&line.bytes[..start]).ok().filter(|text| text.contains('#'));
-        if text.is_none() {
-            self.expect_no_more();
-        }
-        text
-    }
-
-    fn unknown_command(&mut self, line: Line<'a>, name: &str, span: Range<usize>) {
-        // Looking for it takes longer than parsing a line.
-        let nearest = if self.report.describes_next() { Command::nearest(name) } else { None };
-        self.report.error(line, span, || wording::unknown_command(name, nearest));
-        if let Some(command) = nearest {
-            self.expect_no_more_of(command);
-        }
-    }
-
     /// A line could not be read: what is missing may stand in it.
     fn expect_no_more(&mut self) {
+        self.line_lost = true;
         self.expect_no_more_of(Command::Screen);
         self.expect_no_more_of(Command::Trace);
     }
 
     /// A command was there, though faulty: that it is missing would be told in vain.
     fn expect_no_more_of(&mut self, command: Command) {
-        match command {
-            Command::Trace => {
+        match command.act() {
+            Act::Trace => {
                 self.trace_misspelt = true;
                 self.unseen = Unseen::NOTHING;
             }
-            Command::Screen => {
+            Act::Screen => {
                 if matches!(self.screen, ScreenState::Unset) {
                     self.screen = ScreenState::Faulty;
                 }
             }
-            Command::Orthocamera
-            | Command::Camera
-            | Command::Background
-            | Command::Sphere
-            | Command::Triangle
-            | Command::Cuboid
-            | Command::Look
-            | Command::Plane
-            | Command::Disc
-            | Command::Cylinder
-            | Command::Cone
-            | Command::Torus
-            | Command::Ilight
-            | Command::Plight
-            | Command::Clear => {}
+            Act::Group | Act::End => self.line_lost = true,
+            Act::Camera(_)
+            | Act::Background
+            | Act::Lens
+            | Act::Samples
+            | Act::Shutter
+            | Act::Tone
+            | Act::Depth
+            | Act::Frames
+            | Act::Material
+            | Act::Use
+            | Act::Object(_)
+            | Act::Light(_)
+            | Act::Clear => {}
         }
-    }
-
-    /// The values of the parameters; `None` if there is a fault in them or in their number, which is reported.
-    fn values(
-        &mut self,
-        line: Line<'a>,
-        text: &str,
-        command: Command,
-        words: &Words,
-    ) -> Option<[f64; MAX_NUMBERS]> {
-        let mut values = [0.0; MAX_NUMBERS];
-        let mut good = true;
-        let (least, most) = command.form().arity().into_inner();
-        for (i, span) in words.parameters().iter().take(most).enumerate() {
-            let word = &text[span.clone()];
-            match number::parse(word) {
-                Ok(value) => values[i] = value,
-                Err(fault) => {
-                    good = false;
-                    self.report.error(line, span.clone(), || {
-                        wording::bad_number(fault, command.form().number(i).0, word)
-                    });
-                }
-            }
-        }
-        if words.count() < least {
-            good = false;
-            self.report.error(line, words.end(), || wording::too_few(command, words));
-        } else if words.count() > most {
-            good = false;
-            self.report.error(line, words.rest(most), || {
-                let first = words.parameters().get(most).map_or("", |span| &text[span.clone()]);
-                wording::too_many(
-                    command,
-                    words,
-                    first,
-                    decimal_comma(text, command, words).map(|comma| &text[comma]),
-                )
-            });
-        }
-        good.then_some(values)
     }
 
     fn run(&mut self, s: &Statement<'a>) {
-        match s.command {
-            Command::Screen => self.screen(s),
-            Command::Orthocamera => self.camera(s, Some(Camera::Orthographic)),
-            Command::Camera => {
-                let pinhole = self.read(s).map(Camera::Pinhole);
-                self.camera(s, pinhole);
-            }
-            Command::Look => {
-                let look = self.read(s).map(Camera::Look);
-                self.camera(s, look);
-            }
-            Command::Background => self.background(s),
-            Command::Sphere => self.object::<Sphere>(s),
-            Command::Triangle => self.object::<Triangle>(s),
-            Command::Cuboid => self.object::<Cuboid>(s),
-            Command::Plane => self.object::<Plane>(s),
-            Command::Disc => self.object::<Disc>(s),
-            Command::Cylinder => self.object::<Cylinder>(s),
-            Command::Cone => self.object::<Cone>(s),
-            Command::Torus => self.object::<Torus>(s),
-            Command::Ilight => self.light::<DirectionalLight>(s),
-            Command::Plight => self.light::<Lamp>(s),
-            Command::Clear => self.clear(),
-            Command::Trace => self.trace(s),
+        let act = s.command.act();
+        if self.group.is_some() && !matches!(act, Act::Object(_) | Act::Use | Act::End) {
+            self.leave_group_at(s);
+        }
+        match act {
+            Act::Screen => self.screen(s),
+            Act::Camera(read) => self.camera(s, read),
+            Act::Background => self.background(s),
+            Act::Lens => self.lens(s),
+            Act::Samples => self.set(s, |recorder, samples| recorder.samples = samples),
+            Act::Shutter => self.set(s, |recorder, shutter| recorder.shutter = shutter),
+            Act::Tone => self.set(s, |recorder, tone| recorder.tone = tone),
+            Act::Depth => self.set(s, |recorder, depth| recorder.depth = depth),
+            Act::Frames => self.set(s, |recorder, numbers| recorder.numbers = numbers),
+            Act::Material => self.material(s),
+            Act::Group => self.open_group(s),
+            Act::End => self.end_group(s),
+            Act::Use => self.draw_group(s),
+            Act::Object(read) => self.object(s, read),
+            Act::Light(read) => self.light(s, read),
+            Act::Clear => self.clear(),
+            Act::Trace => self.trace(s),
         }
     }
 
     /// What the line holds; `None` for what is no such thing, which is reported.
-    fn read<T: Scripted>(&mut self, s: &Statement<'a>) -> Option<T> {
-        match T::read(&mut Numbers::new(&s.values)) {
+    fn read<T>(&mut self, s: &Statement<'a>, surface: Option<&Material>, reader: Reader<T>) -> Option<T> {
+        match reader(&mut Numbers::new(&s.values, s.words.count(), surface)) {
             Ok(item) => Some(item),
             Err(faults) => {
-                faults.0.into_iter().for_each(|fault| self.invalid(s, fault));
+                self.invalid(s, faults);
                 None
+            }
+        }
+    }
+
+    /// What the line holds, or the line itself if it has curves, whose conditions are looked at when it is known when it
+    /// is seen. With it the number of the line among those with curves.
+    fn read_value<T>(&mut self, s: &Statement<'a>, reader: Reader<T>) -> Option<(Value<T>, Option<usize>)> {
+        match &s.row {
+            None => self.read(s, None, reader).map(|value| (Value::Still(value), None)),
+            Some(row) => {
+                let template = Template { command: s.command, row: row.clone() };
+                let number =
+                    self.keep_moving(s.line, s.words.parameters().to_vec(), Origin::Command(s.command), row);
+                Some((Value::Moving(template), Some(number)))
             }
         }
     }
@@ -333,7 +254,7 @@ impl<'a> Parser<'a> {
     fn screen(&mut self, s: &Statement<'a>) {
         self.unseen.lasting.get_or_insert_with(|| s.place());
         let limit = self.limits.max_pixels;
-        self.screen = match self.read::<Screen>(s) {
+        self.screen = match self.read(s, None, Screen::read) {
             Some(screen) if screen.pixels() <= limit => ScreenState::Set(screen),
             Some(screen) => {
                 let span = s.words.span(0..2);
@@ -342,56 +263,146 @@ impl<'a> Parser<'a> {
             }
             None => ScreenState::Faulty,
         };
+        self.picture.screen_set();
     }
 
-    fn camera(&mut self, s: &Statement<'a>, camera: Option<Camera>) {
+    fn camera(&mut self, s: &Statement<'a>, read: Reader<Camera>) {
         self.unseen.lasting.get_or_insert_with(|| s.place());
-        if let Some(camera) = camera {
-            self.recorder.set_camera(camera);
-        }
+        let Some((camera, moving)) = self.read_value(s, read) else {
+            self.picture.camera_faulty();
+            return;
+        };
+        self.picture.camera_set(s, &camera);
+        let old = self.pending.camera.replace((moving, self.exposures.len()));
+        self.settle(old);
+        self.record(|recorder| recorder.set_camera(camera));
+    }
+
+    fn lens(&mut self, s: &Statement<'a>) {
+        self.unseen.lasting.get_or_insert_with(|| s.place());
+        let Some((lens, moving)) = self.read_value(s, Lens::read) else { return };
+        self.picture.lens_set(s, &lens);
+        let old = self.pending.lens.replace((moving, self.exposures.len()));
+        self.settle(old);
+        self.record(|recorder| recorder.set_lens(lens));
     }
 
     fn background(&mut self, s: &Statement<'a>) {
         self.unseen.removable.get_or_insert_with(|| s.place());
-        if let Some(background) = self.read(s) {
-            self.recorder.set_background(background);
+        let Some((background, moving)) = self.read_value(s, Background::read) else { return };
+        let old = self.pending.background.replace((moving, self.exposures.len()));
+        self.settle(old);
+        self.record(|recorder| recorder.set_background(background));
+    }
+
+    /// A setting that a `Clear` leaves.
+    fn set<T: Scripted>(&mut self, s: &Statement<'a>, set: impl FnOnce(&mut Recorder, T)) {
+        self.unseen.lasting.get_or_insert_with(|| s.place());
+        if let Some(value) = self.read(s, None, T::read) {
+            // Also of a script with errors: what a `Trace` is, is asked later.
+            set(&mut self.recorder, value);
         }
     }
 
-    fn object<T: Scripted + Into<Object>>(&mut self, s: &Statement<'a>) {
-        self.unseen.removable.get_or_insert_with(|| s.place());
-        let Some(object) = self.read::<T>(s).map(Into::into) else { return };
-        if let Some(doubt) = object.doubt() {
-            let place = s.command.form().place(|_, parameter| parameter == doubt.parameter());
-            self.report.warning(s.line, s.words.span(place), || wording::doubtful(doubt));
+    fn object(&mut self, s: &Statement<'a>, read: Reader<Object>) {
+        if self.group.is_none() {
+            self.unseen.removable.get_or_insert_with(|| s.place());
         }
-        self.objects += 1;
-        self.check_limit(s, self.objects, self.limits.max_objects, "objects in a scene");
-        self.record(|recorder| recorder.add_object(object));
+        let surface = s.surface.clone().map(|span| self.refer(Kinds::Materials, s.line, span));
+        let (number, material) = match surface {
+            None => (None, None),
+            Some(Some(number)) => {
+                let info = self.materials.get(number).thing.as_ref();
+                // Of one with curves its line is kept; of a faulty one nothing.
+                (Some(number), info.map(|info| info.still.clone()))
+            }
+            Some(None) => (None, Some(Some(Material::default()))),
+        };
+        let moves = matches!(material, Some(None));
+        let is_still = s.row.is_none() && !moves;
+        let drawn = if is_still {
+            let material = material.flatten().or(number.map(|_| Material::default()));
+            let Some(object) = self.read(s, material.as_ref(), read) else { return };
+            if let Some(doubt) = object.doubt() {
+                let place = s.command.form().place(|_, parameter| parameter == doubt.parameter());
+                self.report.warning(s.line, s.words.span(place), || wording::doubtful(doubt));
+            }
+            Err(object)
+        } else {
+            let row = match &s.row {
+                Some(row) => row.clone(),
+                None => {
+                    let fits = self.read(s, Some(&Material::default()), read);
+                    if fits.is_none() {
+                        return;
+                    }
+                    s.still_row()
+                }
+            };
+            let template = Template { command: s.command, row: row.clone() };
+            if s.row.is_some() {
+                let spans = s.words.parameters().to_vec();
+                let moving = self.keep_moving(s.line, spans, Origin::Command(s.command), &row);
+                self.see_moving(moving);
+            }
+            Ok(Drawn::Object { template, surface: number })
+        };
+        if let Some(number) = number.filter(|_| moves) {
+            self.see_material(number);
+        }
+        self.count_drawn(s, 1, 0);
+        let is_good = !self.has_errors();
+        match (&mut self.group, drawn) {
+            (Some(group), Err(object)) if is_good => group.recorder.add_object(object, number),
+            (Some(group), Ok(drawn)) if is_good => group.recorder.add_drawn(drawn),
+            (Some(_), _) => {}
+            (None, Err(object)) => self.record(|recorder| recorder.add_object(object, number)),
+            (None, Ok(drawn)) => self.record(|recorder| recorder.add_drawn(drawn)),
+        }
     }
 
-    fn light<T: Scripted + Into<Light>>(&mut self, s: &Statement<'a>) {
+    fn light(&mut self, s: &Statement<'a>, read: Reader<Light>) {
         self.unseen.removable.get_or_insert_with(|| s.place());
-        let Some(light) = self.read::<T>(s).map(Into::into) else { return };
+        let Some((light, moving)) = self.read_value(s, read) else { return };
+        if let Some(moving) = moving {
+            self.see_moving(moving);
+        }
         self.lights += 1;
-        self.check_limit(s, self.lights, self.limits.max_lights, "lights in a scene");
+        let (count, limit) = (self.lights, self.limits.max_lights);
+        self.check_limit(s, count - 1, count, limit, "lights in a scene");
         self.record(|recorder| recorder.add_light(light));
     }
 
     fn clear(&mut self) {
-        (self.objects, self.lights) = (0, 0);
+        (self.objects, self.uses, self.lights) = (0, 0, 0);
         if let Some((line, span)) = self.unseen.removable.take() {
             self.report.warning(line, span, wording::cleared);
         }
+        self.settle_scene();
         self.recorder.clear();
     }
 
     fn trace(&mut self, s: &Statement<'a>) {
-        self.traces += 1;
         self.unseen = Unseen::NOTHING;
-        self.check_limit(s, self.traces, self.limits.max_frames.unwrap_or(usize::MAX), "frames");
+        let (numbers, shutter) = (self.recorder.numbers, self.recorder.shutter);
+        let before = self.frames;
+        self.frames = before.saturating_add(numbers.count());
+        let limit = match self.limits.max_frames {
+            Some(limit) => limit as u64,
+            None if numbers.count() > 1 => Limits::FRAMES,
+            None => u64::MAX,
+        };
+        if self.frames > limit && (before <= limit || self.limits.max_frames.is_none()) {
+            let frames = self.frames;
+            self.report.error(s.line, s.words.command.clone(), || wording::too_many_frames(frames, limit));
+        }
+        self.exposures.push(Exposure { numbers, open: shutter.open() });
         match self.screen {
-            ScreenState::Set(screen) => self.record(|recorder| recorder.trace(screen)),
+            ScreenState::Set(screen) => {
+                self.picture.check(screen, &mut self.report);
+                let drawn = self.objects;
+                self.record(|recorder| recorder.trace(screen, drawn));
+            }
             ScreenState::Unset => {
                 self.report.error(s.line, s.words.command.clone(), wording::no_screen);
                 self.screen = ScreenState::Faulty;
@@ -400,27 +411,88 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn invalid(&mut self, s: &Statement<'a>, fault: InvalidValue) {
+    fn draw_group(&mut self, s: &Statement<'a>) {
+        if self.group.is_none() {
+            self.unseen.removable.get_or_insert_with(|| s.place());
+        }
+        let Some(name) = s.subject.clone() else { return };
+        let number = self.refer(Kinds::Groups, s.line, name);
+        let still = match &s.row {
+            None => match self.read(s, None, Placement::read) {
+                Some(placement) => Some(placement),
+                None => return,
+            },
+            Some(row) => {
+                let spans = s.words.parameters().to_vec();
+                let moving = self.keep_moving(s.line, spans, Origin::Command(s.command), row);
+                self.see_moving(moving);
+                None
+            }
+        };
+        let Some(number) = number else { return };
+        let row = s.row.clone().unwrap_or_else(|| s.still_row());
+        let Some(info) = self.groups.get(number).thing.as_ref() else { return };
+        let (reach, scale) = info.reach.placed(&row);
+        let is_hidden = still == Some(None) || info.drawn == 0;
+        let (drawn, uses) = if is_hidden { (0, 0) } else { (info.drawn, info.uses.saturating_add(1)) };
+        if !is_hidden && !(4.0 * reach).is_finite() || !scale.is_finite() {
+            self.report.error(s.line, s.words.rest(0), wording::too_far);
+        }
+        self.see_group(number, reach, scale);
+        self.count_drawn(s, drawn, uses);
+        let drawn = Drawn::Use { group: number, row };
+        match &mut self.group {
+            Some(group) => group.recorder.add_drawn(drawn),
+            None => self.record(|recorder| recorder.add_drawn(drawn)),
+        }
+    }
+
+    /// Counts what is drawn, in the group that is being defined or in the scene.
+    fn count_drawn(&mut self, s: &Statement<'a>, drawn: usize, uses: usize) {
+        if let Some(group) = &mut self.group {
+            group.drawn = group.drawn.saturating_add(drawn);
+            group.uses = group.uses.saturating_add(uses);
+            return;
+        }
+        let (objects, used) = (self.objects, self.uses);
+        self.objects = objects.saturating_add(drawn);
+        self.uses = used.saturating_add(uses);
+        let limit = self.limits.max_objects;
+        self.check_limit(s, objects, self.objects, limit, "objects in a scene");
+        self.check_limit(s, used, self.uses, limit, "groups drawn in a scene");
+    }
+
+    fn invalid(&mut self, s: &Statement<'a>, faults: Faults) {
+        faults.0.into_iter().for_each(|fault| self.invalid_value(s, fault));
+    }
+
+    fn invalid_value(&mut self, s: &Statement<'a>, fault: InvalidValue) {
         let form = s.command.form();
         let place = form.place(|name, parameter| fault.is_about(parameter, name));
-        let (name, _) = form.number(place.start);
+        let (name, field) = form.number(place.start);
         let span = s.words.span(place);
         self.report.error(s.line, span.clone(), || {
-            wording::invalid(fault, name, &String::from_utf8_lossy(&s.line.bytes[span]))
+            wording::invalid(fault, name, field, &String::from_utf8_lossy(&s.line.bytes[span]))
         });
     }
 
-    /// Reports the first command beyond a limit.
-    fn check_limit(&mut self, s: &Statement<'a>, count: usize, limit: usize, what: &str) {
-        if count.checked_sub(1) == Some(limit) {
-            self.report.error(s.line, s.words.command.clone(), || wording::beyond_limit(limit, what));
+    /// Reports the command that goes beyond a limit.
+    fn check_limit(&mut self, s: &Statement<'a>, before: usize, count: usize, limit: usize, what: &str) {
+        if before <= limit && count > limit {
+            let span = s.words.command.clone();
+            self.report.error(s.line, span, || wording::beyond_limit(count - before, count, limit, what));
         }
+    }
+
+    /// Whether there is a fault, told or to be told.
+    fn has_errors(&self) -> bool {
+        self.report.has_errors() || !self.unresolved.is_empty()
     }
 
     /// Records something, unless the script has an error: then it will not be used, and its memory is given back.
     fn record(&mut self, what: impl FnOnce(&mut Recorder)) {
-        if self.report.has_errors() {
-            self.recorder = Recorder::default();
+        if self.has_errors() {
+            self.recorder.forget();
         } else {
             what(&mut self.recorder);
         }

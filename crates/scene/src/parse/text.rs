@@ -16,9 +16,71 @@ pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
     })
 }
 
+/// What a byte is to the words of a line.
+#[derive(Clone, Copy, PartialEq)]
+enum Class {
+    Word,
+    Separator,
+    Comment,
+    /// A word of its own.
+    Mark,
+}
+
+/// Of all bytes, so that a line is read with one look at each.
+const CLASSES: [Class; 256] = {
+    let mut classes = [Class::Word; 256];
+    classes[b' ' as usize] = Class::Separator;
+    classes[b'\t' as usize] = Class::Separator;
+    classes[b',' as usize] = Class::Separator;
+    classes[b'#' as usize] = Class::Comment;
+    classes[b'(' as usize] = Class::Mark;
+    classes[b')' as usize] = Class::Mark;
+    classes[b':' as usize] = Class::Mark;
+    classes
+};
+
+/// The next word of `line` from byte `at` on; `at` comes to stand behind it.
+pub(super) fn next_word(line: &[u8], at: &mut usize) -> Option<Range<usize>> {
+    let mut end = *at;
+    while end < line.len() && CLASSES[usize::from(line[end])] == Class::Separator {
+        end += 1;
+    }
+    let start = end;
+    while end < line.len() && CLASSES[usize::from(line[end])] == Class::Word {
+        end += 1;
+    }
+    if end == start && end < line.len() && CLASSES[usize::from(line[end])] == Class::Mark {
+        end += 1;
+    }
+    *at = end;
+    (end > start).then_some(start..end)
+}
+
+/// The next parameter: a word, or a curve from its opening bracket to the closing one or, where that lacks, the end of
+/// the last word.
+fn next_parameter(line: &[u8], at: &mut usize) -> Option<Range<usize>> {
+    let first = next_word(line, at)?;
+    if line[first.start] != b'(' {
+        return Some(first);
+    }
+    let mut end = first.end;
+    while let Some(word) = next_word(line, at) {
+        end = word.end;
+        if line[word.start] == b')' {
+            break;
+        }
+    }
+    Some(first.start..end)
+}
+
+/// All parameters of a line behind byte `at`.
+pub(super) fn parameters(line: &[u8], mut at: usize) -> Vec<Range<usize>> {
+    std::iter::from_fn(|| next_parameter(line, &mut at)).collect()
+}
+
 /// The words of a line, as bytes of it: its command and the parameters, of which those beyond the most that any
-/// command takes are only counted.
-#[derive(Debug, PartialEq)]
+/// command takes are only counted. A curve is one parameter.
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Words {
     pub(super) command: Range<usize>,
     parameters: [Range<usize>; MAX_NUMBERS],
@@ -32,19 +94,9 @@ impl Words {
     pub(super) fn of(line: &[u8]) -> Option<Self> {
         const NOWHERE: Range<usize> = 0..0;
         let mut at = 0;
-        let mut next = || {
-            while at < line.len() && is_separator(line[at]) {
-                at += 1;
-            }
-            let start = at;
-            while at < line.len() && !is_separator(line[at]) && line[at] != b'#' {
-                at += 1;
-            }
-            (at > start).then_some(start..at)
-        };
-        let command = next()?;
+        let command = next_word(line, &mut at)?;
         let mut words = Self { end: command.end, command, parameters: [NOWHERE; MAX_NUMBERS], count: 0 };
-        while let Some(word) = next() {
+        while let Some(word) = next_parameter(line, &mut at) {
             words.end = word.end;
             if let Some(slot) = words.parameters.get_mut(words.count) {
                 *slot = word;
@@ -64,9 +116,18 @@ impl Words {
         &self.parameters[..self.count.min(MAX_NUMBERS)]
     }
 
-    /// From the first to the last of some parameters.
+    /// The first parameter, which then is one no more.
+    pub(super) fn take_first(&mut self) -> Option<Range<usize>> {
+        let first = self.parameters().first()?.clone();
+        self.parameters.rotate_left(1);
+        self.count -= 1;
+        Some(first)
+    }
+
+    /// From the first to the last of some parameters, of those that are there.
     pub(super) fn span(&self, parameters: Range<usize>) -> Range<usize> {
-        self.parameters[parameters.start].start..self.parameters[parameters.end - 1].end
+        let last = parameters.end.min(self.count).max(parameters.start + 1) - 1;
+        self.parameters[parameters.start].start..self.parameters[last].end
     }
 
     /// Behind the last word.
@@ -80,8 +141,10 @@ impl Words {
     }
 }
 
-fn is_separator(byte: u8) -> bool {
-    matches!(byte, b' ' | b'\t' | b',')
+/// Whether it can be the name of a material or a group.
+pub(super) fn is_name(word: &str) -> bool {
+    word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+        && word.bytes().all(|b| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'-'))
 }
 
 #[cfg(test)]
@@ -120,6 +183,10 @@ mod tests {
         check("Screen,4,,3,", &["Screen", "4", "3"]);
         check("Screen 4#3", &["Screen", "4"]);
         check("a\u{a0}b c", &["a\u{a0}b", "c"]);
+        check("Sphere(1:2 3:4)5", &["Sphere", "(1:2 3:4)", "5"]);
+        check("a ( 1:2#)", &["a", "( 1:2"]);
+        check("a)b:c", &["a", ")", "b", ":", "c"]);
+        check("a (1 (2) 3", &["a", "(1 (2)", "3"]);
     }
 
     #[test]

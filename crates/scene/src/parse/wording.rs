@@ -1,12 +1,16 @@
 //! What a person is told about a fault in a script: what is wrong, what was expected, what to do.
 
+use super::curve::CurveFault;
 use super::number::{self, NumberFault};
+use super::seen::Seen;
 use super::text::Words;
 use crate::command::Command;
+use crate::curve::{CYCLE, Mode, Moment};
 use crate::diagnostic::Code;
-use crate::model::{Doubt, InvalidValue};
+use crate::form::{Field, Form, Kind, Names, Unit, Values};
+use crate::model::{Clause, Doubt, InvalidValue, Screen};
 use crate::report::Fault;
-use crate::shown::{grouped, quoted};
+use crate::shown::{grouped, nearest, quoted};
 
 /// What `Trace` is for.
 const TRACE_HELP: &str = "`Trace` renders a frame of everything that stands before it";
@@ -46,8 +50,8 @@ pub(super) fn unknown_command(name: &str, nearest: Option<Command>) -> Fault {
         .help(help)
 }
 
-/// About `word`, which stands in the place of `parameter`.
-pub(super) fn bad_number(fault: NumberFault, parameter: &str, word: &str) -> Fault {
+/// About `word`, which stands in the place of `parameter`; `is_surface` where a material's name could, alone.
+pub(super) fn bad_number(fault: NumberFault, parameter: &str, word: &str, is_surface: bool) -> Fault {
     match fault {
         NumberFault::TooLarge => Fault::new(Code::NumberTooLarge, format!("{} is too large", quoted(word)))
             .expected(format!("expected `{parameter}`, a number up to 1.79e308")),
@@ -56,6 +60,9 @@ pub(super) fn bad_number(fault: NumberFault, parameter: &str, word: &str) -> Fau
                 .expected(format!("expected `{parameter}`, a number such as 2, -.5 or 1e-3"));
             match hint(word) {
                 Some(hint) => fault.help(hint),
+                None if is_surface => {
+                    fault.help("the name of a material stands alone, in the place of all coefficients")
+                }
                 None => fault,
             }
         }
@@ -71,6 +78,9 @@ fn hint(word: &str) -> Option<String> {
     if Command::from_name(word).is_some() {
         return Some("every command stands on a line of its own".to_string());
     }
+    if matches!(word, ":" | ")") {
+        return Some(format!("{} stands in a curve only, as in `(1:0 25:3)`", quoted(word)));
+    }
     let odd = word.chars().find(|c| !c.is_ascii_graphic())?;
     let code = u32::from(odd);
     let is_dash = |c| matches!(c, '\u{2010}'..='\u{2015}' | '\u{2212}' | '\u{fe63}' | '\u{ff0d}');
@@ -83,9 +93,10 @@ fn hint(word: &str) -> Option<String> {
     None
 }
 
-pub(super) fn too_few(command: Command, words: &Words) -> Fault {
+/// `comma` is a parameter that was probably written with a comma for a point.
+pub(super) fn too_few(command: Command, words: &Words, comma: Option<&str>) -> Fault {
     let (missing, _) = command.form().number(words.count());
-    miscounted(Code::TooFewParameters, command, words, None).expected(format!("expected `{missing}` here"))
+    miscounted(Code::TooFewParameters, command, words, comma).expected(format!("expected `{missing}` here"))
 }
 
 /// `first` is the first word that is too much; `comma` a parameter that was probably written with a comma for a point.
@@ -100,20 +111,35 @@ pub(super) fn too_many(command: Command, words: &Words, first: &str, comma: Opti
 }
 
 fn miscounted(code: Code, command: Command, words: &Words, comma: Option<&str>) -> Fault {
-    let (least, most) = command.form().arity().into_inner();
-    let takes = match (least, most) {
-        (0, 0) => "no parameters".to_string(),
-        (a, b) if a == b => format!("{a} numbers"),
-        (a, b) => format!("{a} to {b} numbers"),
-    };
+    let takes = counts_of(command.form());
     let found = match words.count() {
         0 => "none".to_string(),
         count => grouped(count as u64),
     };
-    Fault::new(code, format!("`{}` takes {takes}, found {found}", command.name())).help(match comma {
-        Some(comma) => format!("{}; write `{}`", two_numbers(comma), command.form()),
-        None => format!("write `{}`", command.form()),
+    Fault::new(code, format!("`{command}` takes {takes}, found {found}")).help(match comma {
+        Some(comma) => format!("{}; write `{}`", two_numbers(comma), usage(command)),
+        None => format!("write `{}`", usage(command)),
     })
+}
+
+/// How many parameters a command takes.
+fn counts_of(form: &Form) -> String {
+    let counts: Vec<_> = form.counts().collect();
+    let (first, last) = (counts[0], counts[counts.len() - 1]);
+    let what = match form.fields {
+        [Field { kind: Kind::Word, .. }] => "word",
+        _ => "number",
+    };
+    match counts[..] {
+        [0] => "no parameters".to_string(),
+        [1] => format!("1 {what}"),
+        [count] => format!("{count} {what}s"),
+        _ if last - first + 1 == counts.len() && counts.len() > 2 => format!("{first} to {last} {what}s"),
+        _ => {
+            let others: Vec<_> = counts[..counts.len() - 1].iter().map(usize::to_string).collect();
+            format!("{} or {last} {what}s", others.join(", "))
+        }
+    }
 }
 
 /// About a number that was probably written with a comma for a point.
@@ -128,36 +154,300 @@ fn two_numbers(comma: &str) -> String {
     format!("a comma separates numbers: if {} is to be one, it is {}", quoted(comma), quoted(&one))
 }
 
-/// `word` is the first of the numbers that it is about, in the place of `name`.
-pub(super) fn invalid(fault: InvalidValue, name: &str, word: &str) -> Fault {
-    let told = |expected: &str| Fault::new(Code::InvalidValue, fault.to_string()).expected(expected);
+/// `word` is the first of the numbers that it is about, in the place of `name` of `field`.
+pub(super) fn invalid(fault: InvalidValue, name: &str, field: &Field, word: &str) -> Fault {
+    if let InvalidValue::NotWhole(_, least, most) = fault {
+        return not_whole(least, most, name, field, word);
+    }
+    Fault::new(Code::InvalidValue, fault.to_string()).expected(expectation(fault))
+}
+
+/// At a time, in a line with curves.
+pub(super) fn invalid_at(fault: InvalidValue, frame: f64) -> Fault {
+    Fault::new(Code::InvalidValue, format!("{fault}, which fails at frame {frame}"))
+        .expected(format!("{} at frame {frame}", expectation(fault)))
+}
+
+fn expectation(fault: InvalidValue) -> String {
     match fault {
-        InvalidValue::NotFinite(_) => told("expected finite numbers"),
-        InvalidValue::NotPositive(_) => told("expected a number greater than 0"),
-        InvalidValue::ZeroDirection(_) => told("expected three numbers that are not all 0"),
-        InvalidValue::GazeParallelToUp => told("expected two directions that span a plane"),
-        InvalidValue::EmptyWindowWidth => told("expected `au` and `bu` to differ"),
-        InvalidValue::EmptyWindowHeight => told("expected `av` and `bv` to differ"),
-        InvalidValue::Zero(_) => told("expected a number from 1"),
-        InvalidValue::NotWhole(_, least, most) => not_whole(least, most, name, word),
-        InvalidValue::OutOfRange(_, least, most) => {
-            told(&format!("expected a number from {least} to {most}"))
-        }
-        InvalidValue::Negative(_) => told("expected a number from 0"),
-        InvalidValue::TooSmall(_, least) => told(&format!("expected a number from {least}")),
-        InvalidValue::NoAxis => told("expected two points that differ"),
-        InvalidValue::NoRadius => told("expected a number greater than 0 at one end at least"),
-        InvalidValue::ThickTorus => told("expected `r` to be less than `R`"),
-        InvalidValue::NoGaze => told("expected a target apart from the eye"),
-        InvalidValue::EmptyGradient => told("expected `a` and `b` to differ"),
+        InvalidValue::NotFinite(_) => "expected finite numbers".into(),
+        InvalidValue::NotPositive(_) => "expected a number greater than 0".into(),
+        InvalidValue::ZeroDirection(_) => "expected three numbers that are not all 0".into(),
+        InvalidValue::GazeParallelToUp => "expected two directions that span a plane".into(),
+        InvalidValue::EmptyWindowWidth => "expected `au` and `bu` to differ".into(),
+        InvalidValue::EmptyWindowHeight => "expected `av` and `bv` to differ".into(),
+        InvalidValue::Zero(_) => "expected a number from 1".into(),
+        InvalidValue::NotWhole(_, least, most) => format!("expected a whole number from {least} to {most}"),
+        InvalidValue::OutOfRange(_, least, most) => format!("expected a number from {least} to {most}"),
+        InvalidValue::Negative(_) => "expected a number from 0".into(),
+        InvalidValue::TooSmall(_, least) => format!("expected a number from {least}"),
+        InvalidValue::NoAxis => "expected two points that differ".into(),
+        InvalidValue::NoRadius => "expected a number greater than 0 at one end at least".into(),
+        InvalidValue::ThickTorus => "expected `r` to be less than `R`".into(),
+        InvalidValue::NoGaze => "expected a target apart from the eye".into(),
+        InvalidValue::FramesBackwards => "expected `a` to be at most `b`".into(),
+        InvalidValue::EmptyGradient => "expected `a` and `b` to differ".into(),
     }
 }
 
-fn not_whole(least: u32, most: u32, name: &str, word: &str) -> Fault {
+fn not_whole(least: u32, most: u32, name: &str, field: &Field, word: &str) -> Fault {
     let too_large = number::parse(word).is_ok_and(|value| value > most.into());
     let range = if too_large { format!("up to {}", grouped(most.into())) } else { format!("from {least}") };
-    Fault::new(Code::InvalidValue, format!("{} is not a number of pixels", quoted(word)))
+    let what = match field.kind.unit() {
+        Unit::Rays => "rays",
+        Unit::Bounces => "bounces",
+        Unit::Frames => "frames",
+        _ => "pixels",
+    };
+    Fault::new(Code::InvalidValue, format!("{} is not a number of {what}", quoted(word)))
         .expected(format!("expected `{name}`, a whole number {range}"))
+}
+
+/// About a curve that stands where `parameter` does.
+pub(super) fn curve(fault: CurveFault, parameter: &str) -> Fault {
+    let malformed = |message: String| Fault::new(Code::MalformedCurve, message);
+    let modes = || Mode::ALL.iter().map(|mode| mode.name()).chain([CYCLE]);
+    match fault {
+        CurveFault::Unclosed => malformed("the curve is not closed".into())
+            .expected("expected a `)` behind this, on the same line"),
+        CurveFault::NoKey => malformed("the curve has no key".into())
+            .expected(format!("expected frames and values of `{parameter}`, such as `1:0 25:3`")),
+        CurveFault::NotAMode(word) => {
+            let help = match nearest(&word, modes()) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => format!("the modes are {}", listed(modes())),
+            };
+            malformed(format!("{} is no mode of a curve", quoted(&word)))
+                .expected("expected a mode, or a key such as `25:3`")
+                .help(help)
+        }
+        CurveFault::MisplacedMode(word) => malformed(format!("{} stands too late, or twice", quoted(&word)))
+            .expected("expected a key such as `25:3`")
+            .help(format!(
+                "a curve starts with at most one of {}, and `{CYCLE}`",
+                listed(Mode::ALL.iter().map(|mode| mode.name()))
+            )),
+        CurveFault::Stray(mark) => malformed(format!("{} fits nowhere", quoted(&mark)))
+            .expected("expected a key such as `25:3`, or `)`"),
+        CurveFault::NoValue => malformed("a key lacks its value".into())
+            .expected(format!("expected `:` and `{parameter}` behind this frame")),
+        CurveFault::BadNumber(fault, "frame", word) => bad_number(fault, "frame", &word, false),
+        CurveFault::BadNumber(fault, _, word) => bad_number(fault, parameter, &word, false),
+        CurveFault::OutOfOrder(last, frame) => {
+            malformed(format!("frame {frame} does not come behind frame {last}"))
+                .expected(format!("expected a frame greater than {last}"))
+        }
+        CurveFault::ShortCycle => malformed("a cycle of one key has no length".into())
+            .expected("expected two keys at least, the last where it starts again"),
+        CurveFault::Overflow(from, to) => Fault::new(
+            Code::CurveOverflow,
+            format!("the curve becomes too large between frames {from} and {to}"),
+        )
+        .expected("expected values that are nearer to each other, or frames that are not so near"),
+    }
+}
+
+/// A curve where none may stand.
+pub(super) fn unwanted_curve(command: Command, parameter: &str) -> Fault {
+    Fault::new(Code::UnwantedCurve, format!("`{command}` takes no curves"))
+        .expected(format!("expected `{parameter}`, a number"))
+}
+
+/// A curve has a value that `field` does not take.
+pub(super) fn wrong_at(field: &Field, moment: Moment, seen: &Seen) -> Fault {
+    let Moment { frame, value } = moment;
+    let takes = match field.values {
+        Values::Positive => "a number greater than 0".to_string(),
+        Values::NotNegative => "a number from 0".to_string(),
+        Values::AtLeastOne => "a number from 1".to_string(),
+        Values::FieldOfView => "a number above 0 and below 180".to_string(),
+        Values::HalfTurn => "a number from 0 to below 180".to_string(),
+        Values::Share
+        | Values::Any
+        | Values::Clamped
+        | Values::NotZero
+        | Values::Whole(..)
+        | Values::OneOf(_) => field.values.to_string(),
+    };
+    let (from, to) = (seen.from, seen.to);
+    let when = if from == to { format!("at frame {from}") } else { format!("from frame {from} to {to}") };
+    Fault::new(Code::InvalidValue, format!("{} is {value} at frame {frame}", field.parameter))
+        .expected(format!("expected {takes} {when}"))
+}
+
+/// The conditions of a line with curves would take too long to look at.
+pub(super) fn too_much_work() -> Fault {
+    Fault::new(Code::LimitExceeded, "too many frames to see whether this is in order in each of them")
+        .expected("expected fewer frames, or curves that stay away from what is not allowed")
+        .help("split the frames among several scripts")
+}
+
+/// `word` is none of the words that `field` takes.
+pub(super) fn no_such_word(word: &str, words: &[&str], field: &Field) -> Fault {
+    let fault = Fault::new(Code::InvalidValue, format!("{} is not {}", quoted(word), field.parameter))
+        .expected(format!("expected {}", words.join(" or ")));
+    match nearest(word, words.iter().copied()) {
+        Some(near) => fault.help(format!("did you mean `{near}`?")),
+        None => fault,
+    }
+}
+
+/// `a`, `b`, `c`.
+fn listed<'a>(words: impl Iterator<Item = &'a str>) -> String {
+    words.map(|word| format!("`{word}`")).collect::<Vec<_>>().join(", ")
+}
+
+/// How a name looks.
+const NAME_HELP: &str = "a name is a letter or `_`, then letters, digits, `_` and `-`";
+
+pub(super) fn no_name(command: Command, names: Names) -> Fault {
+    Fault::new(Code::MalformedName, format!("`{command}` lacks the name of a {}", names.thing()))
+        .expected("expected a name here")
+        .help(format!("write `{}`", usage(command)))
+}
+
+fn usage(command: Command) -> String {
+    match command {
+        Command::Material => format!("{} CLAUSE ...", command.form()),
+        _ => command.form().to_string(),
+    }
+}
+
+pub(super) fn bad_name(word: &str, names: Names) -> Fault {
+    Fault::new(Code::MalformedName, format!("{} is no name", quoted(word)))
+        .expected(format!("expected the name of a {}", names.thing()))
+        .help(NAME_HELP)
+}
+
+/// `later` is the line in which it is given; `nearest` was perhaps meant.
+pub(super) fn unknown_name(names: Names, name: &str, later: Option<usize>, nearest: Option<&str>) -> Fault {
+    let thing = names.thing();
+    let message = match later {
+        Some(line) => format!("the {thing} {} is not known before line {line}", quoted(name)),
+        None => format!("there is no {thing} {}", quoted(name)),
+    };
+    let fault = Fault::new(Code::UnknownName, message)
+        .expected(format!("expected a {thing} that is defined before this"));
+    match (later, nearest) {
+        (Some(line), _) => fault.help(format!("move line {line} up, before this")),
+        (None, Some(near)) => fault.help(format!("did you mean `{near}`?")),
+        (None, None) => fault,
+    }
+}
+
+pub(super) fn uses_itself(name: &str) -> Fault {
+    Fault::new(Code::UnknownName, format!("the group {} cannot use itself", quoted(name)))
+        .expected("expected a group that is defined before this")
+}
+
+/// `first` is the line in which it was given before.
+pub(super) fn defined_twice(names: Names, name: &str, first: usize) -> Fault {
+    let thing = names.thing();
+    Fault::new(Code::DuplicateName, format!("there is a {thing} {} already, in line {first}", quoted(name)))
+        .expected("expected another name")
+}
+
+pub(super) fn unused_name(names: Names) -> Fault {
+    let thing = names.thing();
+    Fault::new(Code::Unused, format!("this {thing} is not used"))
+        .expected(format!("expected something that uses this {thing}"))
+}
+
+pub(super) fn no_clause() -> Fault {
+    Fault::new(Code::TooFewParameters, "a material says something of its surface")
+        .expected("expected a clause, such as `diffuse .8 .2 .1`")
+        .help(format!("the clauses are {}", listed(Clause::ALL.iter().map(|clause| clause.name()))))
+}
+
+pub(super) fn unknown_clause(word: &str) -> Fault {
+    let names = || Clause::ALL.iter().map(|clause| clause.name());
+    let help = match nearest(word, names()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("the clauses are {}", listed(names())),
+    };
+    Fault::new(Code::UnknownClause, format!("{} is no clause of a material", quoted(word)))
+        .expected("expected a clause")
+        .help(help)
+}
+
+pub(super) fn clause_twice(clause: Clause, first: Clause) -> Fault {
+    let message = if clause == first {
+        format!("a material has one `{}` only", clause.name())
+    } else {
+        format!("a material has one pattern only, and this one has `{}`", first.name())
+    };
+    Fault::new(Code::DuplicateClause, message).expected("expected another clause")
+}
+
+/// `found` numbers are there, the one called `name` is missing.
+pub(super) fn clause_too_short(clause: Clause, name: &str, found: usize) -> Fault {
+    let found = if found == 0 { "none".to_string() } else { found.to_string() };
+    let takes = counts_of(clause.form());
+    Fault::new(Code::TooFewParameters, format!("`{}` takes {takes}, found {found}", clause.name()))
+        .expected(format!("expected `{name}` here"))
+        .help(format!("write `{}`", clause.form()))
+}
+
+pub(super) fn no_pattern_material(clause: Clause) -> Fault {
+    Fault::new(Code::MalformedName, format!("`{}` lacks the name of a material", clause.name()))
+        .expected("expected a name here")
+        .help(format!("write `{}`", clause.form()))
+}
+
+pub(super) fn unfit_material(name: &str) -> Fault {
+    Fault::new(Code::UnfitMaterial, format!("the material {} has more than coefficients", quoted(name)))
+        .expected("expected a material of `ambient`, `diffuse` and `mirror` only")
+}
+
+pub(super) fn end_without_group() -> Fault {
+    Fault::new(Code::Misplaced, "there is no group that this could end")
+        .expected("expected a `Group` before this")
+}
+
+/// The group started in line `number`.
+pub(super) fn not_in_group(command: Command, name: &str, number: usize) -> Fault {
+    Fault::new(Code::Misplaced, format!("`{command}` cannot stand in a group"))
+        .expected("expected an object, `Use` or `End`")
+        .help(format!("the group {} starts in line {number}; is its `End` missing?", quoted(name)))
+}
+
+pub(super) fn group_not_ended() -> Fault {
+    Fault::new(Code::UnclosedGroup, "this group has no end").expected("expected an `End` behind its objects")
+}
+
+pub(super) fn too_far() -> Fault {
+    Fault::new(Code::NumberTooLarge, "this moves or scales the group further than numbers reach")
+        .expected("expected less; 1.79e308 is the largest number")
+}
+
+pub(super) fn lens_without_effect() -> Fault {
+    Fault::new(Code::Unused, "the lens has no effect with `Orthocamera`")
+        .expected("expected a `Look` or `Camera` beside this")
+}
+
+/// `better` is a window that would not.
+pub(super) fn squashed(screen: Screen, better: [f64; 4]) -> Fault {
+    let better: Vec<_> = better.iter().map(|x| short(*x)).collect();
+    Fault::new(Code::SquashedImage, "the picture is squashed: a ball is no circle in it")
+        .expected(format!("expected a window of the shape {} : {}", screen.width(), screen.height()))
+        .help(format!("write for example `{}`", better.join(" ")))
+}
+
+/// A number to six digits.
+fn short(x: f64) -> String {
+    format!("{x:.5e}").parse::<f64>().unwrap_or(x).to_string()
+}
+
+/// More frames than a script may be.
+pub(super) fn too_many_frames(frames: u64, limit: u64) -> Fault {
+    let more = if frames == limit + 1 {
+        "this is one more".to_string()
+    } else {
+        format!("with this there are {}", grouped(frames))
+    };
+    let limit = grouped(limit);
+    Fault::new(Code::LimitExceeded, format!("more than {limit} frames"))
+        .expected(format!("expected at most {limit}, {more}"))
 }
 
 pub(super) fn too_many_pixels(pixels: u64, limit: u64) -> Fault {
@@ -167,10 +457,18 @@ pub(super) fn too_many_pixels(pixels: u64, limit: u64) -> Fault {
         .help("make the image smaller or raise the limit")
 }
 
-pub(super) fn beyond_limit(limit: usize, what: &str) -> Fault {
-    let limit = grouped(limit as u64);
-    Fault::new(Code::LimitExceeded, format!("more than {limit} {what}"))
-        .expected(format!("expected at most {limit}, this is one more"))
+/// With the last `added` there are `count`.
+pub(super) fn beyond_limit(added: usize, count: usize, limit: usize, what: &str) -> Fault {
+    let told = grouped(limit as u64);
+    let more = if added == 1 && count == limit + 1 {
+        "this is one more".to_string()
+    } else if count == usize::MAX {
+        "with this there are many more".to_string()
+    } else {
+        format!("with this there are {}", grouped(count as u64))
+    };
+    Fault::new(Code::LimitExceeded, format!("more than {told} {what}"))
+        .expected(format!("expected at most {told}, {more}"))
 }
 
 pub(super) fn no_screen() -> Fault {

@@ -18,14 +18,23 @@ impl Shape for Cuboid {
     }
 
     /// On an edge that of the first axis which leads there.
-    fn normal(&self, line: &Line, t: &Real) -> Vector {
-        let axis = slabs(self, line).map(
-            |[(enter, first), (_, last)]| {
-                if (&enter.value() - t).sign() == 0 { first } else { last }
-            },
-        );
-        axis.map_or(DVec3::ZERO, |axis| DVec3::AXES[axis]).into()
+    fn outward(&self, line: &Line, t: &Real) -> Vector {
+        let Some((axis, entering)) = met(self, line, t) else { return DVec3::ZERO.into() };
+        let upwards = (line.direction.0[axis].sign() > 0) != entering;
+        if upwards { DVec3::AXES[axis].into() } else { (-DVec3::AXES[axis]).into() }
     }
+
+    fn face(&self, line: &Line, t: &Real) -> Option<(usize, f64)> {
+        let (axis, entering) = met(self, line, t)?;
+        let upwards = (line.direction.0[axis].sign() > 0) != entering;
+        Some((axis, if upwards { self.max()[axis] } else { self.min()[axis] }))
+    }
+}
+
+/// The axis whose face is met at `t`, and whether the line enters there.
+fn met(cuboid: &Cuboid, line: &Line, t: &Real) -> Option<(usize, bool)> {
+    let [(enter, first), (_, last)] = slabs(cuboid, line)?;
+    Some(if (&enter.value() - t).sign() == 0 { (first, true) } else { (last, false) })
 }
 
 /// A quotient that is compared without being computed; the divisor is positive.
@@ -86,20 +95,20 @@ mod tests {
     use super::*;
     use crate::oracle::nearest;
 
-    fn t(object: Object, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
-        nearest(&[object], origin.into(), direction.into()).map(|hit| hit.t.to_f64())
+    fn t(object: &Object, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
+        nearest(std::slice::from_ref(object), origin.into(), direction.into()).map(|hit| hit.t.to_f64())
     }
 
     #[test]
     fn a_box_owns_its_faces_edges_and_corners() {
         let corners = [DVec3::splat(-1.0), DVec3::splat(1.0)];
         let object = Object::Cuboid(Cuboid::new(corners, Material::default()).unwrap());
-        assert_eq!(t(object, [1.0, 0.0, 4.0], [-0.0, 0.0, -1.0]), Some(3.0));
-        assert_eq!(t(object, [3.0, 3.0, 3.0], [-1.0, -1.0, -1.0]), Some(2.0));
-        assert_eq!(t(object, [1.0 + 1e-15, 0.0, 4.0], [0.0, 0.0, -1.0]), None);
-        assert_eq!(t(object, [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]), Some(2.0), "from a face inwards");
-        assert_eq!(t(object, [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]), None, "from a face outwards");
+        assert_eq!(t(&object, [1.0, 0.0, 4.0], [-0.0, 0.0, -1.0]), Some(3.0));
+        assert_eq!(t(&object, [3.0, 3.0, 3.0], [-1.0, -1.0, -1.0]), Some(2.0));
+        assert_eq!(t(&object, [1.0 + 1e-15, 0.0, 4.0], [0.0, 0.0, -1.0]), None);
+        assert_eq!(t(&object, [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]), Some(2.0), "from a face inwards");
+        assert_eq!(t(&object, [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]), None, "from a face outwards");
         // An edge at a third, which no binary fraction is.
-        assert!(t(object, [2.0, 2.0 - 3.0, 0.1], [-1.0, 2.0, 0.0]).is_some());
+        assert!(t(&object, [2.0, 2.0 - 3.0, 0.1], [-1.0, 2.0, 0.0]).is_some());
     }
 }

@@ -26,8 +26,12 @@ impl Shape for Sphere {
         if near > *start { Some(near) } else { Some((&-&b + &root).over(&a)).filter(|far| far > start) }
     }
 
-    fn normal(&self, line: &Line, t: &Real) -> Vector {
+    fn outward(&self, line: &Line, t: &Real) -> Vector {
         line.origin.minus(&self.center().into()).plus(t, &line.direction).unit()
+    }
+
+    fn face(&self, _: &Line, _: &Real) -> Option<(usize, f64)> {
+        None
     }
 }
 
@@ -64,8 +68,8 @@ mod tests {
     use super::*;
     use crate::oracle::nearest;
 
-    fn t(object: Object, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
-        nearest(&[object], origin.into(), direction.into()).map(|hit| hit.t.to_f64())
+    fn t(object: &Object, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
+        nearest(std::slice::from_ref(object), origin.into(), direction.into()).map(|hit| hit.t.to_f64())
     }
 
     fn sphere(radius: f64, center: [f64; 3]) -> Sphere {
@@ -75,20 +79,20 @@ mod tests {
     #[test]
     fn a_sphere_gives_the_root_in_front() {
         let ball = Object::from(sphere(5.0, [0.0; 3]));
-        assert_eq!(t(ball, [0.0, 0.0, 9.0], [0.0, 0.0, -2.0]), Some(2.0));
-        assert_eq!(t(ball, [0.0, 0.0, 9.0], [0.0, 0.0, 2.0]), None);
-        assert_eq!(t(ball, [0.0; 3], [0.0, 1.0, 0.0]), Some(5.0));
-        assert_eq!(t(ball, [3.0, 4.0, 0.0], [3.0, 4.0, 0.0]), None);
-        assert_eq!(t(ball, [3.0, 4.0, 0.0], [-3.0, -4.0, 0.0]), Some(2.0));
-        assert_eq!(t(ball, [3.0, 4.0, 0.0], [0.0, 0.0, 1.0]), None);
-        assert_eq!(t(ball, [5.0, 0.0, 9.0], [0.0, 0.0, -1.0]), Some(9.0), "a tangent touches");
-        assert_eq!(t(ball, [5.0 + 1e-15, 0.0, 9.0], [0.0, 0.0, -1.0]), None);
+        assert_eq!(t(&ball, [0.0, 0.0, 9.0], [0.0, 0.0, -2.0]), Some(2.0));
+        assert_eq!(t(&ball, [0.0, 0.0, 9.0], [0.0, 0.0, 2.0]), None);
+        assert_eq!(t(&ball, [0.0; 3], [0.0, 1.0, 0.0]), Some(5.0));
+        assert_eq!(t(&ball, [3.0, 4.0, 0.0], [3.0, 4.0, 0.0]), None);
+        assert_eq!(t(&ball, [3.0, 4.0, 0.0], [-3.0, -4.0, 0.0]), Some(2.0));
+        assert_eq!(t(&ball, [3.0, 4.0, 0.0], [0.0, 0.0, 1.0]), None);
+        assert_eq!(t(&ball, [5.0, 0.0, 9.0], [0.0, 0.0, -1.0]), Some(9.0), "a tangent touches");
+        assert_eq!(t(&ball, [5.0 + 1e-15, 0.0, 9.0], [0.0, 0.0, -1.0]), None);
     }
 
     #[test]
     fn a_sphere_where_f64_loses_every_digit() {
         let far = sphere(1.0, [0.0, 0.0, -1e15]);
-        assert_eq!(t(far.into(), [0.0; 3], [0.0, 0.0, -1.0]), Some(1e15 - 1.0));
+        assert_eq!(t(&far.clone().into(), [0.0; 3], [0.0, 0.0, -1.0]), Some(1e15 - 1.0));
         let gap = sphere_clearance(&far, DVec3::new(1.5, 0.0, 0.0), DVec3::NEG_Z);
         assert_eq!(gap, 0.5);
     }

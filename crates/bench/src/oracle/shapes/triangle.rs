@@ -26,8 +26,14 @@ impl Shape for Triangle {
         Some(area.dot(&u).over(&towards)).filter(|t| t > start)
     }
 
-    fn normal(&self, _: &Line, _: &Real) -> Vector {
+    fn outward(&self, _: &Line, _: &Real) -> Vector {
         area(self).unit()
+    }
+
+    fn face(&self, _: &Line, _: &Real) -> Option<(usize, f64)> {
+        let [u, v, w] = self.vertices();
+        let axis = (0..3).find(|&axis| u[axis] == v[axis] && u[axis] == w[axis])?;
+        Some((axis, u[axis]))
     }
 }
 
@@ -68,20 +74,20 @@ mod tests {
     use super::*;
     use crate::oracle::nearest;
 
-    fn t(object: Object, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
-        nearest(&[object], origin.into(), direction.into()).map(|hit| hit.t.to_f64())
+    fn t(object: &Object, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
+        nearest(std::slice::from_ref(object), origin.into(), direction.into()).map(|hit| hit.t.to_f64())
     }
 
     #[test]
     fn a_triangle_is_closed_and_flat() {
         let vertices = [[0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]].map(DVec3::from);
         let triangle = Triangle::new(vertices, Material::default()).unwrap();
-        let object = Object::Triangle(triangle);
+        let object = Object::Triangle(triangle.clone());
         for [x, y] in [[1.0, 1.0], [2.0, 2.0], [0.0, 0.0], [0.0, 3.0], [4.0, 0.0]] {
-            assert_eq!(t(object, [x, y, 6.0], [0.0, 0.0, -2.0]), Some(3.0), "at {x}, {y}");
+            assert_eq!(t(&object, [x, y, 6.0], [0.0, 0.0, -2.0]), Some(3.0), "at {x}, {y}");
         }
-        assert_eq!(t(object, [2.0, 2.0 + 1e-15, 6.0], [0.0, 0.0, -2.0]), None);
-        assert_eq!(t(object, [-1.0, 1.0, 0.0], [1.0, 0.0, 0.0]), None);
+        assert_eq!(t(&object, [2.0, 2.0 + 1e-15, 6.0], [0.0, 0.0, -2.0]), None);
+        assert_eq!(t(&object, [-1.0, 1.0, 0.0], [1.0, 0.0, 0.0]), None);
         let gap = edge_clearance(&triangle, DVec3::new(1.0, 0.25, 6.0), DVec3::NEG_Z);
         assert_eq!(gap, Some(0.25));
     }

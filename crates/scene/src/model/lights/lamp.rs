@@ -57,8 +57,8 @@ impl Scripted for Lamp {
         &[
             Field::new(Parameter::LightColor, &["lr", "lg", "lb"], Kind::Color, Values::Any),
             Field::new(Parameter::LampPosition, &["x", "y", "z"], Kind::Position, Values::Any),
-            Field::new(Parameter::LampRadius, &["radius"], Kind::Length, Values::NotNegative).optional(),
-            Field::new(Parameter::Reach, &["reach"], Kind::Length, Values::NotNegative).optional(),
+            Field::new(Parameter::LampRadius, &["radius"], Kind::Length, Values::NotNegative).optional("0"),
+            Field::new(Parameter::Reach, &["reach"], Kind::Length, Values::NotNegative).optional("0"),
         ],
     );
 

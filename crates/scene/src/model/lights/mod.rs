@@ -35,8 +35,8 @@ impl Light {
     /// As a line of a script.
     pub(crate) fn write(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Directional(light) => write_line(f, light),
-            Self::Lamp(light) => write_line(f, light),
+            Self::Directional(light) => write_line(f, light, None),
+            Self::Lamp(light) => write_line(f, light, None),
         }
     }
 }

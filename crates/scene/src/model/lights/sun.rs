@@ -61,7 +61,7 @@ impl Scripted for DirectionalLight {
         &[
             Field::new(Parameter::LightColor, &["lr", "lg", "lb"], Kind::Color, Values::Any),
             Field::new(Parameter::LightDirection, &["dx", "dy", "dz"], Kind::Direction, Values::NotZero),
-            Field::new(Parameter::SunAngle, &["angle"], Kind::Angle, Values::HalfTurn).optional(),
+            Field::new(Parameter::SunAngle, &["angle"], Kind::Angle, Values::HalfTurn).optional("0"),
         ],
     );
 

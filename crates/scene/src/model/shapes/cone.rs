@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
+use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative};
 use crate::model::material::{self, Material};
 
@@ -65,9 +65,10 @@ impl Scripted for Cone {
             Field::new(Parameter::AxisEnd, &["bx", "by", "bz"], Kind::Position, Values::Any),
             material::AMBIENT,
             material::DIFFUSE,
-            material::MIRROR.optional(),
+            material::MIRROR,
         ],
-    );
+    )
+    .with(&[Together::NotBothZero(0, 1), Together::Differ(2, 3)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let radii = [numbers.number(), numbers.number()];

@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
+use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, positive};
 use crate::model::material::{self, Material};
 
@@ -60,9 +60,10 @@ impl Scripted for Cylinder {
             Field::new(Parameter::AxisEnd, &["bx", "by", "bz"], Kind::Position, Values::Any),
             material::AMBIENT,
             material::DIFFUSE,
-            material::MIRROR.optional(),
+            material::MIRROR,
         ],
-    );
+    )
+    .with(&[Together::Differ(1, 2)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let (radius, ends) = (numbers.number(), [numbers.vector(), numbers.vector()]);

@@ -63,7 +63,7 @@ impl Scripted for Disc {
             Field::new(Parameter::Normal, &["nx", "ny", "nz"], Kind::Direction, Values::NotZero),
             material::AMBIENT,
             material::DIFFUSE,
-            material::MIRROR.optional(),
+            material::MIRROR,
         ],
     );
 

@@ -5,9 +5,21 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::Object;
-use crate::model::invalid::InvalidValue;
+use crate::form::{Field, Form, Kind, Names, Numbers, Subject, Values};
+use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative, positive};
 use crate::model::material::Material;
 use crate::shared_slice::SharedSlice;
+
+/// The command that draws a group.
+pub(crate) const USE: Form = Form::new(
+    "Use",
+    &[
+        Field::new(Parameter::Translation, &["tx", "ty", "tz"], Kind::Position, Values::Any).optional("0"),
+        Field::new(Parameter::Rotation, &["rx", "ry", "rz"], Kind::Rotation, Values::Any).optional("0"),
+        Field::new(Parameter::Scale, &["s"], Kind::Plain, Values::NotNegative).optional("1"),
+    ],
+)
+.with_subject(Subject::Refers(Names::Groups));
 
 /// Moves, turns and scales: p' = t + s·R·p.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,10 +35,19 @@ impl Placement {
     /// # Errors
     /// When the scale is not positive or a number is not finite.
     pub fn new(translation: DVec3, rotation: DMat3, scale: f64) -> Result<Self, InvalidValue> {
-        use crate::model::invalid::{Parameter, finite, positive};
         finite(Parameter::Translation, translation)?;
         positive(Parameter::Scale, scale)?;
         Ok(Self { translation, rotation, scale })
+    }
+
+    /// From the numbers of a [`USE`]; `None` where a scale of 0 hides the group.
+    pub(crate) fn read(numbers: &mut Numbers<'_>) -> Result<Option<Self>, Faults> {
+        let (translation, degrees) = (numbers.vector(), numbers.vector());
+        let scale = not_negative(Parameter::Scale, numbers.optional_number().unwrap_or(1.0))?;
+        if scale == 0.0 {
+            return Ok(None);
+        }
+        Ok(Some(Self::new(translation, turned(degrees), scale)?))
     }
 
     /// t.
@@ -60,6 +81,29 @@ impl Placement {
     /// When a number leaves the range of those that are finite, or the scale vanishes.
     pub fn within(&self, outer: &Self) -> Result<Self, InvalidValue> {
         Self::new(outer.point(self.translation), outer.rotation * self.rotation, outer.scale * self.scale)
+    }
+}
+
+/// Rz·Ry·Rx for angles in degrees, right-handed; multiples of 90 are exact.
+fn turned(degrees: DVec3) -> DMat3 {
+    let [x, y, z] = degrees.to_array().map(cos_sin);
+    let about_x = DMat3::from_cols_array(&[1.0, 0.0, 0.0, 0.0, x.0, x.1, 0.0, -x.1, x.0]);
+    let about_y = DMat3::from_cols_array(&[y.0, 0.0, -y.1, 0.0, 1.0, 0.0, y.1, 0.0, y.0]);
+    let about_z = DMat3::from_cols_array(&[z.0, z.1, 0.0, -z.1, z.0, 0.0, 0.0, 0.0, 1.0]);
+    about_z * about_y * about_x
+}
+
+/// Cosine and sine of an angle in degrees, the same on every machine.
+fn cos_sin(degrees: f64) -> (f64, f64) {
+    // Both steps are exact: what is left is within 45 degrees of a multiple of 90.
+    let turn = degrees % 360.0;
+    let quarters = (turn / 90.0).round();
+    let (sin, cos) = libm::sincos((turn - 90.0 * quarters).to_radians());
+    match (quarters as i32).rem_euclid(4) {
+        0 => (cos, sin),
+        1 => (-sin, cos),
+        2 => (-cos, -sin),
+        _ => (sin, -cos),
     }
 }
 
@@ -101,5 +145,33 @@ impl Instance {
         let Placement { translation, rotation, scale: own } = *self.placement;
         let placement = Placement::new(place(translation), rotation, scale * own)?;
         Ok(Self { placement: Arc::new(placement), ..self.clone() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quarter_turns_are_exact_and_right_handed() {
+        let turn = |x, y, z| turned(DVec3::new(x, y, z));
+        assert_eq!(turn(90.0, 0.0, 0.0) * DVec3::Y, DVec3::Z);
+        assert_eq!(turn(0.0, 90.0, 0.0) * DVec3::Z, DVec3::X);
+        assert_eq!(turn(0.0, 0.0, 90.0) * DVec3::X, DVec3::Y);
+        assert_eq!(turn(0.0, 0.0, -270.0) * DVec3::X, DVec3::Y);
+        assert_eq!(turn(0.0, 0.0, 36_000_000_000_180.0) * DVec3::X, DVec3::NEG_X);
+        assert_eq!(turn(90.0, 90.0, 0.0) * DVec3::Y, DVec3::X, "about x first");
+        assert_eq!(turn(90.0, 0.0, 90.0) * DVec3::X, DVec3::Y, "about z last");
+    }
+
+    #[test]
+    fn other_turns_are_close_and_keep_lengths() {
+        for k in -1000..1000 {
+            let degrees = f64::from(k) * 0.7311;
+            let (cos, sin) = cos_sin(degrees);
+            let (expect_sin, expect_cos) = degrees.to_radians().sin_cos();
+            assert!((cos - expect_cos).abs() < 4e-15 && (sin - expect_sin).abs() < 4e-15, "{degrees}");
+            assert!((cos * cos + sin * sin - 1.0).abs() < 4e-16, "{degrees}");
+        }
     }
 }

@@ -21,6 +21,7 @@ pub use cone::Cone;
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use disc::Disc;
+pub(crate) use instance::USE;
 pub use instance::{Instance, Placement};
 pub use plane::Plane;
 pub use sphere::Sphere;
@@ -103,17 +104,17 @@ impl Object {
         }
     }
 
-    /// As a line of a script.
-    pub(crate) fn write(&self, f: &mut Formatter<'_>) -> fmt::Result {
+    /// As a line of a script; `surface` is the name of its material, if it has one.
+    pub(crate) fn write(&self, f: &mut Formatter<'_>, surface: Option<&str>) -> fmt::Result {
         match self {
-            Self::Sphere(o) => write_line(f, o),
-            Self::Triangle(o) => write_line(f, o),
-            Self::Cuboid(o) => write_line(f, o),
-            Self::Plane(o) => write_line(f, o),
-            Self::Disc(o) => write_line(f, o),
-            Self::Cylinder(o) => write_line(f, o),
-            Self::Cone(o) => write_line(f, o),
-            Self::Torus(o) => write_line(f, o),
+            Self::Sphere(o) => write_line(f, o, surface),
+            Self::Triangle(o) => write_line(f, o, surface),
+            Self::Cuboid(o) => write_line(f, o, surface),
+            Self::Plane(o) => write_line(f, o, surface),
+            Self::Disc(o) => write_line(f, o, surface),
+            Self::Cylinder(o) => write_line(f, o, surface),
+            Self::Cone(o) => write_line(f, o, surface),
+            Self::Torus(o) => write_line(f, o, surface),
             // An object of a group is written with its group.
             Self::Instance(_) => Err(fmt::Error),
         }

@@ -55,7 +55,7 @@ impl Scripted for Plane {
             Field::new(Parameter::Normal, &["nx", "ny", "nz"], Kind::Direction, Values::NotZero),
             material::AMBIENT,
             material::DIFFUSE,
-            material::MIRROR.optional(),
+            material::MIRROR,
         ],
     );
 

@@ -53,7 +53,7 @@ impl Scripted for Sphere {
             Field::new(Parameter::Center, &["cx", "cy", "cz"], Kind::Position, Values::Any),
             material::AMBIENT,
             material::DIFFUSE,
-            material::MIRROR.optional(),
+            material::MIRROR,
         ],
     );
 

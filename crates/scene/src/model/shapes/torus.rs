@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
+use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
 use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite, positive};
 use crate::model::material::{self, Material};
 
@@ -82,9 +82,10 @@ impl Scripted for Torus {
             Field::new(Parameter::Normal, &["nx", "ny", "nz"], Kind::Direction, Values::NotZero),
             material::AMBIENT,
             material::DIFFUSE,
-            material::MIRROR.optional(),
+            material::MIRROR,
         ],
-    );
+    )
+    .with(&[Together::Greater(0, 1)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let (radius, thickness) = (numbers.number(), numbers.number());

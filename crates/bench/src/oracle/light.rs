@@ -1,0 +1,72 @@
+//! What arrives from a light.
+
+use glam::DVec3;
+use rayfold_scene::{Light, Scene};
+
+use super::line::Line;
+use super::real::{Real, Vector};
+use super::{glass_of, nearest_on};
+
+/// Light that arrives.
+pub(super) struct Arriving {
+    /// Unit vector to where it comes from.
+    pub(super) towards: Vector,
+    /// What is left of it.
+    pub(super) color: Vector,
+}
+
+/// `None` where nothing does: from behind, in a shadow, at the lamp itself. Nearer than `start` are the surfaces that `point`
+/// lies on.
+pub(super) fn arriving(
+    scene: &Scene,
+    light: &Light,
+    point: &Vector,
+    normal: &Vector,
+    start: &Real,
+) -> Option<Arriving> {
+    let mut color = Vector::from(light.color());
+    let (towards, distance) = match light {
+        Light::Directional(sun) => (Vector::from(sun.direction()).opposite().unit(), None),
+        Light::Lamp(lamp) => {
+            let way = Vector::from(lamp.position()).minus(point);
+            let distance = way.dot(&way).root();
+            if distance <= *start {
+                return None;
+            }
+            if lamp.reach() > 0.0 {
+                let part = Real::from(lamp.reach()).over(&distance);
+                color = Vector::from(DVec3::ZERO).plus(&(&part * &part), &color);
+            }
+            (way.unit(), Some(&distance - start))
+        }
+    };
+    if normal.dot(&towards).sign() <= 0 {
+        return None;
+    }
+    let line = Line { origin: point.clone(), direction: towards.clone() };
+    let mut passed = start.clone();
+    while let Some(hit) = nearest_on(&scene.objects, &line, &passed) {
+        if distance.as_ref().is_some_and(|distance| hit.t >= *distance) {
+            break;
+        }
+        let glass = glass_of(&scene.objects[hit.object])?;
+        color = color.times(&glass.color().into());
+        passed = &hit.t + start;
+    }
+    Some(Arriving { towards, color })
+}
+
+/// max(0, N·h)ⁿ, h halfway between two unit vectors.
+pub(super) fn highlight(exponent: f64, normal: &Vector, towards: &Vector, towards_eye: &Vector) -> f64 {
+    let one = Real::from(1.0);
+    let halfway = towards.plus(&one, towards_eye);
+    if halfway.dot(&halfway).sign() == 0 {
+        return 0.0;
+    }
+    let cosine = normal.dot(&halfway.unit());
+    if cosine.sign() <= 0 {
+        return 0.0;
+    }
+    // cosⁿ = e^(n·ln(1 - (1 - cos))), whose last difference is exact here.
+    (exponent * (-(&one - &cosine).to_f64()).ln_1p()).exp()
+}

@@ -1,0 +1,349 @@
+//! Numbers that change: curves through keys.
+//!
+//! Times are frame numbers, also between frames. All is computed in 64-bit floats in the order in which
+//! `docs/language.md` writes it, with no function whose last bit differs between machines. Knows nothing of text but
+//! how a curve is written.
+//!
+//! Invariants: at least two keys, their frames finite and strictly increasing; no value overflows at any time.
+
+use std::fmt::{self, Display, Formatter};
+
+use crate::form::write_number;
+
+/// A number that changes with time.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Curve {
+    mode: Mode,
+    cycle: bool,
+    keys: Vec<Key>,
+    largest: f64,
+}
+
+/// What a number is at a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Key {
+    pub(crate) frame: f64,
+    pub(crate) value: f64,
+}
+
+/// What happens between two keys.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Mode {
+    /// In a straight line.
+    #[default]
+    Linear,
+    /// Along a cubic that never overshoots (Fritsch and Butland 1984, "A method for constructing local monotone
+    /// piecewise cubic interpolants").
+    Smooth,
+    /// The last key's value stays.
+    Step,
+}
+
+impl Mode {
+    /// All of them, in the order of the documentation.
+    pub(crate) const ALL: &[Self] = &[Self::Linear, Self::Smooth, Self::Step];
+
+    /// The word that asks for it.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::Smooth => "smooth",
+            Self::Step => "step",
+        }
+    }
+
+    /// What it does, in a few words.
+    pub(crate) fn about(self) -> &'static str {
+        match self {
+            Self::Linear => "In straight lines from key to key.",
+            Self::Smooth => "Without corners; it eases in and out, and never overshoots a key.",
+            Self::Step => "The value of the last key stays.",
+        }
+    }
+}
+
+/// The word that makes a curve start again behind its last key.
+pub(crate) const CYCLE: &str = "cycle";
+
+/// Two neighbouring keys between which a curve overflows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Overflow(pub(crate) usize);
+
+/// A value, and when.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Moment {
+    pub(crate) frame: f64,
+    pub(crate) value: f64,
+}
+
+/// How far computed values may lie outside of those at the ends of a stretch without keys, over the largest value of
+/// a key. A cubic's terms are at most 23 times its ends, and there are less than 16 roundings.
+const SLACK: f64 = 1.0 / (1u64 << 43) as f64;
+
+impl Curve {
+    /// `keys` are at least two, their frames finite and strictly increasing.
+    ///
+    /// # Errors
+    /// The place of the first key after which a value overflows.
+    pub(crate) fn new(mode: Mode, cycle: bool, keys: Vec<Key>) -> Result<Self, Overflow> {
+        debug_assert!(keys.len() >= 2 && keys.windows(2).all(|pair| pair[0].frame < pair[1].frame));
+        let largest = keys.iter().fold(0.0, |largest: f64, key| largest.max(key.value.abs()));
+        let curve = Self { mode, cycle, keys, largest };
+        match (0..curve.keys.len() - 1).find(|&i| !curve.is_bounded(i)) {
+            Some(i) => Err(Overflow(i)),
+            None if cycle && !curve.period().is_finite() => Err(Overflow(0)),
+            None => Ok(curve),
+        }
+    }
+
+    /// Its value at a time.
+    pub(crate) fn at(&self, frame: f64) -> f64 {
+        let (first, last) = (self.keys[0], self.keys[self.keys.len() - 1]);
+        let frame = if self.cycle { self.within_cycle(frame) } else { frame };
+        if frame <= first.frame {
+            first.value
+        } else if frame >= last.frame {
+            if self.cycle { first.value } else { last.value }
+        } else {
+            self.between(self.keys.partition_point(|key| key.frame <= frame) - 1, frame)
+        }
+    }
+
+    /// The moments of a stretch of time that say where its values lie, in order: its ends, the keys between, and what
+    /// comes just before a cycle starts again. Of many cycles one is looked at.
+    pub(crate) fn moments(&self, from: f64, to: f64, mut seen: impl FnMut(Moment)) {
+        seen(Moment { frame: from, value: self.at(from) });
+        if self.cycle {
+            let start = self.within_cycle(from);
+            let period = self.period();
+            let last = self.keys[self.keys.len() - 1];
+            let to = to.min(from + period);
+            for shift in [from - start, from - start + period] {
+                for key in &self.keys[..self.keys.len() - 1] {
+                    let frame = key.frame + shift;
+                    if frame > from && frame < to {
+                        seen(Moment { frame, value: key.value });
+                    }
+                }
+                let seam = last.frame + shift;
+                if seam > from && seam <= to && self.mode != Mode::Step {
+                    let before = last.frame.next_down();
+                    seen(Moment {
+                        frame: seam.next_down(),
+                        value: self.between(self.keys.len() - 2, before),
+                    });
+                }
+            }
+        } else {
+            let first = self.keys.partition_point(|key| key.frame <= from);
+            let inside = self.keys[first..].iter().take_while(|key| key.frame < to);
+            inside.for_each(|key| seen(Moment { frame: key.frame, value: key.value }));
+        }
+        seen(Moment { frame: to, value: self.at(to) });
+    }
+
+    /// The least and the greatest value of a stretch of time, or a little beyond; adds to `work` how many keys were
+    /// looked at.
+    pub(crate) fn range(&self, from: f64, to: f64, work: &mut usize) -> (f64, f64) {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        *work += if self.cycle { 2 * self.keys.len() } else { 0 };
+        self.moments(from, to, |moment| {
+            *work += 1;
+            (low, high) = (low.min(moment.value), high.max(moment.value));
+        });
+        if low == high {
+            return (low, high);
+        }
+        let slack = SLACK * self.largest + f64::MIN_POSITIVE;
+        (low - slack, high + slack)
+    }
+
+    /// The largest absolute value of its keys, which no value exceeds by more than roundings.
+    pub(crate) fn largest(&self) -> f64 {
+        self.largest
+    }
+
+    fn period(&self) -> f64 {
+        self.keys[self.keys.len() - 1].frame - self.keys[0].frame
+    }
+
+    /// The time of the first cycle at which it has the value of `frame`.
+    fn within_cycle(&self, frame: f64) -> f64 {
+        let (start, period) = (self.keys[0].frame, self.period());
+        let since = (frame - start).rem_euclid(period);
+        start + if since < period { since } else { 0.0 }
+    }
+
+    /// Its value at `frame`, which is between keys `i` and `i + 1`.
+    fn between(&self, i: usize, frame: f64) -> f64 {
+        let (here, next) = (self.keys[i], self.keys[i + 1]);
+        let (x, h) = (frame - here.frame, next.frame - here.frame);
+        let (v, w) = (here.value, next.value);
+        if x == 0.0 {
+            return v;
+        }
+        match self.mode {
+            Mode::Linear => v + (w - v) * (x / h),
+            Mode::Step => v,
+            Mode::Smooth => {
+                let (m, c, d) = self.cubic(i);
+                (v + x * (m + x * (c + x * d))).clamp(v.min(w), v.max(w))
+            }
+        }
+    }
+
+    /// The coefficients of x, x² and x³ behind key `i`.
+    fn cubic(&self, i: usize) -> (f64, f64, f64) {
+        let (here, next) = (self.keys[i], self.keys[i + 1]);
+        let (h, slope) = (next.frame - here.frame, self.slope(i));
+        let (m, n) = (self.tangent(i), self.tangent(i + 1));
+        (m, (3.0 * slope - 2.0 * m - n) / h, (m + n - 2.0 * slope) / (h * h))
+    }
+
+    /// From key `i` to the next.
+    fn slope(&self, i: usize) -> f64 {
+        let (here, next) = (self.keys[i], self.keys[i + 1]);
+        (next.value - here.value) / (next.frame - here.frame)
+    }
+
+    /// The slope at key `i`: the weighted harmonic mean of those on both sides.
+    fn tangent(&self, i: usize) -> f64 {
+        let last = self.keys.len() - 1;
+        let (before, after) = match (i, self.cycle) {
+            (0, true) => (last - 1, 0),
+            (0, false) => return 0.0,
+            (i, true) if i == last => (last - 1, 0),
+            (i, false) if i == last => return 0.0,
+            (i, _) => (i - 1, i),
+        };
+        let (left, right) = (self.slope(before), self.slope(after));
+        if left == 0.0 || right == 0.0 || (left > 0.0) != (right > 0.0) {
+            return 0.0;
+        }
+        let length = |i: usize| self.keys[i + 1].frame - self.keys[i].frame;
+        let (p, q) = (2.0 * length(after) + length(before), length(after) + 2.0 * length(before));
+        (p + q) / (p / left + q / right)
+    }
+
+    /// Whether nothing overflows between keys `i` and `i + 1`.
+    fn is_bounded(&self, i: usize) -> bool {
+        let (here, next) = (self.keys[i], self.keys[i + 1]);
+        let h = next.frame - here.frame;
+        match self.mode {
+            Mode::Step => true,
+            Mode::Linear => h.is_finite() && (next.value - here.value).is_finite(),
+            Mode::Smooth => {
+                let (m, c, d) = self.cubic(i);
+                let terms = here.value.abs() + h * (m.abs() + h * (c.abs() + h * d.abs()));
+                let slopes = [self.slope(i), m, c, d];
+                h.is_finite() && slopes.iter().all(|x| x.is_finite()) && terms.is_finite()
+            }
+        }
+    }
+}
+
+/// `(smooth cycle 1:0 25:3)`.
+impl Display for Curve {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str("(")?;
+        if self.mode != Mode::Linear {
+            write!(f, "{} ", self.mode.name())?;
+        }
+        if self.cycle {
+            write!(f, "{CYCLE} ")?;
+        }
+        for (i, key) in self.keys.iter().enumerate() {
+            f.write_str(if i == 0 { "" } else { " " })?;
+            write_number(f, key.frame)?;
+            f.write_str(":")?;
+            write_number(f, key.value)?;
+        }
+        f.write_str(")")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve(mode: Mode, cycle: bool, keys: &[(f64, f64)]) -> Curve {
+        let keys = keys.iter().map(|&(frame, value)| Key { frame, value }).collect();
+        Curve::new(mode, cycle, keys).unwrap()
+    }
+
+    #[test]
+    fn linear_curves_keep_their_ends() {
+        let curve = curve(Mode::Linear, false, &[(1.0, 0.0), (25.0, 3.0), (50.0, -1.0)]);
+        let check = |frame, value| assert_eq!(curve.at(frame), value, "{frame}");
+        check(-7.0, 0.0);
+        check(1.0, 0.0);
+        check(13.0, 1.5);
+        check(25.0, 3.0);
+        check(30.0, 2.2);
+        check(50.0, -1.0);
+        check(1e300, -1.0);
+    }
+
+    #[test]
+    fn steps_wait_for_their_key() {
+        let curve = curve(Mode::Step, false, &[(1.0, 5.0), (2.0, 7.0)]);
+        assert_eq!([0.0, 1.0, 1.999, 2.0, 3.0].map(|t| curve.at(t)), [5.0, 5.0, 5.0, 7.0, 7.0]);
+    }
+
+    #[test]
+    fn a_cycle_starts_again_at_its_last_key() {
+        let linear = curve(Mode::Linear, true, &[(1.0, 0.0), (5.0, 8.0)]);
+        assert_eq!([1.0, 3.0, 5.0, 7.0, -1.0].map(|t| linear.at(t)), [0.0, 4.0, 0.0, 4.0, 4.0]);
+        assert_eq!(linear.at(1.0 - 1e-30), 0.0, "what rounds to the period is 0");
+        let step = curve(Mode::Step, true, &[(0.0, 1.0), (1.0, 2.0), (2.0, 3.0)]);
+        assert_eq!([0.0, 1.0, 2.0, 3.0].map(|t| step.at(t)), [1.0, 2.0, 1.0, 2.0]);
+    }
+
+    #[test]
+    fn smooth_curves_ease_and_never_overshoot() {
+        let eased = curve(Mode::Smooth, false, &[(0.0, 0.0), (1.0, 1.0)]);
+        assert_eq!([0.25, 0.5, 0.75].map(|t| eased.at(t)), [0.15625, 0.5, 0.84375]);
+        let steep = curve(Mode::Smooth, false, &[(0.0, 0.0), (1.0, 1e-9), (2.0, 1.0), (3.0, 1.0)]);
+        for k in 0..=3000 {
+            let value = steep.at(f64::from(k) / 1000.0);
+            assert!((0.0..=1.0).contains(&value), "{k}: {value}");
+        }
+        // Slopes 1 and 2 over lengths 1 and 2: p = 5, q = 4, and 9/(5/1 + 4/2).
+        let bend = curve(Mode::Smooth, false, &[(0.0, 0.0), (1.0, 1.0), (3.0, 5.0)]);
+        assert_eq!(bend.tangent(1), 9.0 / 7.0);
+        let seam = curve(Mode::Smooth, true, &[(0.0, 0.0), (1.0, 1.0), (3.0, 5.0)]);
+        assert_eq!((seam.tangent(0), seam.tangent(2)), (9.0 / 7.0, 9.0 / 7.0));
+    }
+
+    #[test]
+    fn overflow_is_found_before_it_happens() {
+        let new = |mode, keys: &[(f64, f64)]| {
+            Curve::new(mode, false, keys.iter().map(|&(frame, value)| Key { frame, value }).collect())
+        };
+        let wide = [(0.0, 0.0), (1.0, -1e308), (2.0, 1e308)];
+        assert_eq!(new(Mode::Linear, &wide), Err(Overflow(1)));
+        assert_eq!(new(Mode::Smooth, &wide), Err(Overflow(0)));
+        assert!(new(Mode::Step, &wide).is_ok());
+        assert_eq!(new(Mode::Linear, &[(-1e308, 0.0), (1e308, 1.0)]), Err(Overflow(0)));
+        assert_eq!(new(Mode::Smooth, &[(0.0, 0.0), (1e-200, 1.0)]), Err(Overflow(0)));
+    }
+
+    #[test]
+    fn moments_hold_all_extremes() {
+        let told = |curve: &Curve, from, to| {
+            let mut told = Vec::new();
+            curve.moments(from, to, |moment| told.push((moment.frame, moment.value)));
+            told
+        };
+        let hill = curve(Mode::Linear, false, &[(0.0, 0.0), (2.0, 4.0), (4.0, 0.0)]);
+        assert_eq!(told(&hill, 1.0, 3.5), [(1.0, 2.0), (2.0, 4.0), (3.5, 1.0)]);
+        assert_eq!(told(&hill, -9.0, 9.0).len(), 5);
+        let saw = curve(Mode::Linear, true, &[(0.0, 1.0), (10.0, -1.0)]);
+        let seen = told(&saw, 1.0, 11.0);
+        assert!(
+            seen.iter().any(|&(frame, value)| frame < 10.0 && frame > 9.999 && value < -0.999),
+            "{seen:?}"
+        );
+        assert!(seen.iter().any(|&(frame, value)| frame == 10.0 && value == 1.0), "{seen:?}");
+    }
+}

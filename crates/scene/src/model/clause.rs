@@ -1,0 +1,129 @@
+//! Clauses: what a `Material` says of a surface.
+
+use glam::DVec3;
+
+use super::invalid::{Faults, InvalidValue, Parameter, finite};
+use super::material::{
+    AMBIENT, Coefficients, DIFFUSE, Finish, Glass, MIRROR, Material, Pattern, Shine, Weight,
+};
+use crate::form::{Field, Form, Kind, Names, Numbers, Presence, Subject, Together, Values};
+
+/// The command that names a material.
+pub(crate) const MATERIAL: Form = Form::new("Material", &[]).with_subject(Subject::Defines(Names::Materials));
+
+/// Defines [`Clause`] from its names, so that the list of all is whole.
+macro_rules! clauses {
+    ($($clause:ident: $form:expr, $about:literal;)*) => {
+        /// What a `Material` can say of a surface, each at most once.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum Clause {
+            $(#[doc = $about] $clause,)*
+        }
+
+        impl Clause {
+            /// All of them, in the order of the documentation.
+            pub const ALL: &[Self] = &[$(Self::$clause,)*];
+
+            /// How it is written.
+            pub const fn form(self) -> &'static Form {
+                match self {
+                    $(Self::$clause => &const { $form },)*
+                }
+            }
+
+            /// What it says, in a few words.
+            pub const fn about(self) -> &'static str {
+                match self {
+                    $(Self::$clause => $about,)*
+                }
+            }
+        }
+    };
+}
+
+const SIZE: &[Field] = &[Field::new(Parameter::CellSize, &["s"], Kind::Length, Values::Positive)];
+
+const WHOLE_MIRROR: &[Field] = &[Field { presence: Presence::Required, ..MIRROR }];
+const SHINE: &[Field] = &[
+    Field::new(Parameter::Shine, &["r", "g", "b"], Kind::Coefficients, Values::Any),
+    Field::new(Parameter::ShineExponent, &["n"], Kind::Plain, Values::AtLeastOne),
+];
+const GLASS: &[Field] = &[
+    Field::new(Parameter::Glass, &["r", "g", "b"], Kind::Coefficients, Values::Any),
+    Field::new(Parameter::Ior, &["ior"], Kind::Plain, Values::Positive),
+];
+const ENDS: &[Field] = &[
+    Field::new(Parameter::GradientStart, &["a"], Kind::Position, Values::Any),
+    Field::new(Parameter::GradientEnd, &["b"], Kind::Position, Values::Any),
+];
+
+clauses! {
+    Ambient: Form::new("ambient", &[AMBIENT]), "The colour that needs no light.";
+    Diffuse: Form::new("diffuse", &[DIFFUSE]), "What is scattered of the light that arrives.";
+    Mirror: Form::new("mirror", WHOLE_MIRROR), "What is mirrored of the colour along the reflected ray.";
+    Shine: Form::new("shine", SHINE), "Highlights.";
+    Glass: Form::new("glass", GLASS), "Light goes through.";
+    Checker: Form::new("checker", SIZE).ending_with(Names::Materials), "Another material in every other cell.";
+    Stripes: Form::new("stripes", SIZE).ending_with(Names::Materials), "Another material in every other stripe along x.";
+    Noise: Form::new("noise", SIZE).ending_with(Names::Materials), "Another material here and there.";
+    Gradient: Form::new("gradient", ENDS).with(&[Together::Differ(0, 1)]).ending_with(Names::Materials), "Another material from height a to height b.";
+}
+
+impl Clause {
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        self.form().name
+    }
+
+    /// The clause of this name, in any letter case.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|c| c.name().eq_ignore_ascii_case(name))
+    }
+
+    /// Whether it is a pattern, of which a material has at most one.
+    pub(crate) fn is_pattern(self) -> bool {
+        self.form().ends_with.is_some()
+    }
+}
+
+/// A material that is put together from its clauses.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Clauses {
+    ambient: DVec3,
+    diffuse: DVec3,
+    mirror: DVec3,
+    finish: Finish,
+}
+
+impl Clauses {
+    /// Adds a clause; `other` is the material that a pattern names.
+    pub(crate) fn add(
+        &mut self,
+        clause: Clause,
+        numbers: &mut Numbers<'_>,
+        other: Coefficients,
+    ) -> Result<(), Faults> {
+        let pattern =
+            |weight: Weight| Ok::<_, InvalidValue>(Some(Pattern { weight: weight.checked()?, other }));
+        match clause {
+            Clause::Ambient => self.ambient = finite(Parameter::Ambient, numbers.vector())?,
+            Clause::Diffuse => self.diffuse = finite(Parameter::Diffuse, numbers.vector())?,
+            Clause::Mirror => self.mirror = finite(Parameter::Mirror, numbers.vector())?,
+            Clause::Shine => self.finish.shine = Some(Shine::new(numbers.vector(), numbers.number())?),
+            Clause::Glass => self.finish.glass = Some(Glass::new(numbers.vector(), numbers.number())?),
+            Clause::Checker => self.finish.pattern = pattern(Weight::Checker(numbers.number()))?,
+            Clause::Stripes => self.finish.pattern = pattern(Weight::Stripes(numbers.number()))?,
+            Clause::Noise => self.finish.pattern = pattern(Weight::Noise(numbers.number()))?,
+            Clause::Gradient => {
+                self.finish.pattern = pattern(Weight::Gradient(numbers.number(), numbers.number()))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The whole.
+    pub(crate) fn material(self) -> Result<Material, InvalidValue> {
+        let coefficients = Coefficients::new(self.ambient, self.diffuse, self.mirror)?;
+        Ok(Material::finished(coefficients, self.finish))
+    }
+}

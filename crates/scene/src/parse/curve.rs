@@ -1,0 +1,147 @@
+//! The text of a curve to a curve: `(smooth 1:0 25:3)`.
+
+use std::ops::Range;
+
+use super::number::{self, NumberFault};
+use super::text::next_word;
+use crate::curve::{CYCLE, Curve, Key, Mode, Overflow};
+use crate::row::Number;
+
+/// What is wrong with a curve.
+#[derive(Debug, PartialEq)]
+pub(super) enum CurveFault {
+    /// There is no closing bracket.
+    Unclosed,
+    /// There is no key.
+    NoKey,
+    /// A word that is neither a key nor a mode.
+    NotAMode(String),
+    /// A mode where there is one, or behind a key.
+    MisplacedMode(String),
+    /// A mark that fits nowhere: a second `(`, or a `:` without a frame before it.
+    Stray(String),
+    /// A frame without `:` and value.
+    NoValue,
+    /// A frame or a value that is no number.
+    BadNumber(NumberFault, &'static str, String),
+    /// A frame that is not behind the one before it.
+    OutOfOrder(f64, f64),
+    /// A cycle of one key.
+    ShortCycle,
+    /// Between two keys the numbers become too large.
+    Overflow(f64, f64),
+}
+
+/// The curve that `text` holds at `span`, from its opening bracket on; a curve of one key is a number that is still.
+///
+/// # Errors
+/// The first fault, and where.
+pub(super) fn parse(text: &str, span: Range<usize>) -> Result<Number, (Range<usize>, CurveFault)> {
+    let bytes = &text.as_bytes()[..span.end];
+    let mut at = span.start + 1;
+    let mut mode = None;
+    let mut cycle = false;
+    let mut keys: Vec<Key> = Vec::new();
+    let mut places: Vec<Range<usize>> = Vec::new();
+    loop {
+        let Some(word) = next_word(bytes, &mut at) else { return Err((span, CurveFault::Unclosed)) };
+        let told = &text[word.clone()];
+        match told {
+            ")" => break,
+            "(" | ":" => return Err((word, CurveFault::Stray(told.to_owned()))),
+            _ => {}
+        }
+        if told.starts_with(|c: char| c.is_ascii_alphabetic()) {
+            let known = Mode::ALL.iter().copied().find(|mode| mode.name().eq_ignore_ascii_case(told));
+            let is_cycle = told.eq_ignore_ascii_case(CYCLE);
+            let is_again = if is_cycle { cycle } else { mode.is_some() };
+            match known {
+                None if !is_cycle => return Err((word, CurveFault::NotAMode(told.to_owned()))),
+                _ if is_again || !keys.is_empty() => {
+                    return Err((word, CurveFault::MisplacedMode(told.to_owned())));
+                }
+                None => cycle = true,
+                Some(known) => mode = Some(known),
+            }
+            continue;
+        }
+        let read = |word: Range<usize>, name| {
+            let told = &text[word.clone()];
+            number::parse(told).map_err(|fault| (word, CurveFault::BadNumber(fault, name, told.to_owned())))
+        };
+        let frame = read(word.clone(), "frame")?;
+        let colon = next_word(bytes, &mut at);
+        if colon.is_none_or(|colon| &text[colon] != ":") {
+            return Err((word, CurveFault::NoValue));
+        }
+        let value = match next_word(bytes, &mut at) {
+            Some(value) if !matches!(&text[value.clone()], "(" | ")" | ":") => read(value.clone(), "value")?,
+            _ => return Err((word, CurveFault::NoValue)),
+        };
+        if let Some(last) = keys.last()
+            && last.frame >= frame
+        {
+            return Err((word, CurveFault::OutOfOrder(last.frame, frame)));
+        }
+        keys.push(Key { frame, value });
+        places.push(word.start..at);
+    }
+    match keys[..] {
+        [] => Err((span, CurveFault::NoKey)),
+        [_] if cycle => Err((span, CurveFault::ShortCycle)),
+        [key] => Ok(Number::Still(key.value)),
+        _ => match Curve::new(mode.unwrap_or_default(), cycle, keys.clone()) {
+            Ok(curve) => Ok(Number::Moving(curve)),
+            Err(Overflow(i)) => {
+                let place = places[i].start..places[i + 1].end;
+                Err((place, CurveFault::Overflow(keys[i].frame, keys[i + 1].frame)))
+            }
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(text: &str) -> Result<String, (Range<usize>, CurveFault)> {
+        parse(text, 0..text.len()).map(|number| match number {
+            Number::Still(value) => value.to_string(),
+            Number::Moving(curve) => curve.to_string(),
+        })
+    }
+
+    #[test]
+    fn curves_are_read_as_they_are_written() {
+        let check = |text: &str, written: &str| assert_eq!(parsed(text).as_deref(), Ok(written), "{text}");
+        check("(1:0 2:3)", "(1:0 2:3)");
+        check("( LINEAR 1 : 0,2:3 )", "(1:0 2:3)");
+        check("(cycle Smooth -1e3:.5\t7:1e-9)", "(smooth cycle -1000:0.5 7:1e-9)");
+        check("(step Cycle 1:0 2:3 4:-0)", "(step cycle 1:0 2:3 4:-0)");
+        check("(5:3)", "3");
+        check("(smooth 5:3)", "3");
+    }
+
+    #[test]
+    fn faults_have_their_place() {
+        let check = |text: &str, place: &str, fault: CurveFault| {
+            let (span, found) = parsed(text).unwrap_err();
+            assert_eq!((&text[span], found), (place, fault), "{text}");
+        };
+        check("(1:0 2:3", "(1:0 2:3", CurveFault::Unclosed);
+        check("()", "()", CurveFault::NoKey);
+        check("(smooth)", "(smooth)", CurveFault::NoKey);
+        check("(smoth 1:0)", "smoth", CurveFault::NotAMode("smoth".into()));
+        check("(smooth step 1:0)", "step", CurveFault::MisplacedMode("step".into()));
+        check("(cycle cycle 1:0)", "cycle", CurveFault::MisplacedMode("cycle".into()));
+        check("(1:0 smooth 2:1)", "smooth", CurveFault::MisplacedMode("smooth".into()));
+        check("(1:0 (2:1)", "(", CurveFault::Stray("(".into()));
+        check("(1:0 :1)", ":", CurveFault::Stray(":".into()));
+        check("(1:0 2)", "2", CurveFault::NoValue);
+        check("(1:0 2:)", "2", CurveFault::NoValue);
+        check("(1 0 2 1)", "1", CurveFault::NoValue);
+        check("(1:0 1:1)", "1", CurveFault::OutOfOrder(1.0, 1.0));
+        check("(cycle 1:0)", "(cycle 1:0)", CurveFault::ShortCycle);
+        check("(0:0 1:-1e308 2:1e308)", "1:-1e308 2:1e308", CurveFault::Overflow(1.0, 2.0));
+    }
+}

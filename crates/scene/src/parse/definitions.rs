@@ -1,0 +1,499 @@
+//! Materials and groups: their definitions, what refers to them, and when what is in them is seen.
+
+use std::ops::Range;
+
+use super::line::Statement;
+use super::seen::{Moving, Origin, Seen, Suffix, join};
+use super::text::{is_name, parameters};
+use super::{Parser, curve, number, wording};
+use crate::command::{Act, Command};
+use crate::form::{Names as Kinds, Numbers};
+use crate::model::{Clause, Coefficients, Material};
+use crate::report::Line;
+use crate::row::{Number, Row};
+use crate::script::{ClauseLine, GroupRecorder, NamedMaterial};
+
+/// What the parser knows of a material.
+pub(super) struct MaterialInfo {
+    /// Its value, if no curve is in it.
+    pub(super) still: Option<Material>,
+    /// Whether it is nothing but coefficients.
+    is_plain: bool,
+    /// The material of its pattern.
+    other: Option<usize>,
+    /// Of its clauses with curves, among all lines with curves.
+    moving: Vec<usize>,
+    seen: Option<Seen>,
+}
+
+/// What the parser knows of a group.
+pub(super) struct GroupInfo {
+    /// How many objects drawing it draws, at most.
+    pub(super) drawn: usize,
+    /// How many groups drawing it draws, at most.
+    pub(super) uses: usize,
+    pub(super) reach: Reach,
+    contents: Contents,
+    seen: Option<Seen>,
+}
+
+/// Bounds on what the groups that a group uses are moved and scaled by.
+#[derive(Clone, Copy)]
+pub(super) struct Reach {
+    distance: f64,
+    scale: f64,
+}
+
+/// What is seen when a group is.
+#[derive(Default)]
+struct Contents {
+    moving: Vec<usize>,
+    materials: Vec<usize>,
+    groups: Vec<usize>,
+}
+
+/// A group that is being defined.
+pub(super) struct OpenGroup<'a> {
+    name: &'a str,
+    line: Line<'a>,
+    command: Range<usize>,
+    subject: Range<usize>,
+    pub(super) recorder: GroupRecorder,
+    pub(super) drawn: usize,
+    pub(super) uses: usize,
+    reach: Reach,
+    contents: Contents,
+}
+
+/// What was not looked at yet of the scene as it stands, each with the number of Traces before it.
+#[derive(Default)]
+pub(super) struct Pending {
+    pub(super) camera: Option<(Option<usize>, usize)>,
+    pub(super) lens: Option<(Option<usize>, usize)>,
+    pub(super) background: Option<(Option<usize>, usize)>,
+    moving: Vec<(usize, usize)>,
+    materials: Vec<(usize, usize)>,
+    groups: Vec<(usize, usize)>,
+}
+
+impl Reach {
+    const NONE: Self = Self { distance: 0.0, scale: 1.0 };
+
+    /// How far, and how much larger, things come that `row` moves together with this.
+    pub(super) fn placed(self, row: &Row) -> (f64, f64) {
+        let [x, y, z] = [0, 1, 2].map(|i| row.largest(i).unwrap_or(0.0));
+        let scale = row.largest(6).unwrap_or(1.0);
+        (x.hypot(y).hypot(z) + scale * self.distance, scale * self.scale)
+    }
+}
+
+impl<'a> Parser<'a> {
+    /// The number of a material or group; `None` where there is none, which is reported.
+    pub(super) fn refer(&mut self, kind: Kinds, line: Line<'a>, span: Range<usize>) -> Option<usize> {
+        let name = std::str::from_utf8(&line.bytes[span.clone()]).unwrap_or_default();
+        let number = match kind {
+            Kinds::Materials => self.materials.refer(name),
+            Kinds::Groups => self.groups.refer(name),
+        };
+        if number.is_none() {
+            if kind == Kinds::Groups && self.group.as_ref().is_some_and(|group| group.name == name) {
+                self.report.error(line, span, || wording::uses_itself(name));
+            } else {
+                // It may come later, which is then told.
+                self.unresolved.push((kind, line, span));
+            }
+        }
+        number
+    }
+
+    /// Tells of the names that nothing before them had.
+    pub(super) fn tell_unresolved(&mut self) {
+        for (kind, line, span) in std::mem::take(&mut self.unresolved) {
+            let name = std::str::from_utf8(&line.bytes[span.clone()]).unwrap_or_default();
+            let later = match kind {
+                Kinds::Materials => self.materials.line_of(name),
+                Kinds::Groups => self.groups.line_of(name),
+            };
+            let nearest = match kind {
+                _ if later.is_some() || !self.report.describes_next() => None,
+                Kinds::Materials => self.materials.nearest(name),
+                Kinds::Groups => self.groups.nearest(name),
+            };
+            self.report.error(line, span, || wording::unknown_name(kind, name, later, nearest));
+        }
+    }
+
+    pub(super) fn tell_unused_names(&mut self) {
+        self.tell_unresolved();
+        for named in self.materials.all().iter().filter(|named| !named.is_used) {
+            self.report.warning(named.line, named.span.clone(), || wording::unused_name(Kinds::Materials));
+        }
+        for named in self.groups.all().iter().filter(|named| !named.is_used) {
+            self.report.warning(named.line, named.span.clone(), || wording::unused_name(Kinds::Groups));
+        }
+    }
+
+    /// Gives the name of a faulty line, so that what refers to it is not faulty too.
+    pub(super) fn define_faulty(
+        &mut self,
+        line: Line<'a>,
+        text: &'a str,
+        command: Command,
+        subject: Option<Range<usize>>,
+    ) {
+        let Some(subject) = subject else { return };
+        let name = &text[subject.clone()];
+        let used = match command.act() {
+            Act::Material => {
+                // That it is there twice is told of lines in order only.
+                let _ = self.materials.define(name, line, subject, None);
+                self.materials.refer(name)
+            }
+            Act::Group => {
+                let _ = self.groups.define(name, line, subject, None);
+                self.groups.refer(name)
+            }
+            _ => None,
+        };
+        // Nobody is told either that it is not used.
+        let _ = used;
+    }
+
+    pub(super) fn material(&mut self, s: &Statement<'a>) {
+        let (Some(name), Some(subject)) = (s.name(), s.subject.clone()) else { return };
+        let errors_before = self.report.error_count();
+        let (clauses, moving) = self.clauses(s, subject.end);
+        let is_plain =
+            |line: &ClauseLine| matches!(line.clause, Clause::Ambient | Clause::Diffuse | Clause::Mirror);
+        let is_good = self.report.error_count() == errors_before;
+        let other = clauses.iter().find_map(|line| line.other);
+        let is_still = clauses.iter().all(|line| line.row.is_still())
+            && other.is_none_or(|other| {
+                self.materials.get(other).thing.as_ref().is_some_and(|info| info.still.is_some())
+            });
+        let mut named = NamedMaterial { name: name.into(), clauses, still: None };
+        if is_still && is_good {
+            let coefficients = |other: usize| {
+                let info = self.materials.get(other).thing.as_ref();
+                Ok(info.and_then(|info| info.still.clone()).unwrap_or_default())
+            };
+            named.still = named.at(0.0, coefficients).ok();
+        }
+        let info = MaterialInfo {
+            still: named.still.clone(),
+            is_plain: named.clauses.iter().all(is_plain),
+            other,
+            moving,
+            seen: None,
+        };
+        match self.materials.define(name, s.line, subject.clone(), is_good.then_some(info)) {
+            Ok(number) if is_good => {
+                debug_assert_eq!(self.materials.get(number).name, name);
+                self.record(|recorder| recorder.add_material(named));
+            }
+            Ok(_) => {
+                self.materials.refer(name);
+            }
+            Err(first) => {
+                self.report.error(s.line, subject, || wording::defined_twice(Kinds::Materials, name, first));
+            }
+        }
+    }
+
+    /// The clauses behind byte `at`, and those of them with curves among all lines with curves.
+    fn clauses(&mut self, s: &Statement<'a>, at: usize) -> (Vec<ClauseLine>, Vec<usize>) {
+        let words = parameters(s.text.as_bytes(), at);
+        let (mut lines, mut moving): (Vec<ClauseLine>, Vec<usize>) = (Vec::new(), Vec::new());
+        if words.is_empty() {
+            self.report.error(s.line, at..at, wording::no_clause);
+        }
+        let mut next = 0;
+        while next < words.len() {
+            let place = words[next].clone();
+            let told = &s.text[place.clone()];
+            next += 1;
+            let Some(clause) = Clause::from_name(told) else {
+                self.report.error(s.line, place, || wording::unknown_clause(told));
+                // Numbers that belong to it say nothing new.
+                next += words[next..]
+                    .iter()
+                    .take_while(|word| Clause::from_name(&s.text[(*word).clone()]).is_none())
+                    .count();
+                continue;
+            };
+            if let Some(first) = lines
+                .iter()
+                .find(|line| line.clause == clause || line.clause.is_pattern() && clause.is_pattern())
+            {
+                let first = first.clause;
+                self.report.error(s.line, place.clone(), || wording::clause_twice(clause, first));
+            }
+            let (row, spans) = self.clause_numbers(s, clause, &place, &words, &mut next);
+            let other = match clause.form().ends_with {
+                Some(_) => self.clause_material(s, clause, &place, &words, &mut next),
+                None => Some(None),
+            };
+            if let (Some(row), Some(other)) = (row, other) {
+                if row.is_still() {
+                    self.check_clause(s, clause, &row, &spans);
+                } else {
+                    moving.push(self.keep_moving(s.line, spans, Origin::Clause(clause), &row));
+                }
+                lines.push(ClauseLine { clause, row, other });
+            }
+        }
+        (lines, moving)
+    }
+
+    /// The numbers of a clause; `None` if there is a fault in them, which is reported.
+    fn clause_numbers(
+        &mut self,
+        s: &Statement<'a>,
+        clause: Clause,
+        place: &Range<usize>,
+        words: &[Range<usize>],
+        next: &mut usize,
+    ) -> (Option<Row>, Vec<Range<usize>>) {
+        let form = clause.form();
+        let (mut numbers, mut spans) = (Vec::new(), Vec::new());
+        let mut good = true;
+        for (name, _) in form.numbers() {
+            let word = words.get(*next).map(|span| (span.clone(), &s.text[span.clone()]));
+            let number = match &word {
+                Some((span, word)) if word.starts_with('(') => curve::parse(s.text, span.clone())
+                    .map_err(|(span, fault)| (span, wording::curve(fault, name))),
+                Some((span, word)) => number::parse(word)
+                    .map(Number::Still)
+                    .map_err(|fault| (span.clone(), wording::bad_number(fault, name, word, false))),
+                None => Err((0..0, wording::no_clause())),
+            };
+            let is_word = word.as_ref().is_none_or(|(_, word)| is_name(word));
+            match number {
+                Ok(number) => numbers.push(number),
+                Err(_) if is_word => {
+                    let end = words[..*next].last().map_or(place.end, |word| word.end);
+                    let found = spans.len();
+                    self.report.error(s.line, end..end, || wording::clause_too_short(clause, name, found));
+                    return (None, spans);
+                }
+                Err((span, fault)) => {
+                    good = false;
+                    self.report.error(s.line, span, || fault);
+                }
+            }
+            spans.extend(word.map(|(span, _)| span));
+            *next += 1;
+        }
+        (good.then(|| Row::new(numbers)), spans)
+    }
+
+    /// The material that a pattern names: `Some(None)` where it is unknown but a name, `None` where there is a fault
+    /// that the definition cannot go on with; both are reported.
+    fn clause_material(
+        &mut self,
+        s: &Statement<'a>,
+        clause: Clause,
+        place: &Range<usize>,
+        words: &[Range<usize>],
+        next: &mut usize,
+    ) -> Option<Option<usize>> {
+        let Some(span) = words.get(*next).filter(|span| is_name(&s.text[(*span).clone()])).cloned() else {
+            let end = words[..*next].last().map_or(place.end, |word| word.end);
+            self.report.error(s.line, end..end, || wording::no_pattern_material(clause));
+            return None;
+        };
+        *next += 1;
+        let number = self.refer(Kinds::Materials, s.line, span.clone())?;
+        if self.materials.get(number).thing.as_ref().is_some_and(|info| !info.is_plain) {
+            let name = &s.text[span.clone()];
+            self.report.error(s.line, span, || wording::unfit_material(name));
+        }
+        Some(Some(number))
+    }
+
+    /// What is wrong with the numbers of a clause.
+    fn check_clause(&mut self, s: &Statement<'a>, clause: Clause, row: &Row, spans: &[Range<usize>]) {
+        let values = row.at(0.0);
+        let mut clauses = crate::model::Clauses::default();
+        let mut numbers = Numbers::new(&values, row.len(), None);
+        let Err(faults) = clauses.add(clause, &mut numbers, Coefficients::default()) else { return };
+        for fault in faults.0 {
+            let form = clause.form();
+            let place = form.place(|name, parameter| fault.is_about(parameter, name));
+            let (name, field) = form.number(place.start);
+            let span = spans[place.start].start..spans[place.end - 1].end;
+            let word = &s.text[span.clone()];
+            self.report.error(s.line, span, || wording::invalid(fault, name, field, word));
+        }
+    }
+
+    pub(super) fn open_group(&mut self, s: &Statement<'a>) {
+        let (Some(name), Some(subject)) = (s.name(), s.subject.clone()) else { return };
+        if let Some(first) = self.groups.line_of(name) {
+            let span = subject.clone();
+            self.report.error(s.line, span, || wording::defined_twice(Kinds::Groups, name, first));
+        }
+        self.group = Some(OpenGroup {
+            name,
+            line: s.line,
+            command: s.words.command.clone(),
+            subject,
+            recorder: GroupRecorder::default(),
+            drawn: 0,
+            uses: 0,
+            reach: Reach::NONE,
+            contents: Contents::default(),
+        });
+    }
+
+    pub(super) fn end_group(&mut self, s: &Statement<'a>) {
+        if self.group.is_none() && !self.line_lost {
+            self.report.error(s.line, s.words.command.clone(), wording::end_without_group);
+        }
+        self.close_group();
+    }
+
+    /// A command that may not stand in a group ends it, so that what follows is not faulty too.
+    pub(super) fn leave_group_at(&mut self, s: &Statement<'a>) {
+        if let Some(group) = &self.group {
+            let (name, number) = (group.name, group.line.number);
+            if !self.line_lost {
+                let command = s.command;
+                self.report
+                    .error(s.line, s.words.command.clone(), || wording::not_in_group(command, name, number));
+            }
+            self.line_lost = true;
+            self.close_group();
+        }
+    }
+
+    /// At the end of the text.
+    pub(super) fn close_forgotten_group(&mut self) {
+        if let Some(group) = &self.group
+            && !self.line_lost
+        {
+            let (line, span) = (group.line, group.command.clone());
+            self.report.error(line, span, wording::group_not_ended);
+        }
+        self.close_group();
+    }
+
+    fn close_group(&mut self) {
+        let Some(group) = self.group.take() else { return };
+        let OpenGroup { name, line, subject, recorder, drawn, uses, reach, contents, .. } = group;
+        let info = GroupInfo { drawn, uses, reach, contents, seen: None };
+        if self.groups.define(name, line, subject, Some(info)).is_ok() {
+            self.record(|script| script.add_group(recorder.finish(name, drawn)));
+        }
+    }
+
+    /// Keeps a line with curves; its number among them.
+    pub(super) fn keep_moving(
+        &mut self,
+        line: Line<'a>,
+        spans: Vec<Range<usize>>,
+        origin: Origin,
+        row: &Row,
+    ) -> usize {
+        self.moving.push(Moving { line, spans, row: row.clone(), origin, seen: None });
+        self.moving.len() - 1
+    }
+
+    /// A line with curves is drawn, in the group that is being defined or in the scene.
+    pub(super) fn see_moving(&mut self, number: usize) {
+        match &mut self.group {
+            Some(group) => group.contents.moving.push(number),
+            None => self.pending.moving.push((number, self.exposures.len())),
+        }
+    }
+
+    /// A material with curves is seen.
+    pub(super) fn see_material(&mut self, number: usize) {
+        match &mut self.group {
+            Some(group) => group.contents.materials.push(number),
+            None => {
+                if self.pending.materials.last().is_none_or(|(last, _)| *last != number) {
+                    self.pending.materials.push((number, self.exposures.len()));
+                }
+            }
+        }
+    }
+
+    /// A group is drawn, as far away and as large as that.
+    pub(super) fn see_group(&mut self, number: usize, distance: f64, scale: f64) {
+        match &mut self.group {
+            Some(group) => {
+                let Reach { distance: d, scale: s } = group.reach;
+                group.reach = Reach { distance: d.max(distance), scale: s.max(scale) };
+                group.contents.groups.push(number);
+            }
+            None => self.pending.groups.push((number, self.exposures.len())),
+        }
+    }
+
+    /// A setting stands no more, since the Trace of which it stood.
+    pub(super) fn settle(&mut self, old: Option<(Option<usize>, usize)>) {
+        if let Some((Some(number), since)) = old {
+            join(&mut self.moving[number].seen, Suffix::of(&self.exposures).from(since));
+        }
+    }
+
+    /// The scene stands no more: what of it which Traces saw.
+    pub(super) fn settle_scene(&mut self) {
+        let background = self.pending.background.take();
+        self.settle(background);
+        let mut suffix = Suffix::of(&self.exposures);
+        for (number, since) in self.pending.moving.drain(..).rev() {
+            join(&mut self.moving[number].seen, suffix.from(since));
+        }
+        let mut suffix = Suffix::of(&self.exposures);
+        for (number, since) in self.pending.materials.drain(..).rev() {
+            if let Some(info) = self.materials.thing_mut(number) {
+                join(&mut info.seen, suffix.from(since));
+            }
+        }
+        let mut suffix = Suffix::of(&self.exposures);
+        for (number, since) in self.pending.groups.drain(..).rev() {
+            if let Some(info) = self.groups.thing_mut(number) {
+                join(&mut info.seen, suffix.from(since));
+            }
+        }
+    }
+
+    /// At the end of the text: what was seen of everything.
+    pub(super) fn settle_all(&mut self) {
+        self.settle_scene();
+        for old in [self.pending.camera.take(), self.pending.lens.take()] {
+            self.settle(old);
+        }
+        // What a group or a material refers to stands before it.
+        for number in (0..self.groups.all().len()).rev() {
+            let Some(GroupInfo { seen, contents, .. }) = self.groups.thing_mut(number) else { continue };
+            let (seen, contents) = (seen.take(), std::mem::take(contents));
+            for number in contents.moving {
+                join(&mut self.moving[number].seen, seen.as_ref());
+            }
+            for number in contents.materials {
+                if let Some(info) = self.materials.thing_mut(number) {
+                    join(&mut info.seen, seen.as_ref());
+                }
+            }
+            for number in contents.groups {
+                if let Some(info) = self.groups.thing_mut(number) {
+                    join(&mut info.seen, seen.as_ref());
+                }
+            }
+        }
+        for number in (0..self.materials.all().len()).rev() {
+            let Some(info) = self.materials.thing_mut(number) else { continue };
+            let (seen, moving) = (info.seen.take(), std::mem::take(&mut info.moving));
+            let other = info.other;
+            for number in moving {
+                join(&mut self.moving[number].seen, seen.as_ref());
+            }
+            if let Some(info) = other.and_then(|other| self.materials.thing_mut(other)) {
+                join(&mut info.seen, seen.as_ref());
+            }
+        }
+    }
+}

@@ -1,0 +1,274 @@
+//! A line of the text to a statement: its command, its numbers, and the names in it.
+
+use std::ops::Range;
+use std::str::Utf8Error;
+
+use super::text::{Words, is_name};
+use super::{Parser, curve, number, wording};
+use crate::command::{Act, Command, MAX_NUMBERS};
+use crate::form::{Subject, Values};
+use crate::report::{Fault, Line};
+use crate::row::{Number, Row};
+
+/// A command whose words are numbers and names, and as many as it takes.
+pub(super) struct Statement<'a> {
+    pub(super) line: Line<'a>,
+    /// Of the line, without what is not UTF-8 in its comment.
+    pub(super) text: &'a str,
+    pub(super) command: Command,
+    /// Without the name that stands before the numbers.
+    pub(super) words: Words,
+    /// The name that stands before the numbers.
+    pub(super) subject: Option<Range<usize>>,
+    /// Of the parameters; 0 for optional ones that are missing, and for curves.
+    pub(super) values: [f64; MAX_NUMBERS],
+    /// The parameters, if one of them is a curve.
+    pub(super) row: Option<Row>,
+    /// The name of a material that stands in the place of numbers.
+    pub(super) surface: Option<Range<usize>>,
+}
+
+/// The parameters of a line.
+struct Parameters {
+    values: [f64; MAX_NUMBERS],
+    row: Option<Row>,
+    surface: Option<Range<usize>>,
+}
+
+impl<'a> Statement<'a> {
+    /// Of its command.
+    pub(super) fn place(&self) -> (Line<'a>, Range<usize>) {
+        (self.line, self.words.command.clone())
+    }
+
+    /// Its numbers, where none is a curve.
+    pub(super) fn still_row(&self) -> Row {
+        let count = self.words.count() - usize::from(self.surface.is_some());
+        Row::new(self.values[..count].iter().copied().map(Number::Still).collect())
+    }
+
+    /// The name that stands before the numbers.
+    pub(super) fn name(&self) -> Option<&'a str> {
+        self.subject.clone().map(|span| &self.text[span])
+    }
+}
+
+/// The first parameter that was probably written with a comma for a point: `1,5`, in a line that would have as many
+/// numbers as its command takes if only blanks separated them.
+fn decimal_comma(text: &str, command: Command, words: &Words) -> Option<Range<usize>> {
+    // Most lines have no comma, which is quickly seen.
+    if !text.contains(',') {
+        return None;
+    }
+    let form = command.form();
+    let start = words.command.end;
+    let parameters = text[start..].split('#').next().unwrap_or_default();
+    let is_decimal = |part: &&str| {
+        let digits = |part: &str| part.bytes().all(|b| b.is_ascii_digit()) && !part.is_empty();
+        part.split_once(',')
+            .is_some_and(|(whole, fraction)| digits(whole.trim_start_matches(['+', '-'])) && digits(fraction))
+    };
+    let parts = || parameters.split([' ', '\t']).filter(|part| !part.is_empty());
+    let first = parts().find(is_decimal)?;
+    let at = first.as_ptr().addr() - text.as_ptr().addr();
+    let count = parts().filter(|part| *part != ",").count();
+    let numbers = count.checked_sub(usize::from(form.subject.is_some()))?;
+    form.takes(numbers).then_some(at..at + first.len())
+}
+
+impl<'a> Parser<'a> {
+    /// Reads a line and does what it says, unless it has a fault, which is reported.
+    pub(super) fn line(&mut self, line: Line<'a>) {
+        if let Some(statement) = self.statement(line) {
+            self.run(&statement);
+        }
+    }
+
+    /// `None` for a line without a command and for one with a fault, which is reported.
+    fn statement(&mut self, line: Line<'a>) -> Option<Statement<'a>> {
+        let text = match std::str::from_utf8(line.bytes) {
+            Ok(text) => text,
+            Err(error) => self.not_utf8(line, error)?,
+        };
+        if let Some(at) = text.find('\r') {
+            self.report.error(line, at..at + 1, wording::lone_carriage_return);
+            self.expect_no_more();
+            return None;
+        }
+        let mut words = Words::of(text.as_bytes())?;
+        let name = &text[words.command.clone()];
+        let Some(command) = Command::from_name(name) else {
+            self.unknown_command(line, text, words);
+            return None;
+        };
+        let subject = match command.form().subject {
+            None => None,
+            Some(subject) => match self.subject(line, text, command, subject, &mut words) {
+                Some(name) => Some(name),
+                None => {
+                    self.faulty_line(line, text, command, None);
+                    return None;
+                }
+            },
+        };
+        if matches!(command.act(), Act::Material) {
+            let values = [0.0; MAX_NUMBERS];
+            return Some(Statement { line, text, command, words, subject, values, row: None, surface: None });
+        }
+        let Some(parameters) = self.parameters(line, text, command, &words) else {
+            self.faulty_line(line, text, command, subject);
+            return None;
+        };
+        let Parameters { values, row, surface } = parameters;
+        if words.count() > command.form().arity().0
+            && row.is_none()
+            && let Some(comma) = decimal_comma(text, command, &words)
+        {
+            self.report.warning(line, comma.clone(), || wording::decimal_comma(&text[comma]));
+        }
+        Some(Statement { line, text, command, words, subject, values, row, surface })
+    }
+
+    /// The name that stands before the numbers; `None` if it is missing or no name, which is reported.
+    fn subject(
+        &mut self,
+        line: Line<'a>,
+        text: &str,
+        command: Command,
+        subject: Subject,
+        words: &mut Words,
+    ) -> Option<Range<usize>> {
+        let (Subject::Defines(names) | Subject::Refers(names)) = subject;
+        let Some(name) = words.take_first() else {
+            self.report.error(line, words.end(), || wording::no_name(command, names));
+            return None;
+        };
+        if !is_name(&text[name.clone()]) {
+            self.report.error(line, name.clone(), || wording::bad_name(&text[name], names));
+            return None;
+        }
+        Some(name)
+    }
+
+    /// A line of this command was there: what would follow from that it is not is not told.
+    fn faulty_line(
+        &mut self,
+        line: Line<'a>,
+        text: &'a str,
+        command: Command,
+        subject: Option<Range<usize>>,
+    ) {
+        self.expect_no_more_of(command);
+        self.define_faulty(line, text, command, subject);
+    }
+
+    /// The readable start of the line if only its comment is faulty.
+    fn not_utf8(&mut self, line: Line<'a>, error: Utf8Error) -> Option<&'a str> {
+        let start = error.valid_up_to();
+        let end = error.error_len().map_or(line.bytes.len(), |length| start + length);
+        self.report.error(line, start..end, || Fault::not_utf8(line, start..end, "script"));
+        let text = std::str::from_utf8(&line.bytes[..start]).ok().filter(|text| text.contains('#'));
+        if text.is_none() {
+            self.expect_no_more();
+        }
+        text
+    }
+
+    fn unknown_command(&mut self, line: Line<'a>, text: &'a str, mut words: Words) {
+        let name = &text[words.command.clone()];
+        // Looking for it takes longer than parsing a line.
+        let nearest = if self.report.describes_next() { Command::nearest(name) } else { None };
+        self.report.error(line, words.command.clone(), || wording::unknown_command(name, nearest));
+        if let Some(command) = nearest {
+            let subject = words.take_first().filter(|span| is_name(&text[span.clone()]));
+            self.faulty_line(line, text, command, subject);
+        }
+    }
+
+    /// The parameters; `None` if there is a fault in them or in their number, which is reported.
+    fn parameters(
+        &mut self,
+        line: Line<'a>,
+        text: &str,
+        command: Command,
+        words: &Words,
+    ) -> Option<Parameters> {
+        let form = command.form();
+        let mut parameters = Parameters { values: [0.0; MAX_NUMBERS], row: None, surface: None };
+        let mut curves: Vec<(usize, Number)> = Vec::new();
+        let mut good = true;
+        let (_, most) = form.arity();
+        let takes_words = matches!(form.fields.first().map(|field| field.values), Some(Values::OneOf(_)));
+        for (i, span) in words.parameters().iter().take(most).enumerate() {
+            let word = &text[span.clone()];
+            let result = match number::parse(word) {
+                Ok(value) if !takes_words => {
+                    parameters.values[i] = value;
+                    continue;
+                }
+                result => result,
+            };
+            let (name, field) = form.number(i);
+            if let Values::OneOf(words) = field.values {
+                match words.iter().position(|known| known.eq_ignore_ascii_case(word)) {
+                    Some(place) => parameters.values[i] = place as f64,
+                    None => {
+                        good = false;
+                        self.report.error(line, span.clone(), || wording::no_such_word(word, words, field));
+                    }
+                }
+                continue;
+            }
+            let Err(fault) = result else { continue };
+            if word.starts_with('(') {
+                match curve::parse(text, span.clone()) {
+                    _ if !form.curves => {
+                        good = false;
+                        self.report.error(line, span.clone(), || wording::unwanted_curve(command, name));
+                    }
+                    Ok(Number::Still(value)) => parameters.values[i] = value,
+                    Ok(curve) => curves.push((i, curve)),
+                    Err((place, fault)) => {
+                        good = false;
+                        self.report.error(line, place, || wording::curve(fault, name));
+                    }
+                }
+            } else if form.surface() == Some(i) && words.count() == i + 1 && is_name(word) {
+                parameters.surface = Some(span.clone());
+            } else {
+                good = false;
+                let is_surface = form.surface() == Some(i) && is_name(word);
+                self.report.error(line, span.clone(), || wording::bad_number(fault, name, word, is_surface));
+            }
+        }
+        let count = words.count();
+        if count > most {
+            good = false;
+            self.report.error(line, words.rest(most), || {
+                let first = words.parameters().get(most).map_or("", |span| &text[span.clone()]);
+                wording::too_many(
+                    command,
+                    words,
+                    first,
+                    decimal_comma(text, command, words).map(|comma| &text[comma]),
+                )
+            });
+        } else if parameters.surface.is_none() && !form.takes(count) {
+            good = false;
+            self.report.error(line, words.end(), || {
+                wording::too_few(
+                    command,
+                    words,
+                    decimal_comma(text, command, words).map(|comma| &text[comma]),
+                )
+            });
+        }
+        if !curves.is_empty() {
+            let count = count.min(most) - usize::from(parameters.surface.is_some());
+            let mut numbers: Vec<_> = parameters.values[..count].iter().copied().map(Number::Still).collect();
+            curves.into_iter().for_each(|(i, curve)| numbers[i] = curve);
+            parameters.row = Some(Row::new(numbers));
+        }
+        good.then_some(parameters)
+    }
+}

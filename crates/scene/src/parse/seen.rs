@@ -1,0 +1,236 @@
+//! When lines with curves are seen, and whether they are in order then.
+//!
+//! A condition on one number must hold from the first opening of the shutter that sees it to the last closing, which
+//! the curve's ends and keys decide. Conditions on several must hold at each frame's opening, middle and closing. Few
+//! frames are looked at for that: where the ranges of the numbers say that a condition holds over a stretch of frames
+//! they are done, else its halves are looked at, and at last a frame. The work is counted over the whole script
+//! ([`MOST_WORK`]), so that no number of frames takes longer than about a second.
+
+use std::ops::Range;
+
+use super::wording;
+use crate::command::{Act, Command};
+use crate::form::{Form, Numbers};
+use crate::model::{
+    Background, Clause, Clauses, Coefficients, Faults, FrameNumbers, Lens, Material, Placement,
+};
+use crate::report::{Line, Report};
+use crate::row::{Number, Row};
+
+/// Keys of curves that are looked at, stretch of frames by stretch of frames, in a whole script.
+const MOST_WORK: usize = 1 << 24;
+
+/// Reading a line counts as much as so many keys.
+const READING: usize = 32;
+
+/// What a `Trace` is, to those that it sees.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Exposure {
+    pub(super) numbers: FrameNumbers,
+    /// The shutter's share of a frame.
+    pub(super) open: f64,
+}
+
+/// When something is seen.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Seen {
+    /// From the first opening to the last closing.
+    pub(super) from: f64,
+    pub(super) to: f64,
+    /// The first and the last `Trace` that sees it, those between maybe.
+    traces: Range<usize>,
+}
+
+/// A line, or a part of it, with curves.
+pub(super) struct Moving<'a> {
+    pub(super) line: Line<'a>,
+    /// Of each of its numbers.
+    pub(super) spans: Vec<Range<usize>>,
+    pub(super) row: Row,
+    pub(super) origin: Origin,
+    pub(super) seen: Option<Seen>,
+}
+
+/// What the numbers belong to.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Origin {
+    Command(Command),
+    Clause(Clause),
+}
+
+impl Exposure {
+    fn opening(&self) -> f64 {
+        f64::from(self.numbers.first) - 0.5 * self.open
+    }
+
+    fn closing(&self) -> f64 {
+        f64::from(self.numbers.last) + 0.5 * self.open
+    }
+}
+
+/// The last Traces of some, more and more of them.
+pub(super) struct Suffix<'e> {
+    exposures: &'e [Exposure],
+    start: usize,
+    seen: Option<Seen>,
+}
+
+impl<'e> Suffix<'e> {
+    /// None of these.
+    pub(super) fn of(exposures: &'e [Exposure]) -> Self {
+        Self { exposures, start: exposures.len(), seen: None }
+    }
+
+    /// What those from number `start` on see; it never grows from call to call.
+    pub(super) fn from(&mut self, start: usize) -> Option<&Seen> {
+        for i in (start..self.start).rev() {
+            let exposure = &self.exposures[i];
+            let one = Seen { from: exposure.opening(), to: exposure.closing(), traces: i..i + 1 };
+            join(&mut self.seen, Some(&one));
+        }
+        self.start = self.start.min(start);
+        self.seen.as_ref()
+    }
+}
+
+/// What is seen then too.
+pub(super) fn join(seen: &mut Option<Seen>, also: Option<&Seen>) {
+    match (seen.as_mut(), also) {
+        (_, None) => {}
+        (None, Some(also)) => *seen = Some(also.clone()),
+        (Some(seen), Some(also)) => {
+            seen.from = seen.from.min(also.from);
+            seen.to = seen.to.max(also.to);
+            let (start, end) =
+                (seen.traces.start.min(also.traces.start), seen.traces.end.max(also.traces.end));
+            seen.traces = start..end;
+        }
+    }
+}
+
+impl Origin {
+    fn form(self) -> &'static Form {
+        match self {
+            Self::Command(command) => command.form(),
+            Self::Clause(clause) => clause.form(),
+        }
+    }
+
+    /// What is wrong with these numbers.
+    fn faults(self, numbers: &mut Numbers<'_>) -> Option<Faults> {
+        use crate::form::Scripted;
+        match self {
+            Self::Clause(clause) => Clauses::default().add(clause, numbers, Coefficients::default()).err(),
+            Self::Command(command) => match command.act() {
+                Act::Camera(read) => read(numbers).err(),
+                Act::Object(read) => read(numbers).err(),
+                Act::Light(read) => read(numbers).err(),
+                Act::Background => Background::read(numbers).err(),
+                Act::Lens => Lens::read(numbers).err(),
+                Act::Use => Placement::read(numbers).err(),
+                Act::Screen
+                | Act::Samples
+                | Act::Shutter
+                | Act::Tone
+                | Act::Depth
+                | Act::Frames
+                | Act::Material
+                | Act::Group
+                | Act::End
+                | Act::Clear
+                | Act::Trace => unreachable!("`{command}` has no curves"),
+            },
+        }
+    }
+}
+
+/// Looks at all lines with curves at the times at which they are seen.
+pub(super) fn check(moving: &[Moving<'_>], exposures: &[Exposure], report: &mut Report<'_>) {
+    let mut work = 0;
+    for line in moving {
+        if let Some(seen) = &line.seen
+            && line.check_alone(seen, report)
+            && !line.row.surely_keeps(line.origin.form(), seen.from, seen.to, &mut 0)
+        {
+            line.check_together(&exposures[seen.traces.clone()], &mut work, report);
+        }
+    }
+}
+
+impl Moving<'_> {
+    /// The conditions on one number; whether all hold.
+    fn check_alone(&self, seen: &Seen, report: &mut Report<'_>) -> bool {
+        let form = self.origin.form();
+        let mut good = true;
+        for (i, number) in self.row.numbers().iter().enumerate() {
+            let Number::Moving(curve) = number else { continue };
+            let (_, field) = form.number(i);
+            let is_wrong = |value: f64| !field.values.take(value, value);
+            let mut wrong = None;
+            curve.moments(seen.from, seen.to, |moment| {
+                if wrong.is_none() && is_wrong(moment.value) {
+                    wrong = Some(moment);
+                }
+            });
+            let Some(mut wrong) = wrong else { continue };
+            // A whole frame says more to a person than the moment before a cycle starts again.
+            let frames = [wrong.frame.round(), wrong.frame.floor(), wrong.frame.ceil()];
+            let whole = frames
+                .into_iter()
+                .find(|frame| (seen.from..=seen.to).contains(frame) && is_wrong(curve.at(*frame)));
+            if let Some(frame) = whole {
+                wrong.frame = frame;
+                wrong.value = curve.at(frame);
+            }
+            good = false;
+            report.error(self.line, self.spans[i].clone(), || wording::wrong_at(field, wrong, seen));
+        }
+        good
+    }
+
+    /// All conditions, frame by frame where nothing shorter decides.
+    fn check_together(&self, exposures: &[Exposure], work: &mut usize, report: &mut Report<'_>) {
+        let form = self.origin.form();
+        for exposure in exposures {
+            let half = 0.5 * exposure.open;
+            let mut ranges = vec![(exposure.numbers.first, exposure.numbers.last)];
+            while let Some((first, last)) = ranges.pop() {
+                *work += READING;
+                if *work > MOST_WORK {
+                    let span = self.spans[0].start..self.spans[self.spans.len() - 1].end;
+                    report.error(self.line, span, wording::too_much_work);
+                    return;
+                }
+                let (from, to) = (f64::from(first) - half, f64::from(last) + half);
+                if self.row.surely_keeps(form, from, to, work) {
+                    continue;
+                }
+                if first < last {
+                    let middle = first + (last - first) / 2;
+                    ranges.extend([(middle + 1, last), (first, middle)]);
+                } else if self.is_faulty_at(&[from, f64::from(first), to], report) {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Whether something is wrong at one of some times; the first is told.
+    fn is_faulty_at(&self, frames: &[f64], report: &mut Report<'_>) -> bool {
+        let form = self.origin.form();
+        for &frame in frames {
+            let values = self.row.at(frame);
+            let surface = Material::default();
+            let mut numbers = Numbers::new(&values, self.row.len(), form.surface().map(|_| &surface));
+            let Some(faults) = self.origin.faults(&mut numbers) else { continue };
+            for fault in faults.0 {
+                let place = form.place(|name, parameter| fault.is_about(parameter, name));
+                let last = place.end.min(self.spans.len()) - 1;
+                let span = self.spans[place.start.min(last)].start..self.spans[last].end;
+                report.error(self.line, span, || wording::invalid_at(fault, frame));
+            }
+            return true;
+        }
+        false
+    }
+}

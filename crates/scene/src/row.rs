@@ -1,0 +1,176 @@
+//! The numbers of a line as they stand in a script, each still or a curve, and which conditions they surely keep.
+//!
+//! Knows forms, but neither what a command makes of the numbers nor where they stand in a text.
+
+use std::fmt::{self, Formatter};
+use std::sync::Arc;
+
+use crate::command::MAX_NUMBERS;
+use crate::curve::Curve;
+use crate::form::{Form, Presence, Together, Values, write_number};
+use crate::model::PARALLEL;
+
+/// A number of a line.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Number {
+    Still(f64),
+    Moving(Curve),
+}
+
+/// The numbers of a line, shared by all that keep them.
+#[derive(Clone, Debug)]
+pub(crate) struct Row(Arc<[Number]>);
+
+/// The least and the greatest value of a number over some time.
+type Range = (f64, f64);
+
+impl Row {
+    pub(crate) fn new(numbers: Vec<Number>) -> Self {
+        Self(numbers.into())
+    }
+
+    /// How many were written.
+    pub(crate) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    pub(crate) fn is_still(&self) -> bool {
+        self.0.iter().all(|number| matches!(number, Number::Still(_)))
+    }
+
+    pub(crate) fn numbers(&self) -> &[Number] {
+        &self.0
+    }
+
+    /// The values at a time; 0 for those that were not written.
+    pub(crate) fn at(&self, frame: f64) -> [f64; MAX_NUMBERS] {
+        let mut values = [0.0; MAX_NUMBERS];
+        for (value, number) in values.iter_mut().zip(self.0.iter()) {
+            *value = number.at(frame);
+        }
+        values
+    }
+
+    /// A bound on the absolute value of number `i` at any time; `None` if it was not written.
+    pub(crate) fn largest(&self, i: usize) -> Option<f64> {
+        self.0.get(i).map(|number| match number {
+            Number::Still(value) => value.abs(),
+            Number::Moving(curve) => curve.largest(),
+        })
+    }
+
+    /// Whether everything that `form` demands surely holds from one time to another. Where it says no it may hold
+    /// nevertheless. Adds to `work` how many keys were looked at.
+    pub(crate) fn surely_keeps(&self, form: &Form, from: f64, to: f64, work: &mut usize) -> bool {
+        let mut ranges = [(0.0, 0.0); MAX_NUMBERS];
+        for (range, number) in ranges.iter_mut().zip(self.0.iter()) {
+            *range = match number {
+                Number::Still(value) => (*value, *value),
+                Number::Moving(curve) => curve.range(from, to, work),
+            };
+        }
+        let field = |i: usize| &ranges[form.span(i)];
+        let alone = (0..form.fields.len()).all(|i| {
+            // What was left out keeps every condition.
+            form.span(i).start >= self.len() || keeps(form.fields[i].values, field(i))
+        });
+        alone && form.together.iter().all(|together| self.keep_together(form, *together, &field))
+    }
+
+    fn keep_together<'a>(
+        &self,
+        form: &Form,
+        together: Together,
+        field: &impl Fn(usize) -> &'a [Range],
+    ) -> bool {
+        let apart = |a: usize, b: usize| field(a).iter().zip(field(b)).map(|(a, b)| a.1 < b.0 || b.1 < a.0);
+        match together {
+            Together::Differ(a, b) => apart(a, b).any(|apart| apart),
+            Together::DifferEverywhere(a, b) => apart(a, b).all(|apart| apart),
+            Together::NotParallel(a, b) => surely_cross(field(a), field(b)),
+            Together::LooksAside(from, to, up) => {
+                let gaze = [0, 1, 2].map(|i| minus(half(field(to)[i]), half(field(from)[i])));
+                let is_left_out =
+                    form.span(up).start >= self.len() && form.fields[up].presence != Presence::Required;
+                if !is_left_out {
+                    return surely_cross(&gaze, field(up));
+                }
+                // Straight up or down another direction is taken, and nearly so is a fault.
+                surely_cross(&gaze, &[(0.0, 0.0), (1.0, 1.0), (0.0, 0.0)])
+                    || gaze[0] == (0.0, 0.0) && gaze[2] == (0.0, 0.0)
+            }
+            Together::Greater(a, b) => field(a)[0].0 > field(b)[0].1,
+            Together::NotBothZero(a, b) => field(a)[0].0 > 0.0 || field(b)[0].0 > 0.0,
+            Together::InOrder(a, b) => field(a)[0].1 <= field(b)[0].0,
+        }
+    }
+
+    /// As they stand in a line, each behind a blank; words for those that stand for words.
+    pub(crate) fn write(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        for number in self.0.iter() {
+            f.write_str(" ")?;
+            match number {
+                Number::Still(value) => write_number(f, *value)?,
+                Number::Moving(curve) => write!(f, "{curve}")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Number {
+    pub(crate) fn at(&self, frame: f64) -> f64 {
+        match self {
+            Self::Still(value) => *value,
+            Self::Moving(curve) => curve.at(frame),
+        }
+    }
+}
+
+impl PartialEq for Row {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0) || self.0 == other.0
+    }
+}
+
+fn keeps(values: Values, ranges: &[Range]) -> bool {
+    let finite = ranges.iter().all(|&(low, high)| low.is_finite() && high.is_finite());
+    let excludes_zero = || ranges.iter().any(|&(low, high)| low > 0.0 || high < 0.0);
+    finite
+        && ranges.iter().all(|&(low, high)| values.take(low, high))
+        && (values != Values::NotZero || excludes_zero())
+}
+
+fn half((low, high): Range) -> Range {
+    (0.5 * low, 0.5 * high)
+}
+
+fn minus(a: Range, b: Range) -> Range {
+    (a.0 - b.1, a.1 - b.0)
+}
+
+fn times(a: Range, b: Range) -> Range {
+    let products = [a.0 * b.0, a.0 * b.1, a.1 * b.0, a.1 * b.1];
+    (
+        products.into_iter().fold(f64::INFINITY, f64::min),
+        products.into_iter().fold(f64::NEG_INFINITY, f64::max),
+    )
+}
+
+/// Whether two directions are far from parallel, whatever they are in their ranges: by more than a thousand times
+/// what is taken for parallel, which rounding here cannot hide.
+fn surely_cross(a: &[Range], b: &[Range]) -> bool {
+    let largest =
+        |v: &[Range]| v.iter().fold(0.0, |most: f64, (low, high)| most.max(low.abs()).max(high.abs()));
+    let (size_a, size_b) = (largest(a), largest(b));
+    // Products of others may overflow or vanish.
+    let sensible = |size: f64| (1e-100..1e100).contains(&size);
+    if !sensible(size_a) || !sensible(size_b) {
+        return false;
+    }
+    let margin = 1000.0 * PARALLEL * 3.0 * size_a * size_b;
+    [(1, 2), (2, 0), (0, 1)].into_iter().any(|(i, j)| {
+        let (low, high) = minus(times(a[i], b[j]), times(a[j], b[i]));
+        low > margin || high < -margin
+    })
+}

@@ -1,0 +1,355 @@
+//! A script that was understood: a sequence of frames, each made when it is asked for.
+//!
+//! Frames share what they have in common. All objects of the script lie in one list, in the order of the text; a
+//! `Clear` starts a new range of it, each command adds to the range, and a `Trace` notes how far it reaches: a [`Shot`],
+//! which is one frame or many. So a frame is a handful of numbers, and any frame can be had without replaying those
+//! before it. What has no curves is kept as it is drawn; what has is kept as its line, and read at each moment that is
+//! asked for (`moment`).
+//!
+//! Invariants: every range lies within its list; what no frame sees is not kept; no two neighbours in `views` are equal;
+//! materials and groups refer only to earlier ones.
+
+mod moment;
+mod of_scene;
+mod recorder;
+mod write;
+
+use std::ops::Range;
+
+use crate::command::Command;
+use crate::model::{
+    Background, Camera, Clause, Depth, FrameNumbers, InvalidValue, Lens, Light, Material, Object, Samples,
+    Scene, Screen, Shutter, Tone,
+};
+use crate::row::Row;
+use crate::shared_slice::SharedSlice;
+
+pub(crate) use recorder::{GroupRecorder, Recorder};
+
+/// The frames of a script, at least one.
+///
+/// ```
+/// let text = b"Screen 4 3\nSphere (1:1 25:3) 0 0 -5 1 0 0 0 0 0\nFrames 50\nTrace\nClear\nFrames 1\nTrace";
+/// let script = rayfold_scene::parse("a.txt", text, &Default::default()).script.unwrap();
+/// assert_eq!(script.frame_count(), 51);
+/// let rayfold_scene::Object::Sphere(sphere) = &script.frame(12).unwrap().objects[0] else { unreachable!() };
+/// assert_eq!(sphere.radius(), 2.0);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Script {
+    materials: Vec<NamedMaterial>,
+    groups: Vec<Group>,
+    objects: Objects,
+    lights: Sequence<Light, Template>,
+    views: Vec<View>,
+    shots: Vec<Shot>,
+}
+
+/// What one `Trace` renders, without its scenes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShotSummary {
+    /// How many frames it is.
+    pub frame_count: usize,
+    /// Size of their images.
+    pub screen: Screen,
+    /// Whether they are drawn by `Orthocamera`.
+    pub is_orthographic: bool,
+    /// The most objects that one of them has, as drawn.
+    pub objects: usize,
+}
+
+/// What a frame has beside its objects and lights.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct View {
+    pub(crate) screen: Screen,
+    pub(crate) camera: Value<Camera>,
+    pub(crate) background: Value<Background>,
+    pub(crate) lens: Value<Lens>,
+    pub(crate) samples: Samples,
+    pub(crate) shutter: Shutter,
+    pub(crate) tone: Tone,
+    pub(crate) depth: Depth,
+}
+
+/// What is the same in all frames, or read anew for each.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Value<T> {
+    Still(T),
+    Moving(Template),
+}
+
+/// A line that is read at each moment that is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Template {
+    pub(crate) command: Command,
+    pub(crate) row: Row,
+}
+
+/// What a `Trace` sees.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Shot {
+    view: usize,
+    objects: Extent,
+    lights: Extent,
+    numbers: FrameNumbers,
+    /// How many frames come before.
+    before: usize,
+    /// The most objects that a frame has, as drawn.
+    drawn: usize,
+}
+
+/// Things in the order of the text: those that are the same in all frames, and others between them.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Sequence<T, M> {
+    still: SharedSlice<T>,
+    /// Each with the number of still ones that stand before it.
+    others: Vec<(usize, M)>,
+}
+
+/// A part of a sequence.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Extent {
+    still: Range<usize>,
+    others: Range<usize>,
+}
+
+/// Objects in the order of the text.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Objects {
+    list: Sequence<Object, Drawn>,
+    /// Which material the still objects from a place on are named to have.
+    surfaces: Vec<(usize, Option<usize>)>,
+}
+
+/// What is drawn beside still objects.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Drawn {
+    /// An object that is read at each moment, with its numbers or a named material.
+    Object { template: Template, surface: Option<usize> },
+    /// A group.
+    Use { group: usize, row: Row },
+}
+
+/// A material with its name.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct NamedMaterial {
+    pub(crate) name: Box<str>,
+    pub(crate) clauses: Vec<ClauseLine>,
+    /// Its value, if no curve is in it.
+    pub(crate) still: Option<Material>,
+}
+
+/// A clause as it stands in a script.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ClauseLine {
+    pub(crate) clause: Clause,
+    pub(crate) row: Row,
+    /// The material that a pattern names.
+    pub(crate) other: Option<usize>,
+}
+
+/// A group with its name.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Group {
+    name: Box<str>,
+    objects: Objects,
+    /// The most objects that drawing it draws.
+    drawn: usize,
+}
+
+impl Script {
+    /// How many frames there are.
+    pub fn frame_count(&self) -> usize {
+        self.shots.last().map_or(0, |shot| shot.before.saturating_add(shot.frame_count()))
+    }
+
+    /// The scene of frame `k`, counted from 0, at the middle of its exposure; `None` beyond the last. Copies no object
+    /// of a frame in which nothing moves.
+    pub fn frame(&self, k: usize) -> Option<Scene> {
+        let (shot, number) = self.shot_of(k)?;
+        self.scene(shot, number).ok()
+    }
+
+    /// The number of frame `k`, counted from 0, which is the time at which its curves are read.
+    pub fn frame_number(&self, k: usize) -> Option<f64> {
+        self.shot_of(k).map(|(_, number)| number)
+    }
+
+    /// The scene of frame `k`, counted from 0, as it is at another moment of its exposure: `time` lies within half of the
+    /// shutter's share around [`Self::frame_number`]. `None` beyond the last frame.
+    ///
+    /// # Errors
+    /// What is wrong at that moment: what several numbers must keep together is known to hold only at the opening, the
+    /// middle and the closing of the shutter. Nothing at these three.
+    pub fn frame_at(&self, k: usize, time: f64) -> Option<Result<Scene, InvalidValue>> {
+        let (shot, _) = self.shot_of(k)?;
+        Some(self.scene(shot, time).map_err(|faults| faults.0[0]))
+    }
+
+    /// The scenes of all frames in order, each made when the iterator comes to it.
+    pub fn frames(&self) -> impl DoubleEndedIterator<Item = Scene> + ExactSizeIterator + '_ {
+        (0..self.frame_count()).map(|k| {
+            let scene = self.frame(k);
+            scene.unwrap_or_else(|| unreachable!("frame {k} was found to be in order when it was parsed"))
+        })
+    }
+
+    /// What each `Trace` renders, in order; costs nothing for the frames that it is.
+    pub fn shots(&self) -> impl Iterator<Item = ShotSummary> + '_ {
+        self.shots.iter().map(|shot| {
+            let view = &self.views[shot.view];
+            ShotSummary {
+                frame_count: shot.frame_count(),
+                screen: view.screen,
+                is_orthographic: view.camera == Value::Still(Camera::Orthographic),
+                objects: shot.drawn,
+            }
+        })
+    }
+
+    /// The script of frame `k`, counted from 0, alone; `None` beyond the last. It has the pixels of that frame, and is
+    /// written with its curves and its number.
+    pub fn only(&self, k: usize) -> Option<Self> {
+        let (shot, number) = self.shot_of(k)?;
+        let number = number as u32;
+        let (objects, lights) = (self.objects.part(&shot.objects), self.lights.part(&shot.lights));
+        let shot = Shot {
+            view: 0,
+            objects: objects.list.whole(),
+            lights: lights.whole(),
+            numbers: FrameNumbers { first: number, last: number },
+            before: 0,
+            drawn: shot.drawn,
+        };
+        let mut script = Self {
+            materials: self.materials.clone(),
+            groups: self.groups.clone(),
+            objects,
+            lights,
+            views: vec![self.views[self.shot_of(k)?.0.view].clone()],
+            shots: vec![shot],
+        };
+        script.forget_unused();
+        Some(script)
+    }
+
+    /// What frame `k` is a part of, and its number.
+    fn shot_of(&self, k: usize) -> Option<(&Shot, f64)> {
+        let shot = &self.shots[self.shots.partition_point(|shot| shot.before <= k).checked_sub(1)?];
+        let number = f64::from(shot.numbers.first) + (k - shot.before) as f64;
+        (number <= f64::from(shot.numbers.last)).then_some((shot, number))
+    }
+
+    /// Forgets materials and groups that nothing refers to, and numbers the others anew.
+    fn forget_unused(&mut self) {
+        if self.materials.is_empty() && self.groups.is_empty() {
+            return;
+        }
+        let (mut materials, mut groups) = (vec![false; self.materials.len()], vec![false; self.groups.len()]);
+        self.objects.refer(&mut materials, &mut groups);
+        for (i, group) in self.groups.iter().enumerate().rev() {
+            if groups[i] {
+                group.objects.refer(&mut materials, &mut groups);
+            }
+        }
+        for (i, material) in self.materials.iter().enumerate().rev() {
+            if materials[i] {
+                material.clauses.iter().filter_map(|clause| clause.other).for_each(|k| materials[k] = true);
+            }
+        }
+        let (materials, groups) = (renumbered(&materials), renumbered(&groups));
+        let mut i = 0..;
+        self.materials.retain(|_| i.next().is_some_and(|i: usize| materials[i].is_some()));
+        let mut i = 0..;
+        self.groups.retain(|_| i.next().is_some_and(|i: usize| groups[i].is_some()));
+        let new = |old: &mut usize, numbers: &[Option<usize>]| *old = numbers[*old].unwrap_or(*old);
+        for material in &mut self.materials {
+            material.clauses.iter_mut().filter_map(|c| c.other.as_mut()).for_each(|k| new(k, &materials));
+        }
+        let all = self.groups.iter_mut().map(|group| &mut group.objects).chain([&mut self.objects]);
+        for objects in all {
+            objects.surfaces.iter_mut().filter_map(|(_, k)| k.as_mut()).for_each(|k| new(k, &materials));
+            for (_, drawn) in &mut objects.list.others {
+                match drawn {
+                    Drawn::Object { surface, .. } => {
+                        surface.iter_mut().for_each(|k| new(k, &materials));
+                    }
+                    Drawn::Use { group, .. } => new(group, &groups),
+                }
+            }
+        }
+    }
+}
+
+/// The new number of each that is kept.
+fn renumbered(kept: &[bool]) -> Vec<Option<usize>> {
+    let mut next = 0..;
+    kept.iter().map(|kept| if *kept { next.next() } else { None }).collect()
+}
+
+impl Shot {
+    fn frame_count(&self) -> usize {
+        usize::try_from(self.numbers.count()).unwrap_or(usize::MAX)
+    }
+}
+
+impl<T, M> Sequence<T, M> {
+    fn whole(&self) -> Extent {
+        Extent { still: 0..self.still.len(), others: 0..self.others.len() }
+    }
+}
+
+impl<T, M: Clone> Sequence<T, M> {
+    fn part(&self, extent: &Extent) -> Self {
+        let others = self.others[extent.others.clone()].iter();
+        Self {
+            still: self.still.part(extent.still.clone()),
+            others: others.map(|(before, other)| (before - extent.still.start, other.clone())).collect(),
+        }
+    }
+}
+
+impl<T, M> Default for Sequence<T, M> {
+    fn default() -> Self {
+        Self { still: SharedSlice::default(), others: Vec::new() }
+    }
+}
+
+impl Objects {
+    fn part(&self, extent: &Extent) -> Self {
+        let Range { start, end } = extent.still;
+        let mut surfaces: Vec<_> = (self.surfaces.iter())
+            .filter(|(from, _)| (start + 1..end).contains(from))
+            .map(|(from, surface)| (from - start, *surface))
+            .collect();
+        if let Some(surface) = self.surface_of(start)
+            && start < end
+        {
+            surfaces.insert(0, (0, Some(surface)));
+        }
+        Self { list: self.list.part(extent), surfaces }
+    }
+
+    /// The named material of still object `i`.
+    fn surface_of(&self, i: usize) -> Option<usize> {
+        let run = self.surfaces.partition_point(|(from, _)| *from <= i).checked_sub(1)?;
+        self.surfaces[run].1
+    }
+
+    /// Marks the materials and groups that they refer to.
+    fn refer(&self, materials: &mut [bool], groups: &mut [bool]) {
+        self.surfaces.iter().filter_map(|(_, surface)| *surface).for_each(|k| materials[k] = true);
+        for (_, drawn) in &self.list.others {
+            match drawn {
+                Drawn::Object { surface, .. } => surface.iter().for_each(|k| materials[*k] = true),
+                Drawn::Use { group, .. } => groups[*group] = true,
+            }
+        }
+    }
+}
+
+impl<T: Default> Default for Value<T> {
+    fn default() -> Self {
+        Self::Still(T::default())
+    }
+}

@@ -1,0 +1,252 @@
+//! The scene of a script at a moment: lines with curves are read, groups are drawn.
+//!
+//! Each material and group is evaluated once a moment, however often it is used. Groups are drawn without recursion, so
+//! that no depth of groups in groups exhausts the stack.
+
+use std::sync::Arc;
+
+use super::{Drawn, Extent, Group, NamedMaterial, Script, Shot, Template, Value};
+use crate::command::{Act, Reader};
+use crate::form::{Numbers, Scripted};
+use crate::model::{Clauses, Coefficients, Faults, Instance, Light, Material, Object, Placement, Scene};
+use crate::row::Row;
+use crate::shared_slice::SharedSlice;
+
+/// A script at a time, and what of it was evaluated so far.
+struct Moment<'a> {
+    script: &'a Script,
+    frame: f64,
+    /// Those that move.
+    materials: Vec<Option<Material>>,
+    /// The objects that stand in a group, without those of groups that it uses.
+    groups: Vec<Option<SharedSlice<Object>>>,
+}
+
+/// How far the drawing of a group has come.
+struct Level {
+    group: usize,
+    placement: Arc<Placement>,
+    /// The next of its still objects, of its other lines, and of all its objects.
+    still: usize,
+    other: usize,
+    object: usize,
+}
+
+impl Script {
+    pub(super) fn scene(&self, shot: &Shot, frame: f64) -> Result<Scene, Faults> {
+        let view = &self.views[shot.view];
+        let camera = view.camera.at(frame, |act| match act {
+            Act::Camera(read) => Some(read),
+            _ => None,
+        })?;
+        let mut scene = Scene::new(view.screen, camera);
+        scene.background = view.background.at(frame, |_| Some(Scripted::read))?;
+        scene.lens = view.lens.at(frame, |_| Some(Scripted::read))?;
+        (scene.samples, scene.shutter) = (view.samples, view.shutter);
+        (scene.tone, scene.depth) = (view.tone, view.depth);
+        scene.objects = self.objects_at(&shot.objects, frame)?;
+        scene.lights = self.lights_at(&shot.lights, frame)?;
+        Ok(scene)
+    }
+
+    fn lights_at(&self, extent: &Extent, frame: f64) -> Result<SharedSlice<Light>, Faults> {
+        let Extent { still, others } = extent.clone();
+        if others.is_empty() {
+            return Ok(self.lights.still.part(still));
+        }
+        let mut lights = Vec::with_capacity(still.len() + others.len());
+        let mut next = still.start;
+        for (before, template) in &self.lights.others[others] {
+            lights.extend_from_slice(&self.lights.still[next..*before]);
+            next = *before;
+            lights.push(template.light(frame)?);
+        }
+        lights.extend_from_slice(&self.lights.still[next..still.end]);
+        Ok(lights.into())
+    }
+
+    fn objects_at(&self, extent: &Extent, frame: f64) -> Result<SharedSlice<Object>, Faults> {
+        let list = &self.objects.list;
+        let Extent { still, others } = extent.clone();
+        if others.is_empty() {
+            return Ok(list.still.part(still));
+        }
+        let mut moment = Moment {
+            script: self,
+            frame,
+            materials: vec![None; self.materials.len()],
+            groups: vec![None; self.groups.len()],
+        };
+        let mut objects = Vec::new();
+        let mut next = still.start;
+        for (before, drawn) in &list.others[others] {
+            objects.extend_from_slice(&list.still[next..*before]);
+            next = *before;
+            match drawn {
+                Drawn::Object { template, surface } => objects.push(moment.object(template, *surface)?),
+                Drawn::Use { group, row } => moment.draw(*group, row, &mut objects)?,
+            }
+        }
+        objects.extend_from_slice(&list.still[next..still.end]);
+        Ok(objects.into())
+    }
+}
+
+impl Moment<'_> {
+    fn object(&mut self, template: &Template, surface: Option<usize>) -> Result<Object, Faults> {
+        let surface = surface.map(|material| self.material(material)).transpose()?;
+        template.object(self.frame, surface.as_ref())
+    }
+
+    fn material(&mut self, i: usize) -> Result<Material, Faults> {
+        if let Some(material) = self.script.materials[i].still.as_ref().or(self.materials[i].as_ref()) {
+            return Ok(material.clone());
+        }
+        let named = &self.script.materials[i];
+        // Those that a pattern names have no pattern, so that this goes no deeper.
+        let material = named.at(self.frame, |other| self.material(other))?;
+        self.materials[i] = Some(material.clone());
+        Ok(material)
+    }
+
+    /// The objects that stand in a group, without those of groups that it uses.
+    fn objects_of(&mut self, i: usize) -> Result<SharedSlice<Object>, Faults> {
+        if let Some(objects) = &self.groups[i] {
+            return Ok(objects.clone());
+        }
+        let script = self.script;
+        let list = &script.groups[i].objects.list;
+        let moves = |(_, drawn): &(usize, Drawn)| matches!(drawn, Drawn::Object { .. });
+        let objects = if list.others.iter().any(moves) {
+            let mut objects = Vec::with_capacity(list.still.len() + list.others.len());
+            let mut next = 0;
+            for (before, drawn) in &list.others {
+                objects.extend_from_slice(&list.still[next..*before]);
+                next = *before;
+                match drawn {
+                    Drawn::Object { template, surface } => objects.push(self.object(template, *surface)?),
+                    Drawn::Use { .. } => {}
+                }
+            }
+            objects.extend_from_slice(&list.still[next..]);
+            objects.into()
+        } else {
+            list.still.clone()
+        };
+        self.groups[i] = Some(objects);
+        Ok(self.groups[i].clone().unwrap_or_default())
+    }
+
+    /// Adds the objects of a group where `row` draws it, in the order of the text.
+    fn draw(&mut self, group: usize, row: &Row, into: &mut Vec<Object>) -> Result<(), Faults> {
+        let Some(placement) = self.placement(group, row, None)? else { return Ok(()) };
+        let mut stack = vec![Level { group, placement, still: 0, other: 0, object: 0 }];
+        while let Some(level) = stack.last_mut() {
+            let Group { objects, .. } = &self.script.groups[level.group];
+            let other = objects.list.others.get(level.other);
+            let still = other.map_or(objects.list.still.len(), |(before, _)| *before);
+            let mut count = still - level.still;
+            (level.still, level.other) = (still, level.other + 1);
+            if let Some((_, Drawn::Object { .. })) = other {
+                count += 1;
+            }
+            if count > 0 {
+                let own = self.objects_of(level.group)?;
+                let range = level.object..level.object + count;
+                level.object = range.end;
+                into.extend(range.map(|i| Object::from(Instance::new(&own, i, &level.placement))));
+            }
+            match other {
+                Some((_, Drawn::Object { .. })) => {}
+                Some((_, Drawn::Use { group, row })) => {
+                    let outer = Arc::clone(&level.placement);
+                    if let Some(placement) = self.placement(*group, row, Some(&outer))? {
+                        stack.push(Level { group: *group, placement, still: 0, other: 0, object: 0 });
+                    }
+                }
+                None => {
+                    stack.pop();
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Where a group is drawn within another, if at all.
+    fn placement(
+        &self,
+        group: usize,
+        row: &Row,
+        outer: Option<&Placement>,
+    ) -> Result<Option<Arc<Placement>>, Faults> {
+        if self.script.groups[group].drawn == 0 {
+            return Ok(None);
+        }
+        let values = row.at(self.frame);
+        let Some(own) = Placement::read(&mut Numbers::new(&values, row.len(), None))? else {
+            return Ok(None);
+        };
+        Ok(match outer {
+            // What is scaled to less than the least of numbers is hidden.
+            Some(outer) if own.scale() * outer.scale() == 0.0 => None,
+            Some(outer) => Some(Arc::new(own.within(outer)?)),
+            None => Some(Arc::new(own)),
+        })
+    }
+}
+
+impl NamedMaterial {
+    /// Its value at a time; `other` gives that of another material.
+    pub(crate) fn at(
+        &self,
+        frame: f64,
+        mut other: impl FnMut(usize) -> Result<Material, Faults>,
+    ) -> Result<Material, Faults> {
+        let mut clauses = Clauses::default();
+        for line in &self.clauses {
+            let coefficients = match line.other {
+                Some(material) => other(material)?.coefficients(),
+                None => Coefficients::default(),
+            };
+            let values = line.row.at(frame);
+            clauses.add(line.clause, &mut Numbers::new(&values, line.row.len(), None), coefficients)?;
+        }
+        Ok(clauses.material()?)
+    }
+}
+
+impl Template {
+    /// What is read from its numbers at a time.
+    pub(crate) fn at<T>(
+        &self,
+        frame: f64,
+        surface: Option<&Material>,
+        reader: Reader<T>,
+    ) -> Result<T, Faults> {
+        let values = self.row.at(frame);
+        reader(&mut Numbers::new(&values, self.row.len(), surface))
+    }
+
+    pub(crate) fn object(&self, frame: f64, surface: Option<&Material>) -> Result<Object, Faults> {
+        let Act::Object(read) = self.command.act() else { unreachable!("`{}` is no object", self.command) };
+        self.at(frame, surface, read)
+    }
+
+    pub(crate) fn light(&self, frame: f64) -> Result<Light, Faults> {
+        let Act::Light(read) = self.command.act() else { unreachable!("`{}` is no light", self.command) };
+        self.at(frame, None, read)
+    }
+}
+
+impl<T: Clone> Value<T> {
+    /// `reader` finds in what the line's command does how it is read.
+    fn at(&self, frame: f64, reader: impl Fn(Act) -> Option<Reader<T>>) -> Result<T, Faults> {
+        match self {
+            Self::Still(value) => Ok(value.clone()),
+            Self::Moving(template) => match reader(template.command.act()) {
+                Some(read) => template.at(frame, None, read),
+                None => unreachable!("`{}` is no such thing", template.command),
+            },
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! What commands change, and the shots noted so far.
+
+use super::{Drawn, Extent, Group, NamedMaterial, Objects, Script, Sequence, Shot, Template, Value, View};
+use crate::model::{
+    Background, Camera, Depth, FrameNumbers, Lens, Light, Object, Samples, Screen, Shutter, Tone,
+};
+
+/// The state that commands change, and the shots noted so far.
+#[derive(Debug, Default)]
+pub(crate) struct Recorder {
+    materials: Vec<NamedMaterial>,
+    groups: Vec<Group>,
+    objects: List<Object, Drawn>,
+    surfaces: Surfaces,
+    lights: List<Light, Template>,
+    camera: Value<Camera>,
+    background: Value<Background>,
+    lens: Value<Lens>,
+    /// As they stand; screens are given with each `Trace`.
+    pub(crate) samples: Samples,
+    pub(crate) shutter: Shutter,
+    pub(crate) tone: Tone,
+    pub(crate) depth: Depth,
+    pub(crate) numbers: FrameNumbers,
+    views: Vec<View>,
+    shots: Vec<Shot>,
+}
+
+/// The objects of a group that is being defined.
+#[derive(Debug, Default)]
+pub(crate) struct GroupRecorder {
+    still: Vec<Object>,
+    others: Vec<(usize, Drawn)>,
+    surfaces: Surfaces,
+}
+
+/// Runs of still objects of one named material.
+#[derive(Debug, Default)]
+struct Surfaces(Vec<(usize, Option<usize>)>);
+
+impl Surfaces {
+    /// Object `i`, the last so far, has this material.
+    fn add(&mut self, i: usize, surface: Option<usize>) {
+        if self.0.last().and_then(|(_, last)| *last) != surface {
+            self.0.push((i, surface));
+        }
+    }
+
+    /// Forgets those from object `count` on.
+    fn truncate(&mut self, count: usize) {
+        self.0.truncate(self.0.partition_point(|(from, _)| *from < count));
+    }
+}
+
+impl GroupRecorder {
+    pub(crate) fn add_object(&mut self, object: Object, surface: Option<usize>) {
+        self.surfaces.add(self.still.len(), surface);
+        self.still.push(object);
+    }
+
+    pub(crate) fn add_drawn(&mut self, drawn: Drawn) {
+        self.others.push((self.still.len(), drawn));
+    }
+
+    /// `drawn` is how many objects drawing it draws at most.
+    pub(crate) fn finish(self, name: &str, drawn: usize) -> Group {
+        let list = Sequence { still: self.still.into(), others: self.others };
+        Group { name: name.into(), objects: Objects { list, surfaces: self.surfaces.0 }, drawn }
+    }
+}
+
+impl Recorder {
+    /// The next one; they are numbered from 0.
+    pub(crate) fn add_material(&mut self, material: NamedMaterial) {
+        self.materials.push(material);
+    }
+
+    /// The next one; they are numbered from 0.
+    pub(crate) fn add_group(&mut self, group: Group) {
+        self.groups.push(group);
+    }
+
+    /// `surface` is the number of its material, if that was named.
+    pub(crate) fn add_object(&mut self, object: Object, surface: Option<usize>) {
+        self.surfaces.add(self.objects.still.len(), surface);
+        self.objects.still.push(object);
+    }
+
+    pub(crate) fn add_drawn(&mut self, drawn: Drawn) {
+        self.objects.others.push((self.objects.still.len(), drawn));
+    }
+
+    pub(crate) fn add_light(&mut self, light: Value<Light>) {
+        match light {
+            Value::Still(light) => self.lights.still.push(light),
+            Value::Moving(template) => self.lights.others.push((self.lights.still.len(), template)),
+        }
+    }
+
+    pub(crate) fn set_camera(&mut self, camera: Value<Camera>) {
+        set(&mut self.camera, camera);
+    }
+
+    pub(crate) fn set_background(&mut self, background: Value<Background>) {
+        set(&mut self.background, background);
+    }
+
+    pub(crate) fn set_lens(&mut self, lens: Value<Lens>) {
+        set(&mut self.lens, lens);
+    }
+
+    /// Everything but what a `Trace` is.
+    pub(crate) fn forget(&mut self) {
+        *self = Self { shutter: self.shutter, numbers: self.numbers, ..Self::default() };
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.objects.clear();
+        self.surfaces.truncate(self.objects.still.len());
+        self.lights.clear();
+        self.background = Value::default();
+    }
+
+    /// `drawn` is how many objects a frame has at most.
+    pub(crate) fn trace(&mut self, screen: Screen, drawn: usize) {
+        let view = View {
+            screen,
+            camera: self.camera.clone(),
+            background: self.background.clone(),
+            lens: self.lens.clone(),
+            samples: self.samples,
+            shutter: self.shutter,
+            tone: self.tone,
+            depth: self.depth,
+        };
+        if self.views.last() != Some(&view) {
+            self.views.push(view);
+        }
+        let before = self.shots.last().map_or(0, |shot| shot.before.saturating_add(shot.frame_count()));
+        self.shots.push(Shot {
+            view: self.views.len() - 1,
+            objects: self.objects.note(),
+            lights: self.lights.note(),
+            numbers: self.numbers,
+            before,
+            drawn,
+        });
+    }
+
+    /// The script; `None` when there are no frames.
+    pub(crate) fn finish(mut self) -> Option<Script> {
+        self.clear();
+        let Self { materials, groups, objects, surfaces, lights, views, shots, .. } = self;
+        let objects = Objects { list: objects.finish(), surfaces: surfaces.0 };
+        let mut script = Script { materials, groups, objects, lights: lights.finish(), views, shots };
+        script.forget_unused();
+        (!script.shots.is_empty()).then_some(script)
+    }
+}
+
+/// Equal ones stay shared, so that views are quickly compared.
+fn set<T: PartialEq>(old: &mut T, new: T) {
+    if *old != new {
+        *old = new;
+    }
+}
+
+/// The items of all frames in the order of the script; those since the last `Clear` are the current ones.
+#[derive(Debug)]
+struct List<T, M> {
+    still: Vec<T>,
+    others: Vec<(usize, M)>,
+    /// Where the current ones start.
+    start: (usize, usize),
+    /// How far the frames noted so far see.
+    seen: (usize, usize),
+}
+
+impl<T, M> List<T, M> {
+    fn note(&mut self) -> Extent {
+        self.seen = (self.still.len(), self.others.len());
+        Extent { still: self.start.0..self.seen.0, others: self.start.1..self.seen.1 }
+    }
+
+    fn clear(&mut self) {
+        self.still.truncate(self.seen.0);
+        self.others.truncate(self.seen.1);
+        self.start = self.seen;
+    }
+
+    fn finish(self) -> Sequence<T, M> {
+        Sequence { still: self.still.into(), others: self.others }
+    }
+}
+
+impl<T, M> Default for List<T, M> {
+    fn default() -> Self {
+        Self { still: Vec::new(), others: Vec::new(), start: (0, 0), seen: (0, 0) }
+    }
+}

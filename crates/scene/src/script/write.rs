@@ -1,0 +1,199 @@
+//! Scenes and scripts back to text.
+//!
+//! What is written reads back as the same script, every number bit for bit. It is not the text that was read:
+//! comments, spelling, and what no frame sees are gone.
+//!
+//! ```
+//! let text = "Screen 4 3\nSphere 1 0 0 -5 .1 .1 .1 1 1 1\nTrace\nTrace";
+//! let script = rayfold_scene::parse("a.txt", text.as_bytes(), &Default::default()).script.unwrap();
+//! let again = rayfold_scene::parse("b.txt", script.to_string().as_bytes(), &Default::default()).script;
+//! assert_eq!(again, Some(script));
+//! ```
+
+use std::fmt::{self, Display, Formatter};
+
+use super::{Drawn, Extent, NamedMaterial, Objects, Script, Shot, Template, Value, View};
+use crate::command::Command;
+use crate::form::write_line;
+use crate::model::{Background, Camera, FrameNumbers, Lens, Scene, Screen};
+
+/// As a script: materials and groups, then each shot as what changed since the one before, and a `Trace`.
+impl Display for Script {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        self.materials.iter().try_for_each(|material| self.write_material(f, material))?;
+        for group in &self.groups {
+            writeln!(f, "{} {}", Command::Group, group.name)?;
+            self.write_objects(f, &group.objects, &group.objects.list.whole())?;
+            write_name(f, Command::End)?;
+        }
+        let first = View::new(self.views[0].screen);
+        let (mut last, mut seen): (&View, Option<&Shot>) = (&first, None);
+        for shot in &self.shots {
+            let view = &self.views[shot.view];
+            let (mut objects, mut lights) = (shot.objects.clone(), shot.lights.clone());
+            let mut background = &Value::Still(Background::default());
+            if let Some(seen) = seen {
+                if seen.objects.starts_with(&objects) && seen.lights.starts_with(&lights) {
+                    background = &last.background;
+                    objects = objects.behind(&seen.objects);
+                    lights = lights.behind(&seen.lights);
+                } else {
+                    write_name(f, Command::Clear)?;
+                }
+            }
+            if seen.is_none() || last.screen != view.screen {
+                write_line(f, &view.screen, None)?;
+            }
+            view.write_changes(f, last)?;
+            if seen.map_or(FrameNumbers::default(), |seen| seen.numbers) != shot.numbers {
+                write_line(f, &shot.numbers, None)?;
+            }
+            if *background != view.background {
+                match &view.background {
+                    Value::Still(background) => write_line(f, background, None)?,
+                    Value::Moving(template) => template.write(f, None)?,
+                }
+            }
+            self.write_lights(f, &lights)?;
+            self.write_objects(f, &self.objects, &objects)?;
+            write_name(f, Command::Trace)?;
+            (last, seen) = (view, Some(shot));
+        }
+        Ok(())
+    }
+}
+
+/// As a script of one frame. Materials and groups get names; what a group is turned by is written as angles, which
+/// read back as the same turn but for rounding.
+impl Display for Scene {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        Script::from(self).fmt(f)
+    }
+}
+
+impl Script {
+    fn write_material(&self, f: &mut Formatter<'_>, material: &NamedMaterial) -> fmt::Result {
+        write!(f, "{} {}", Command::Material, material.name)?;
+        for line in &material.clauses {
+            write!(f, " {}", line.clause.name())?;
+            line.row.write(f)?;
+            if let Some(other) = line.other {
+                write!(f, " {}", self.materials[other].name)?;
+            }
+        }
+        writeln!(f)
+    }
+
+    fn write_lights(&self, f: &mut Formatter<'_>, extent: &Extent) -> fmt::Result {
+        let mut next = extent.still.start;
+        for (before, template) in &self.lights.others[extent.others.clone()] {
+            self.lights.still[next..*before].iter().try_for_each(|light| light.write(f))?;
+            next = *before;
+            template.write(f, None)?;
+        }
+        self.lights.still[next..extent.still.end].iter().try_for_each(|light| light.write(f))
+    }
+
+    fn write_objects(&self, f: &mut Formatter<'_>, objects: &Objects, extent: &Extent) -> fmt::Result {
+        let name = |surface: Option<usize>| surface.map(|material| &*self.materials[material].name);
+        let first = objects.surfaces.partition_point(|(from, _)| *from <= extent.still.start);
+        let mut runs = objects.surfaces[first.saturating_sub(1)..].iter().peekable();
+        let mut surface = None;
+        let mut next = extent.still.start;
+        let mut write_still = |f: &mut Formatter<'_>, until: usize| {
+            for i in next..until {
+                while let Some((_, run)) = runs.next_if(|(from, _)| *from <= i) {
+                    surface = *run;
+                }
+                objects.list.still[i].write(f, name(surface))?;
+            }
+            next = until;
+            Ok(())
+        };
+        for (before, drawn) in &objects.list.others[extent.others.clone()] {
+            write_still(f, *before)?;
+            match drawn {
+                Drawn::Object { template, surface } => template.write(f, name(*surface))?,
+                Drawn::Use { group, row } => {
+                    write!(f, "{} {}", Command::Use, self.groups[*group].name)?;
+                    row.write(f)?;
+                    writeln!(f)?;
+                }
+            }
+        }
+        write_still(f, extent.still.end)
+    }
+}
+
+impl View {
+    /// As it is before any command.
+    fn new(screen: Screen) -> Self {
+        Self {
+            screen,
+            camera: Value::default(),
+            background: Value::default(),
+            lens: Value::default(),
+            samples: Default::default(),
+            shutter: Default::default(),
+            tone: Default::default(),
+            depth: Default::default(),
+        }
+    }
+
+    /// What a `Clear` leaves, but for the screen.
+    fn write_changes(&self, f: &mut Formatter<'_>, last: &Self) -> fmt::Result {
+        if self.camera != last.camera {
+            match &self.camera {
+                Value::Still(camera) => Camera::write(camera, f)?,
+                Value::Moving(template) => template.write(f, None)?,
+            }
+        }
+        if self.lens != last.lens {
+            match &self.lens {
+                Value::Still(lens) => write_line::<Lens>(f, lens, None)?,
+                Value::Moving(template) => template.write(f, None)?,
+            }
+        }
+        if self.samples != last.samples {
+            write_line(f, &self.samples, None)?;
+        }
+        if self.shutter != last.shutter {
+            write_line(f, &self.shutter, None)?;
+        }
+        if self.tone != last.tone {
+            write_line(f, &self.tone, None)?;
+        }
+        if self.depth != last.depth {
+            write_line(f, &self.depth, None)?;
+        }
+        Ok(())
+    }
+}
+
+impl Extent {
+    /// Whether `other` starts where this one does.
+    fn starts_with(&self, other: &Self) -> bool {
+        (self.still.start, self.others.start) == (other.still.start, other.others.start)
+    }
+
+    /// What lies behind `seen`, which starts where this does.
+    fn behind(&self, seen: &Self) -> Self {
+        Self { still: seen.still.end..self.still.end, others: seen.others.end..self.others.end }
+    }
+}
+
+impl Template {
+    fn write(&self, f: &mut Formatter<'_>, surface: Option<&str>) -> fmt::Result {
+        write!(f, "{}", self.command)?;
+        self.row.write(f)?;
+        if let Some(name) = surface {
+            write!(f, " {name}")?;
+        }
+        writeln!(f)
+    }
+}
+
+/// A line of a command without parameters.
+fn write_name(f: &mut Formatter<'_>, command: Command) -> fmt::Result {
+    writeln!(f, "{command}")
+}
