@@ -20,6 +20,8 @@ pub(super) struct Needs {
     pub(super) shadows: bool,
     /// More objects than masks have bits.
     pub(super) tree: bool,
+    /// More than objects of these kinds, suns, and a background of one colour.
+    pub(super) beyond: bool,
 }
 
 /// What this build has.
@@ -28,6 +30,7 @@ pub(super) const BUILT: Needs = Needs {
     mirrors: cfg!(feature = "mirrors"),
     shadows: cfg!(feature = "shadows"),
     tree: cfg!(feature = "tree"),
+    beyond: cfg!(feature = "beyond"),
 };
 
 impl Needs {
@@ -44,6 +47,7 @@ impl Needs {
             (self.mirrors && !BUILT.mirrors, "mirrors"),
             (self.shadows && !BUILT.shadows, "shadows"),
             (self.tree && !BUILT.tree, "tree"),
+            (self.beyond && !BUILT.beyond, "beyond"),
         ];
         let missing = missing.or(lacks.into_iter().find(|(lacks, _)| *lacks).map(|(_, feature)| feature));
         missing.map_or(Ok(()), |feature| Err(RenderError::LeftOut { feature }))

@@ -66,7 +66,9 @@ impl Finishes {
                 let material = self.scene.objects[order].material();
                 let is_painted = material.finish().is_some_and(|finish| finish.pattern.is_some());
                 let seen = if is_painted {
-                    self.coefficients_at(order, read(&hits.start), read(&hits.normal))
+                    let origin = if EYE { DVec3::ZERO } else { read(&queue.origin) };
+                    let ray = (origin, read(&queue.direction));
+                    self.coefficients_at(order, ray, (read(&hits.start), read(&hits.normal)))
                 } else {
                     material.coefficients()
                 };
@@ -84,8 +86,16 @@ impl Finishes {
         }
     }
 
-    fn coefficients_at(&self, order: usize, start: DVec3, normal: DVec3) -> Coefficients {
-        let world = start / self.scale + self.center;
+    /// Along an axis to which the ray is square a hit lies where the ray starts, so that walls between cells are met where
+    /// they are.
+    fn coefficients_at(
+        &self,
+        order: usize,
+        (origin, direction): (DVec3, DVec3),
+        (start, normal): (DVec3, DVec3),
+    ) -> Coefficients {
+        let place = DVec3::select(direction.cmpeq(DVec3::ZERO), origin, start);
+        let world = place / self.scale + self.center;
         let (object, place, normal) = match &self.scene.objects[order] {
             Object::Instance(instance) => {
                 let placement = instance.placement();

@@ -10,7 +10,7 @@ use rayfold_scene::{Material, Object, Scene};
 
 use super::beyond::Beyond;
 use super::candidates::{Candidates, MASKED, Masks};
-use super::features::Needs;
+use super::features::{BUILT, Needs};
 use super::geometry::{Geometry, View};
 use super::kind::{ByKind, Kind, Row};
 use super::lights::buffer::LightBuffer;
@@ -118,7 +118,9 @@ impl<E: Real> Prepared<E> {
             needs.mirrors |= entry.mirrors;
             of_kind.push(place as u32);
         }
+        let sky = Sky::new(scene.background);
         let beyond = Beyond::new(scene, geometry);
+        needs.beyond = beyond.is_some() || sky.is_some();
         for (order, at) in beyond.iter().flat_map(|beyond| beyond.bodies.places()) {
             let entry = &mut entries[order];
             entry.is_body = true;
@@ -151,7 +153,7 @@ impl<E: Real> Prepared<E> {
             row,
             needs,
             background: narrow(scene.background.colors().0),
-            sky: Sky::new(scene.background),
+            sky,
             tree: branches.map(|branches| {
                 Tree::new(branches, solids, |place| entries[solids[place].order as usize].index)
             }),
@@ -164,7 +166,7 @@ impl<E: Real> Prepared<E> {
     /// Whether there is nothing to be seen but what masks, lists and trees hold, on a background of one colour.
     #[inline(always)]
     pub(super) fn is_plain(&self) -> bool {
-        self.sky.is_none() && self.beyond.is_none()
+        !self.needs.beyond || !BUILT.beyond
     }
 
     /// All objects: by masks, or by all that is in the tree.
