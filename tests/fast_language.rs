@@ -10,8 +10,9 @@ use glam::{DMat3, DVec3};
 use image::RgbImage;
 use rayfold_scene::model::{Finish, Pattern, Shine, Weight};
 use rayfold_scene::{
-    Background, Camera, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Instance, Lamp, Light, Look,
-    Material, Object, Placement, Plane, Scene, Screen, SharedSlice, Sphere, Tone, Torus, Triangle,
+    Background, Camera, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Instance, Lamp, Light, Limits,
+    Look, Material, Object, Placement, Plane, Scene, Screen, SharedSlice, Sphere, Tone, Torus, Triangle,
+    parse,
 };
 use rayfold_tracer::{Level, Precision, RenderOptions, reference, render};
 
@@ -338,4 +339,170 @@ fn highlights_and_patterns_are_the_references() {
         }));
     }
     hold(&scenes);
+}
+
+fn scripted(view: &str, objects: &str) -> Scene {
+    let text = format!("{view}\n{objects}\nTrace\n");
+    let parsed = parse("scene.txt", text.as_bytes(), &Limits::default());
+    let script = parsed.script.unwrap_or_else(|| panic!("{text}\n{:?}", parsed.diagnostics));
+    script.frame(0).unwrap()
+}
+
+const FROM_THE_FRONT: &str = "Screen 41 41\nLook 0 0 9  0 0 0  50\nBackground 0.1 0.2 0.3  0.5 0.7 0.9\n\
+                              Ilight 0.6 0.6 0.6  -1 -2 -3";
+const PARALLEL: &str =
+    "Screen 41 41\nOrthocamera\nIlight 0.6 0.6 0.6  -1 -2 -3\nPlight 0.3 0.2 0.1  20 30 -10";
+
+/// Places at which a formula that is nearly right is wrong.
+const EDGES: [(&str, &str, &str); 15] = [
+    (
+        "eye in a cylinder",
+        FROM_THE_FRONT,
+        "Cylinder 3  0 -2 8.5  0 2 8.5  0.2 0.1 0.1  0.5 0.5 0.5\nPlight 1 1 1  1 1 8",
+    ),
+    (
+        "eye in a cone",
+        FROM_THE_FRONT,
+        "Cone 3 0.5  0 -2 8.5  0 2 8.5  0.2 0.1 0.1  0.5 0.5 0.5\nPlight 1 1 1  0 1 8",
+    ),
+    (
+        "eye in the tube of a torus",
+        FROM_THE_FRONT,
+        "Torus 9 1  0 0 0  0 1 0  0.2 0.1 0.1  0.5 0.5 0.5\nPlight 1 1 1  9 0 0",
+    ),
+    (
+        "eye in the middle of a torus",
+        FROM_THE_FRONT,
+        "Torus 3 1  0 0 9  0 1 0.3  0.2 0.1 0.1  0.5 0.5 0.5  0.2 0.2 0.2",
+    ),
+    (
+        "eye on a plane",
+        FROM_THE_FRONT,
+        "Plane 0 0 9  0 0 1  1 0 0  0 0 0\nSphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7",
+    ),
+    (
+        "the horizon",
+        FROM_THE_FRONT,
+        "Plane 0 -1 0  0 1 0  0.1 0.1 0.1  0.7 0.7 0.7  0.3 0.3 0.3\nSphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7",
+    ),
+    (
+        "a lamp on the floor",
+        FROM_THE_FRONT,
+        "Plane 0 -1 0  0 1 0  0.1 0.1 0.1  0.7 0.7 0.7\nSphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7\nPlight 1 1 1  2 -1 2  0 3",
+    ),
+    (
+        "a lamp on a ball",
+        FROM_THE_FRONT,
+        "Sphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7\nPlight 1 1 1  0 0 1\nTorus 3 0.5  0 0 0  1 1 1  0.1 0.1 0.1  0.7 0.7 0.7",
+    ),
+    (
+        "a lamp in a ball",
+        FROM_THE_FRONT,
+        "Sphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7\nPlight 1 1 1  0 0 0\nBox -3 -3 -3  3 3 -2  0.1 0.1 0.1  0.7 0.7 0.7",
+    ),
+    ("rays along a cylinder", PARALLEL, "Cylinder 10  20 20 -30  20 20 -60  0.1 0.2 0.3  0.7 0.7 0.7"),
+    ("rays along a cone", PARALLEL, "Cone 10 0  20 20 -60  20 20 -30  0.1 0.2 0.3  0.7 0.7 0.7"),
+    (
+        "rays along and square to tori",
+        PARALLEL,
+        "Torus 10 5  20 20 -30  0 0 1  0.1 0.2 0.3  0.7 0.7 0.7\nTorus 12 3  20 20 -30  0 1 0  0.3 0.2 0.1  0.7 0.7 0.7",
+    ),
+    (
+        "discs edge on",
+        PARALLEL,
+        "Disc 10  20 20 -30  0 1 0  1 0 0  0 0 0\nDisc 10  20 20 -30  1 0 0  1 0 0  0 0 0\nDisc 10  20 20 -40  0 0 1  0 1 0  0 0 0",
+    ),
+    (
+        "lying cylinders touch rays",
+        PARALLEL,
+        "Cylinder 10  5 20 -30  35 20 -30  0.1 0.2 0.3  0.7 0.7 0.7\nCylinder 5  20 5 -60  20 35 -60  0.1 0.2 0.3  0.7 0.7 0.7",
+    ),
+    (
+        "mirrors that face each other",
+        FROM_THE_FRONT,
+        "Plane 0 -1.5 0  0 1 0  0.1 0.1 0.1  0 0 0  0.9 0.9 0.9\nPlane 0 1.5 0  0 1 0  0.1 0.1 0.2  0 0 0  0.9 0.9 0.9\nTorus 1 0.3  0 0 0  0 1 1  0.5 0.2 0.1  0.7 0.7 0.7  0.3 0.3 0.3",
+    ),
+];
+
+#[test]
+fn edges_of_bodies_and_lamps_are_where_the_reference_has_them() {
+    for (name, view, objects) in EDGES {
+        let scene = scripted(view, objects);
+        let expected = reference::render(&scene, &RenderOptions::default()).unwrap();
+        let drawn = draw(&scene, RenderOptions::default());
+        for (x, y, pixel) in drawn.enumerate_pixels() {
+            let wanted = expected.get_pixel(x, y);
+            if (0..3).any(|c| pixel[c].abs_diff(wanted[c]) > 1) {
+                println!("{name}: {pixel:?} and not {wanted:?} at {x}, {y}");
+            }
+        }
+        assert!(off(&expected, &drawn) <= 1, "{name}: {} pixels", off(&expected, &drawn));
+    }
+}
+
+#[test]
+fn a_power_of_two_changes_no_byte() {
+    let mut dice = Dice::new("powers");
+    for count in [1, 5, 20] {
+        let objects: Vec<Object> = (0..count).map(|_| dice.body(8)).collect();
+        let scene = dice.scene(objects);
+        let Camera::Look(look) = scene.camera else { continue };
+        let expected = draw(&scene, RenderOptions::default());
+        for exponent in [-300, -9, 7, 300] {
+            let scale = 2f64.powi(exponent);
+            let mut scaled = scene.clone();
+            scaled.objects = scene.objects.iter().map(|o| o.placed(scale, |p| scale * p).unwrap()).collect();
+            let (eye, target) = (scale * look.eye(), scale * look.target());
+            scaled.camera =
+                Camera::Look(Look::new(eye, target, look.field_of_view(), Some(look.up())).unwrap());
+            assert!(expected == draw(&scaled, RenderOptions::default()), "2^{exponent}");
+        }
+    }
+}
+
+#[test]
+fn a_group_is_its_copy_written_out() {
+    let body = "Cylinder 0.5  0 0 0  0 1 0  0.1 0.2 0.3  0.7 0.7 0.7\nTorus 1 0.25  0 0 0  0 1 0  0.3 0.2 0.3  0.7 0.7 0.7\n\
+                Box 1 0 0  1.5 0.5 2  0.1 0.4 0.3  0.7 0.7 0.7\nCone 0.5 0  -1 0 0  -1 1 0  0.1 0.2 0.6  0.7 0.7 0.7\n\
+                Disc 0.5  0 2 0  0 1 0  0.5 0.2 0.3  0.7 0.7 0.7\nSphere 0.5  1 2 0  0.1 0.2 0.3  0.7 0.7 0.7  0.5 0.5 0.5\n";
+    // (x, y, z) to (1 - 2z, -2 + 2y, 0.5 + 2x): a quarter turn about y, twice the size.
+    let written = "Cylinder 1  1 -2 0.5  1 0 0.5  0.1 0.2 0.3  0.7 0.7 0.7\nTorus 2 0.5  1 -2 0.5  0 1 0  0.3 0.2 0.3  0.7 0.7 0.7\n\
+                   Box 1 -2 2.5  -3 -1 3.5  0.1 0.4 0.3  0.7 0.7 0.7\nCone 1 0  1 -2 -1.5  1 0 -1.5  0.1 0.2 0.6  0.7 0.7 0.7\n\
+                   Disc 1  1 2 0.5  0 1 0  0.5 0.2 0.3  0.7 0.7 0.7\nSphere 1  1 2 2.5  0.1 0.2 0.3  0.7 0.7 0.7  0.5 0.5 0.5\n";
+    let grouped = scripted(FROM_THE_FRONT, &format!("Group g\n{body}End\nUse g  1 -2 0.5  0 -90 0  2"));
+    let written = scripted(FROM_THE_FRONT, written);
+    assert!(draw(&grouped, RenderOptions::default()) == draw(&written, RenderOptions::default()));
+}
+
+#[test]
+fn of_faces_in_one_plane_the_first_is_seen() {
+    // Each covers the middle of the picture at z = 0.3, up to x and y of 0.5 at least.
+    let flat = [
+        "Plane 5 5 0.3  0 0 -7",
+        "Disc 2  0 0 0.3  0 0 1",
+        "Box -2 -2 -2  2 2 0.3",
+        "Box -2 -2 0.3  2 2 0.3",
+        "Cylinder 2  0 0 -1  0 0 0.3",
+        "Cylinder 2  0.1 0 0.3  0.1 0 -5",
+        "Cone 1 2  0 0 -1.1  0 0 0.3",
+        "Cone 2 0  0 0 0.3  0 0 -7",
+        "Triangle -3 -3 0.3  3 -3 0.3  0 3 0.3",
+    ];
+    let grouped = |object: &str| format!("Group g\n{}\nEnd\nUse g  0 0 0  0 0 90", object);
+    let view = "Screen 33 33\nLook 0 0 9  0 0 0.3  6";
+    for one in flat {
+        for other in flat {
+            if one == other {
+                continue;
+            }
+            let (red, green) = (format!("{one}  1 0 0  0 0 0"), format!("{other}  0 1 0  0 0 0"));
+            for objects in [format!("{red}\n{green}"), format!("{red}\n{}", grouped(&green))] {
+                for precision in [Precision::Auto, Precision::F64] {
+                    let scene = scripted(view, &objects);
+                    let drawn = draw(&scene, RenderOptions { precision, ..Default::default() });
+                    assert!(drawn.pixels().all(|pixel| pixel.0 == [255, 0, 0]), "{objects}");
+                }
+            }
+        }
+    }
 }

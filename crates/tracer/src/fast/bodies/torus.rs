@@ -98,29 +98,39 @@ impl<E: Real> Torus<E> {
             cubic_root::<S, E>(simd, cubic, (turn, most), error),
             end,
         ];
-        let (mut from, mut to, mut found) = (begin, begin, none);
-        let starts = chord.outside(begin).simd_lt(zero);
+        // What begins before the torus does is outside; what begins on it goes one way up to the first turn.
+        let is_ahead = begin.simd_gt(zero - middle);
+        let mut side = is_ahead.select(constant::<S, E>(simd, 1.0), chord.outside(begin));
+        let (mut from, mut to, mut at_end, mut found) = (begin, begin, zero, none);
         for turn in turns {
             let here = turn.max(from).min(end);
-            let crossed = open & (starts ^ chord.outside(here).simd_lt(zero));
+            let outside = chord.outside(here);
+            let enters = side.simd_gt(zero) & outside.simd_le(zero);
+            let leaves = side.simd_lt(zero) & outside.simd_ge(zero);
+            let crossed = open & (enters | leaves);
             to = crossed.select(here, to);
+            at_end = crossed.select(outside, at_end);
             found |= crossed;
             open &= !crossed;
-            from = open.select(here, from);
+            let goes_on = open & here.simd_gt(from);
+            from = goes_on.select(here, from);
+            side = goes_on.select(outside, side);
         }
         if !found.any_true() {
             return (none, zero);
         }
-        let sign = starts.select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0));
+        // Where it only touches, the turn is known better than the root.
+        let touches = at_end.simd_eq(zero);
+        let sign = side.simd_lt(zero).select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0));
         let root = bracketed::<S, E>(
             simd,
             from,
             to,
-            (found, error),
+            (found & !touches, error),
             #[inline(always)]
             |t| chord.outside(t) * sign,
         );
-        let distance = root + middle;
+        let distance = touches.select(to, root) + middle;
         (found & distance.simd_gt(zero), distance)
     }
 
@@ -135,7 +145,10 @@ impl<E: Real> Torus<E> {
         let circle = Vec3::<S, E>::new(place.x * part, place.y * part, zero);
         let outward = place.sub(circle).normalize(simd);
         let start = Chord { place: ray.origin, direction: ray.direction, ring, square: tube * tube };
-        let side = start.outside(zero).simd_lt(zero).select(zero - one, one);
+        let outside = start.outside(zero);
+        // From the surface itself what goes inwards is within.
+        let inwards = outside.simd_eq(zero) & outward.dot(ray.direction).simd_gt(zero);
+        let side = (outside.simd_lt(zero) | inwards).select(zero - one, one);
         Met { point: outward.scale_add(tube, circle), normal: outward.scale(side) }
     }
 }
