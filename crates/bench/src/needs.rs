@@ -10,7 +10,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail, ensure};
 use glam::DVec3;
-use rayfold_scene::{Object, Scene};
+use rayfold_scene::{Light, Object, Scene};
 use rayon::prelude::*;
 
 use crate::scenes::{cloud, example, rock, table};
@@ -33,7 +33,7 @@ const MOST: f64 = 0.5;
 const LEFT_OUT: i32 = 3;
 
 /// The tracer's cargo features.
-const PARTS: [Part; 5] = [
+const PARTS: [Part; 6] = [
     Part { feature: "boxes", is_used: |scene| scene.objects.iter().any(|o| matches!(o, Object::Cuboid(_))) },
     Part {
         feature: "triangles",
@@ -42,6 +42,7 @@ const PARTS: [Part; 5] = [
     Part { feature: "mirrors", is_used: |scene| scene.objects.iter().any(is_mirror) },
     Part { feature: "shadows", is_used: |scene| !scene.lights.is_empty() && !is_one_ball(scene) },
     Part { feature: "tree", is_used: |scene| scene.objects.len() > 64 },
+    Part { feature: "beyond", is_used: has_more_than_version_1 },
 ];
 
 struct Part {
@@ -55,6 +56,15 @@ fn is_ball(object: &Object) -> bool {
 
 fn is_mirror(object: &Object) -> bool {
     object.material().mirror() != DVec3::ZERO
+}
+
+/// Skies, lamps, finishes, and shapes with axes of their own.
+fn has_more_than_version_1(scene: &Scene) -> bool {
+    let is_old =
+        |object: &Object| matches!(object, Object::Sphere(_) | Object::Cuboid(_) | Object::Triangle(_));
+    scene.background.color().is_none()
+        || scene.lights.iter().any(|light| matches!(light, Light::Lamp(_)))
+        || scene.objects.iter().any(|object| !is_old(object) || object.material().finish().is_some())
 }
 
 /// Nothing is in the light of a ball alone.
@@ -335,7 +345,7 @@ mod tests {
     fn a_report_tells_that_all_hold() {
         let report = report(&rows(100_500)).expect("rows of each part");
         assert!(
-            report.contains("All 5 pairs hold; the most is balls without mirrors (+0.50 %)."),
+            report.contains("All 6 pairs hold; the most is balls without mirrors (+0.50 %)."),
             "{report}"
         );
         assert!(!report.contains("failed"), "{report}");
@@ -344,7 +354,7 @@ mod tests {
     #[test]
     fn a_report_tells_which_pairs_failed() {
         let report = report(&rows(100_600)).expect("rows of each part");
-        let told = "**This run failed** for 1 of 5 pairs: balls without mirrors (+0.60 %).";
+        let told = "**This run failed** for 1 of 6 pairs: balls without mirrors (+0.60 %).";
         assert!(report.contains(told), "{report}");
         assert!(!report.contains("hold"), "{report}");
     }

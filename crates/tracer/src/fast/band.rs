@@ -2,9 +2,11 @@
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
+use rayfold_scene::Tone;
 
 use super::bounce::{Columns, packet_shape};
 use super::real::{Lanes, Real, Vec3, constant};
+use super::tone::encoded;
 use crate::parallel::CHANNELS;
 
 /// A rectangle of the image, counted from its upper left corner.
@@ -29,6 +31,8 @@ pub(super) struct Band<'a> {
     pub(super) size: (u32, u32),
     /// Level of each channel of a pixel that shows nothing.
     pub(super) background: [u8; CHANNELS],
+    /// From colours to levels.
+    pub(super) tone: Tone,
 }
 
 impl Band<'_> {
@@ -37,6 +41,13 @@ impl Band<'_> {
     pub(super) fn background<E: Real>(&self) -> [E; 3] {
         self.background.map(|level| E::narrow(f64::from(level) / 255.0))
     }
+}
+
+/// How many rays the packets of a tile have, those beyond its edges included.
+#[inline(always)]
+pub(super) fn rays_of<S: Simd, E: Real>(tile: Tile) -> usize {
+    let (width, height) = packet_shape::<S, E>();
+    (tile.width as usize).next_multiple_of(width) * (tile.height as usize).next_multiple_of(height)
 }
 
 /// Nothing but background.
@@ -84,6 +95,24 @@ pub(super) fn write_pixels<S: Simd, E: Real>(simd: S, tile: Tile, colors: &Colum
             }
         },
     );
+}
+
+/// Colours to the bytes of the image, encoded by the sRGB curve.
+#[inline(never)]
+pub(super) fn write_encoded<S: Simd, E: Real>(tile: Tile, colors: &Columns<E>, band: &mut Band) {
+    let (width, height) = packet_shape::<S, E>();
+    let stride = band.size.0 as usize * CHANNELS;
+    let packets_in_row = (tile.width as usize).div_ceil(width);
+    for row in 0..tile.height as usize {
+        for column in 0..tile.width as usize {
+            let packet = row / height * packets_in_row + column / width;
+            let at = packet * (width * height) + row % height * width + column % width;
+            let from = row * stride + (tile.left as usize + column) * CHANNELS;
+            for (byte, channel) in band.bytes[from..from + CHANNELS].iter_mut().zip(colors) {
+                *byte = encoded(channel.0[at].widen());
+            }
+        }
+    }
 }
 
 /// The three bytes of each pixel, two pixels at a time.

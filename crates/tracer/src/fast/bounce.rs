@@ -70,6 +70,8 @@ pub(super) struct Hits<E> {
     /// Diffuse coefficient times the ray's weight.
     pub(super) diffuse: Columns<E>,
     pub(super) color: Columns<E>,
+    /// Mirror coefficient times the ray's weight, in scenes that have patterns.
+    pub(super) mirror: Columns<E>,
     /// For each packet with hits: where it begins, and the spheres that can be in its light, as bits.
     pub(super) packets: Vec<(usize, u64)>,
     /// For each packet with mirrors: where it begins, and the lanes that meet them, as bits.
@@ -85,6 +87,7 @@ impl<E: Real> Hits<E> {
             normal: columns(),
             diffuse: columns(),
             color: columns(),
+            mirror: columns(),
             packets: Vec::with_capacity(PIXELS),
             mirrors: Vec::new(),
         }

@@ -20,6 +20,8 @@ pub(super) struct Needs {
     pub(super) shadows: bool,
     /// More objects than masks have bits.
     pub(super) tree: bool,
+    /// More than objects of these kinds, suns, and a background of one colour.
+    pub(super) beyond: bool,
 }
 
 /// What this build has.
@@ -28,6 +30,7 @@ pub(super) const BUILT: Needs = Needs {
     mirrors: cfg!(feature = "mirrors"),
     shadows: cfg!(feature = "shadows"),
     tree: cfg!(feature = "tree"),
+    beyond: cfg!(feature = "beyond"),
 };
 
 impl Needs {
@@ -44,6 +47,7 @@ impl Needs {
             (self.mirrors && !BUILT.mirrors, "mirrors"),
             (self.shadows && !BUILT.shadows, "shadows"),
             (self.tree && !BUILT.tree, "tree"),
+            (self.beyond && !BUILT.beyond, "beyond"),
         ];
         let missing = missing.or(lacks.into_iter().find(|(lacks, _)| *lacks).map(|(_, feature)| feature));
         missing.map_or(Ok(()), |feature| Err(RenderError::LeftOut { feature }))
@@ -69,6 +73,9 @@ pub(super) trait Features<E: Real>: 'static {
 
     /// Whether it looks on lists and down a tree, and not by masks.
     const TREE: bool;
+
+    /// Whether surfaces can be those of bodies.
+    const BODIES: bool = false;
 
     /// A kind that is one of [`Self::KINDS`], so that the compiler knows that it is.
     #[inline(always)]
@@ -99,6 +106,17 @@ impl<E: Real, By: Formulas<E>, const CUBOIDS: bool, const TRIANGLES: bool, const
 
 /// All kinds, any number.
 pub(super) type Everything<By> = Variant<By, true, true, true>;
+
+/// All kinds, any number, and bodies.
+pub(super) struct Anything<By>(PhantomData<By>);
+
+impl<E: Real, By: Formulas<E>> Features<E> for Anything<By> {
+    type By = By;
+
+    const KINDS: ByKind<bool> = BUILT.kinds;
+    const TREE: bool = BUILT.tree;
+    const BODIES: bool = true;
+}
 
 /// What pictures are drawn with.
 pub(super) trait Kernel<E: Real>: 'static {

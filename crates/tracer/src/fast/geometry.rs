@@ -8,9 +8,11 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use rayfold_scene::model::unit;
-use rayfold_scene::{Camera, Light, Scene, Screen};
+use rayfold_scene::{Camera, Lamp, Light, Object, Scene, Screen};
 
+use super::bodies;
 use super::bounds::{Bounds, join};
+use super::lights::lamp::Place;
 use super::lights::sun::Direction;
 use super::placed::Placed;
 use super::shapes::{Shape, Solid, reach};
@@ -38,7 +40,12 @@ pub(super) struct Geometry {
     pub(super) solids: Arc<Vec<Solid>>,
     /// How a tree groups the solids, if they are to be found down a tree.
     pub(super) branches: Option<Branches>,
+    /// What has axes of its own, in the order of the script.
+    pub(super) bodies: Vec<bodies::Solid>,
     pub(super) suns: Vec<Direction>,
+    pub(super) lamps: Vec<Place>,
+    /// Whether surfaces have more than coefficients.
+    pub(super) is_finished: bool,
     /// A length of the scene times this is a length in here.
     pub(super) scale: f64,
     /// Where the origin of these coordinates is in the scene: `(point - center) * scale` is a point in here.
@@ -58,6 +65,11 @@ impl Geometry {
         };
         let reaches = map(&scene.objects, |object| reach(object, center));
         let reach = reaches.into_iter().fold(0.0, f64::max);
+        let has_bodies = scene.objects.iter().any(is_body);
+        let of_bodies =
+            scene.objects.iter().filter(|_| has_bodies).map(|object| bodies::reach(object, center));
+        let of_lamps = lamps(scene).map(|lamp| (lamp.position() - center).abs().max_element());
+        let reach = of_bodies.chain(of_lamps).fold(reach, f64::max);
         let reach = match scene.camera {
             Camera::Pinhole(_) | Camera::Look(_) => reach,
             Camera::Orthographic => reach.max(center.max_element()),
@@ -72,13 +84,28 @@ impl Geometry {
         let solids = solids.filter_map(|(order, shape)| Some(Solid { shape: shape?, order: order as u32 }));
         let mut solids: Vec<Solid> = solids.collect();
         let branches = group(&mut solids, tree);
+        let is_finished = scene.objects.iter().any(|object| object.material().finish().is_some());
+        let orders = scene.objects.iter().filter(|_| has_bodies).zip(0..);
+        let bodies =
+            orders.filter_map(|(object, order)| bodies::body(object, order, center, scale)).collect();
+        let lamps = lamps(scene).map(|lamp| Place::new(lamp, center, scale)).collect();
         let suns = scene.lights.iter().filter_map(|light| match light {
             Light::Directional(light) => {
                 Some(Direction { towards: -unit(light.direction()), color: light.color() })
             }
             Light::Lamp(_) => None,
         });
-        Ok(Self { view, solids: solids.into(), branches, suns: suns.collect(), scale, center })
+        Ok(Self {
+            view,
+            solids: solids.into(),
+            branches,
+            bodies,
+            suns: suns.collect(),
+            lamps,
+            is_finished,
+            scale,
+            center,
+        })
     }
 }
 
@@ -90,6 +117,26 @@ impl Geometry {
             None => self.solids.iter().map(|solid| solid.shape.bounds()).reduce(join).unwrap_or_default(),
         }
     }
+}
+
+/// Whether an object may be a body.
+fn is_body(object: &Object) -> bool {
+    match object {
+        Object::Sphere(_) | Object::Triangle(_) | Object::Cuboid(_) => false,
+        Object::Plane(_)
+        | Object::Disc(_)
+        | Object::Cylinder(_)
+        | Object::Cone(_)
+        | Object::Torus(_)
+        | Object::Instance(_) => true,
+    }
+}
+
+fn lamps(scene: &Scene) -> impl Iterator<Item = &Lamp> {
+    scene.lights.iter().filter_map(|light| match light {
+        Light::Lamp(lamp) => Some(lamp),
+        Light::Directional(_) => None,
+    })
 }
 
 fn middle(screen: Screen) -> DVec3 {

@@ -3,14 +3,18 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
-use super::bounce::Hits;
+use super::beyond::Beyond;
+use super::bounce::{Hits, Queue};
 use super::candidates::{Candidates, Found, Masks, Picked};
 use super::features::{BUILT, Features};
+use super::finish::{Finishes, Lit};
 use super::kind::ByKind;
 use super::lights::buffer::{LightBuffer, Seen};
+use super::lights::lamp::Rays;
+use super::packet::Ray;
 use super::prepare::Prepared;
-use super::real::{Real, Vec3, constant};
-use super::search::unoccluded;
+use super::real::{Lanes, Real, Vec3, constant};
+use super::search::{nearest, unoccluded};
 
 /// What can stand in the way of each sun.
 #[derive(Default)]
@@ -26,6 +30,15 @@ struct Obstacles {
     /// In one with a tree, if it is not too long.
     list: Picked,
     is_listed: bool,
+}
+
+impl Obstacles {
+    /// Where to look for them, but for the spheres whose bits are not among the `others`.
+    #[inline(always)]
+    fn candidates(&self, others: u64, kinds: ByKind<bool>) -> Candidates<'_> {
+        let list = self.is_listed.then_some(&self.list);
+        Candidates { masks: self.masks.and_spheres(others), list, kinds }
+    }
 }
 
 impl InTheWay {
@@ -84,11 +97,7 @@ pub(super) fn light_up<S: Simd, E: Real, F: Features<E>, const SHADOWS: bool>(
                     }
                     if SHADOWS {
                         let obstacles = &obstacles.of[index];
-                        let candidates = Candidates {
-                            masks: obstacles.masks.and_spheres(others),
-                            list: obstacles.is_listed.then_some(&obstacles.list),
-                            kinds: F::KINDS,
-                        };
+                        let candidates = obstacles.candidates(others, F::KINDS);
                         let start = Vec3::load(simd, &hits.start, at);
                         lit = unoccluded::<S, E, F>(simd, scene, light, start, lit, candidates);
                     }
@@ -101,6 +110,87 @@ pub(super) fn light_up<S: Simd, E: Real, F: Features<E>, const SHADOWS: bool>(
                     diffuse.y.mul_add(sum.y, color.y),
                     diffuse.z.mul_add(sum.z, color.z),
                 );
+                lit.store(&mut hits.color, at);
+            }
+        },
+    );
+}
+
+/// Adds the light of suns and lamps that reaches the hits past objects and bodies.
+#[inline(never)]
+pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    beyond: &Beyond<E>,
+    queue: &Queue<E>,
+    hits: &mut Hits<E>,
+    obstacles: &InTheWay,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
+            let far = constant::<S, E>(simd, E::FAR);
+            for &(at, others) in &hits.packets {
+                let normal = Vec3::load(simd, &hits.normal, at);
+                let start = Vec3::load(simd, &hits.start, at);
+                let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
+                let seen = Ray { origin: start, direction: Vec3::load(simd, &queue.direction, at) };
+                let mut gloss = beyond.finishes.as_ref().map(Finishes::gloss);
+                let mut sum = Vec3::zero(simd);
+                for (light, obstacles) in scene.suns.iter().zip(&obstacles.of) {
+                    let towards = light.sun.towards(simd);
+                    let cosine = normal.dot(towards);
+                    let mut lit = cosine.simd_gt(zero);
+                    if lit.any_true() {
+                        let candidates = obstacles.candidates(others, F::KINDS);
+                        lit = unoccluded::<S, E, F>(simd, scene, light, start, lit, candidates);
+                    }
+                    if lit.any_true() {
+                        let ray = Ray { origin: start, direction: towards };
+                        lit = beyond.bodies.unoccluded(simd, ray, far, lit);
+                    }
+                    sum = Vec3::splat(simd, light.sun.color).scale_add(lit.select(cosine, zero), sum);
+                    if let Some(gloss) = &mut gloss {
+                        let lit = Lit { lanes: lit, towards, part: one };
+                        gloss.add(lit, light.sun.color, (seen, normal), orders);
+                    }
+                }
+                for lamp in &beyond.lamps {
+                    let Rays { ray, far, part } = lamp.rays(simd, start);
+                    let cosine = normal.dot(ray.direction);
+                    let mut lit = cosine.simd_gt(zero);
+                    if lit.any_true() {
+                        lit = beyond.bodies.unoccluded(simd, ray, far, lit);
+                    }
+                    if lit.any_true() {
+                        let met = nearest::<S, E, F, false>(simd, scene, ray, scene.all());
+                        lit &= !met.distance.simd_lt(far);
+                    }
+                    sum = Vec3::splat(simd, lamp.color).scale_add(lit.select(cosine * part, zero), sum);
+                    if let Some(gloss) = &mut gloss {
+                        let lit = Lit { lanes: lit, towards: ray.direction, part };
+                        gloss.add(lit, lamp.color, (seen, normal), orders);
+                    }
+                }
+                let diffuse = Vec3::load(simd, &hits.diffuse, at);
+                let color = Vec3::load(simd, &hits.color, at);
+                let lit = Vec3::<S, E>::new(
+                    diffuse.x.mul_add(sum.x, color.x),
+                    diffuse.y.mul_add(sum.y, color.y),
+                    diffuse.z.mul_add(sum.z, color.z),
+                );
+                let lit = match gloss {
+                    Some(gloss) if gloss.is_seen => {
+                        let sum = gloss.sum::<S, E>(simd);
+                        if EYE {
+                            sum.scale_add(one, lit)
+                        } else {
+                            sum.mul(Vec3::load(simd, &queue.weight, at)).scale_add(one, lit)
+                        }
+                    }
+                    Some(_) | None => lit,
+                };
                 lit.store(&mut hits.color, at);
             }
         },

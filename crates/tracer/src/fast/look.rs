@@ -4,10 +4,11 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use super::band::{Band, Tile};
+use super::bodies::Bodies;
 use super::bounce::{Hits, Queue, lanes, packet_shape, weigh};
 use super::candidates::Candidates;
 use super::features::Features;
-use super::packet::Ray;
+use super::packet::{Nearest, Ray};
 use super::prepare::Prepared;
 use super::rays::{AlongAxis, FromEye};
 use super::real::{Lanes, Real, Vec3, constant};
@@ -140,6 +141,49 @@ pub(super) fn look<S: Simd, E: Real, F: Features<E>>(
                     #[inline(always)]
                     || weigh::<S, E, false>(simd, background, queue, at),
                 );
+            }
+        },
+    );
+}
+
+/// What the first `count` rays of a queue meet of bodies, nearer than what they have met; `EYE` says that they start at the
+/// origin of the coordinates.
+#[inline(never)]
+pub(super) fn look_at_bodies<S: Simd, E: Real, const EYE: bool>(
+    simd: S,
+    bodies: &Bodies<E>,
+    count: usize,
+    queue: &Queue<E>,
+    hits: &mut Hits<E>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            // Which packets have hits, by bits.
+            let mut met = [0u64; 8];
+            for &(at, _) in &hits.packets {
+                met[at / Lanes::<S, E>::LEN / 64] |= 1 << (at / Lanes::<S, E>::LEN % 64);
+            }
+            hits.packets.clear();
+            for at in (0..count).step_by(Lanes::<S, E>::LEN) {
+                let end = at + Lanes::<S, E>::LEN;
+                let packet = at / Lanes::<S, E>::LEN;
+                let mut nearest = if met[packet / 64] >> (packet % 64) & 1 == 0 {
+                    Nearest::none(simd)
+                } else {
+                    Nearest {
+                        distance: Lanes::<S, E>::from_slice(simd, &hits.distance.0[at..end]),
+                        order: Lanes::<S, E>::from_slice(simd, &hits.order.0[at..end]),
+                    }
+                };
+                let origin = if EYE { Vec3::zero(simd) } else { Vec3::load(simd, &queue.origin, at) };
+                let ray = Ray { origin, direction: Vec3::load(simd, &queue.direction, at) };
+                bodies.meet(simd, ray, &mut nearest);
+                if nearest.hit(simd).any_true() {
+                    nearest.distance.store_slice(&mut hits.distance.0[at..end]);
+                    nearest.order.store_slice(&mut hits.order.0[at..end]);
+                    hits.packets.push((at, u64::MAX));
+                }
             }
         },
     );

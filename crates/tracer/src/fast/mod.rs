@@ -5,6 +5,8 @@
 //! [`geometry`] has recentred and scaled it.
 
 mod band;
+mod beyond;
+mod bodies;
 mod bounce;
 mod bounds;
 mod candidates;
@@ -12,6 +14,7 @@ mod coincidence;
 mod dispatch;
 mod exact;
 mod features;
+mod finish;
 mod geometry;
 mod kind;
 mod light;
@@ -33,9 +36,11 @@ mod search;
 mod shape;
 mod shapes;
 mod sights;
+mod sky;
 mod supported;
 mod surfaces;
 mod tile;
+mod tone;
 mod tree;
 mod window;
 
@@ -54,6 +59,7 @@ use self::real::Real;
 use self::shape::Robust;
 use self::shapes::{Formulas, Shape};
 use self::tile::Scratch;
+use self::tone::levels;
 use self::window::Window;
 use crate::parallel::{CHANNELS, bands};
 use crate::{Precision, RenderError, RenderOptions};
@@ -170,7 +176,7 @@ impl<'a, E: Real> Setup<'a, E> {
     fn draw<By: Formulas<E>>(&self) -> Result<RgbImage, RenderError> {
         let Self { scene, options, prepared, window, side } = self;
         let size = (scene.screen.width(), scene.screen.height());
-        let background = crate::reference::levels(scene.background.colors().0);
+        let background = levels(scene.background.colors().0, scene.tone);
         let level = options.level.unwrap_or_else(Level::new);
         let bounces = options.bounces(scene);
         // Boxed: it is passed from band to band by value.
@@ -180,7 +186,7 @@ impl<'a, E: Real> Setup<'a, E> {
             options,
             || Box::new(Scratch::new()),
             |scratch, row, bytes| {
-                let band = Band { bytes, size, background };
+                let band = Band { bytes, size, background, tone: scene.tone };
                 draw::<E, By>(&Job { prepared, window, side: *side, row, bounces }, level, band, scratch);
             },
         )

@@ -8,6 +8,7 @@
 
 use rayfold_scene::Scene;
 
+use super::beyond::is_needed;
 use super::coincidence::surfaces_blur;
 use super::geometry::{Geometry, View};
 use super::placed::{Placed, Sight};
@@ -56,11 +57,13 @@ pub(super) fn resolve(options: &RenderOptions, geometry: &Geometry, scene: &Scen
     if !DOUBLE.holds(geometry, scene, &colors) {
         return None;
     }
-    let single = match options.precision {
-        Precision::F64 => false,
-        Precision::F32 => SINGLE.holds(geometry, scene, &colors),
-        Precision::Auto => SINGLE.holds(geometry, scene, &colors) && is_enough(geometry, scene, &colors),
-    };
+    // The errors of what few scenes have are bounded for `f64` alone.
+    let single = !is_needed(geometry)
+        && match options.precision {
+            Precision::F64 => false,
+            Precision::F32 => SINGLE.holds(geometry, scene, &colors),
+            Precision::Auto => SINGLE.holds(geometry, scene, &colors) && is_enough(geometry, scene, &colors),
+        };
     Some(if single { Precision::F32 } else { Precision::F64 })
 }
 

@@ -6,10 +6,11 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use rayfold_scene::{Object, Scene};
+use rayfold_scene::{Material, Object, Scene};
 
+use super::beyond::Beyond;
 use super::candidates::{Candidates, MASKED, Masks};
-use super::features::Needs;
+use super::features::{BUILT, Needs};
 use super::geometry::{Geometry, View};
 use super::kind::{ByKind, Kind, Row};
 use super::lights::buffer::LightBuffer;
@@ -17,8 +18,9 @@ use super::lights::sun::{Direction, Outline, Outlines, Sun};
 use super::lists::LISTED;
 use super::rays::Rays;
 use super::real::Real;
-use super::shapes::{self, Obstacles, Shape, Shapes, Solid, Sorted};
+use super::shapes::{Obstacles, Shape, Shapes, Solid, Sorted};
 use super::sights::Sights;
+use super::sky::Sky;
 use super::tree::{Tree, stump};
 use crate::RenderError;
 use crate::parallel::map;
@@ -50,6 +52,8 @@ pub(super) struct Entry<E> {
     /// Position in the array of its kind.
     pub(super) index: u32,
     pub(super) mirrors: bool,
+    /// Whether the position is that of a body.
+    pub(super) is_body: bool,
     pub(super) ambient: [E; 3],
     pub(super) diffuse: [E; 3],
     pub(super) mirror: [E; 3],
@@ -68,10 +72,14 @@ pub(super) struct Prepared<E> {
     pub(super) tree: Option<Tree<E>>,
     /// For scenes of many objects, where it helps: what the tiles show.
     pub(super) sights: Option<Sights>,
-    /// Unclamped, for mirrored rays.
+    /// Unclamped, for mirrored rays; of a sky its first colour.
     pub(super) background: [E; 3],
+    /// A background that depends on where a ray goes.
+    pub(super) sky: Option<Sky<E>>,
     /// What it has.
     pub(super) needs: Needs,
+    /// What few scenes have.
+    pub(super) beyond: Option<Beyond<E>>,
 }
 
 impl<E: Real> Prepared<E> {
@@ -105,9 +113,19 @@ impl<E: Real> Prepared<E> {
         for (place, solid) in solids.iter().enumerate() {
             let of_kind = sorted.of_mut(solid.shape.kind());
             let entry = &mut entries[solid.order as usize];
+            entry.kind = solid.shape.kind();
             entry.index = of_kind.len() as u32;
             needs.mirrors |= entry.mirrors;
             of_kind.push(place as u32);
+        }
+        let sky = Sky::new(scene.background);
+        let beyond = Beyond::new(scene, geometry);
+        needs.beyond = beyond.is_some() || sky.is_some();
+        for (order, at) in beyond.iter().flat_map(|beyond| beyond.bodies.places()) {
+            let entry = &mut entries[order];
+            entry.is_body = true;
+            entry.index = at as u32;
+            needs.mirrors |= entry.mirrors;
         }
         let counts = ByKind::new(|kind| sorted.of(kind).len());
         let row = Row::new(counts);
@@ -135,10 +153,20 @@ impl<E: Real> Prepared<E> {
             row,
             needs,
             background: narrow(scene.background.colors().0),
-            tree: branches.map(|branches| Tree::new(branches, solids, |order| entries[order as usize].index)),
+            sky,
+            tree: branches.map(|branches| {
+                Tree::new(branches, solids, |place| entries[solids[place].order as usize].index)
+            }),
             sights,
             entries,
+            beyond,
         })
+    }
+
+    /// Whether there is nothing to be seen but what masks, lists and trees hold, on a background of one colour.
+    #[inline(always)]
+    pub(super) fn is_plain(&self) -> bool {
+        !self.needs.beyond || !BUILT.beyond
     }
 
     /// All objects: by masks, or by all that is in the tree.
@@ -158,16 +186,24 @@ fn narrow<E: Real>(v: DVec3) -> [E; 3] {
     v.to_array().map(E::narrow)
 }
 
+/// Its place is known once the solids are sorted; what can never be hit has none.
 fn entry<E: Real>(object: &Object) -> Entry<E> {
     let material = object.material();
     Entry {
-        kind: shapes::kind(object),
+        kind: Kind::Sphere,
         index: 0,
-        mirrors: material.mirror() != DVec3::ZERO,
+        is_body: false,
+        mirrors: mirrors(material),
         ambient: narrow(material.ambient()),
         diffuse: narrow(material.diffuse()),
         mirror: narrow(material.mirror()),
     }
+}
+
+/// Whether it is a mirror anywhere.
+fn mirrors(material: &Material) -> bool {
+    let other = || material.finish()?.pattern.map(|pattern| pattern.other.mirror());
+    material.mirror() != DVec3::ZERO || other().is_some_and(|mirror| mirror != DVec3::ZERO)
 }
 
 /// The solids as they stand in a row, kind after kind.

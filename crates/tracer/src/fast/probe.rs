@@ -8,7 +8,7 @@ use glam::DVec3;
 use rayfold_scene::Scene;
 
 use super::dispatch::on;
-use super::features::Everything;
+use super::features::{Anything, Everything};
 use super::geometry::Geometry;
 use super::packet::Ray;
 use super::precision::resolve;
@@ -116,11 +116,14 @@ impl<E: Real> Batch<'_, E> {
             simd,
             #[inline(always)]
             |ray, from_eye, count| {
-                let found = if from_eye {
+                let mut found = if from_eye {
                     nearest::<S, E, Everything<Robust>, true>(simd, self.scene, ray, self.scene.all())
                 } else {
                     nearest::<S, E, Everything<Robust>, false>(simd, self.scene, ray, self.scene.all())
                 };
+                if let Some(beyond) = &self.scene.beyond {
+                    beyond.bodies.meet(simd, ray, &mut found);
+                }
                 let hit = found.hit(simd).to_bitmask();
                 let mut normals = [DVec3::ZERO; 16];
                 let mut remaining = hit;
@@ -128,23 +131,11 @@ impl<E: Real> Batch<'_, E> {
                     let order = found.order[remaining.trailing_zeros() as usize];
                     let entry = &self.scene.entries[order.to_index()];
                     let normal = if from_eye {
-                        surface::<S, E, Everything<Robust>, true>(
-                            simd,
-                            self.scene,
-                            entry,
-                            ray,
-                            found.distance,
-                        )
-                        .normal
+                        surface::<S, E, Anything<Robust>, true>(simd, self.scene, entry, ray, found.distance)
+                            .normal
                     } else {
-                        surface::<S, E, Everything<Robust>, false>(
-                            simd,
-                            self.scene,
-                            entry,
-                            ray,
-                            found.distance,
-                        )
-                        .normal
+                        surface::<S, E, Anything<Robust>, false>(simd, self.scene, entry, ray, found.distance)
+                            .normal
                     };
                     for (lane, known) in normals.iter_mut().enumerate().take(Lanes::<S, E>::LEN) {
                         if found.order[lane] == order {

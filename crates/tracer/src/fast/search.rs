@@ -108,7 +108,7 @@ struct Waiting([u32; WAITING]);
 
 /// Visits the leaves whose boxes `meets` some lane, nearer children first by the direction of the first lane.
 #[inline(always)]
-fn descend<E: Real>(
+pub(super) fn descend<E: Real>(
     tree: &Tree<E>,
     backwards: [bool; 3],
     mut meets: impl FnMut(&Node<E>) -> bool,
@@ -155,7 +155,7 @@ fn descend<E: Real>(
 
 /// Whether the first lane goes backwards along each axis.
 #[inline(always)]
-fn backwards<S: Simd, E: Real>(direction: Vec3<S, E>) -> [bool; 3] {
+pub(super) fn backwards<S: Simd, E: Real>(direction: Vec3<S, E>) -> [bool; 3] {
     let zero = E::narrow(0.0);
     [direction.x[0] < zero, direction.y[0] < zero, direction.z[0] < zero]
 }

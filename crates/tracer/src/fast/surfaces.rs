@@ -117,7 +117,7 @@ pub(super) fn surfaces<
     simd.vectorize(
         #[inline(always)]
         || {
-            let Hits { distance, order, start, normal, diffuse, color, packets, mirrors } = hits;
+            let Hits { distance, order, start, normal, diffuse, color, packets, mirrors, mirror: _ } = hits;
             mirrors.clear();
             let zero = Vec3::zero(simd);
             for (at, others) in packets {
@@ -150,7 +150,7 @@ pub(super) fn surfaces<
                                 diffuse,
                             );
                             let is_alone = is_first && bits == met.hit.to_bitmask();
-                            *others = if is_alone { own_shadow::<E, EYE>(scene, entry) } else { u64::MAX };
+                            *others = if is_alone { own_shadow::<E, F, EYE>(scene, entry) } else { u64::MAX };
                         }
                         let Vec3 { x, y, z } = surface.start;
                         // Lanes without a hit start where the first hit does, and widen no region.
@@ -166,9 +166,9 @@ pub(super) fn surfaces<
     );
 }
 
-/// The rays that mirrors send on.
+/// The rays that mirrors send on; `PAINTED` says that their coefficients are among the hits.
 #[inline(never)]
-pub(super) fn reflect<S: Simd, E: Real, const EYE: bool>(
+pub(super) fn reflect<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>(
     simd: S,
     scene: &Prepared<E>,
     queue: &Queue<E>,
@@ -187,6 +187,11 @@ pub(super) fn reflect<S: Simd, E: Real, const EYE: bool>(
                     mirrors |= same;
                     mirror = Vec3::select(same, weigh::<S, E, EYE>(simd, entry.mirror, queue, at), mirror);
                     bits &= !same.to_bitmask();
+                }
+                if PAINTED {
+                    mirror = Vec3::load(simd, &hits.mirror, at);
+                    let zero = constant::<S, E>(simd, 0.0);
+                    mirrors &= mirror.x.simd_ne(zero) | mirror.y.simd_ne(zero) | mirror.z.simd_ne(zero);
                 }
                 let normal = Vec3::<S, E>::load(simd, &hits.normal, at);
                 let incoming = Vec3::load(simd, &queue.direction, at);
@@ -223,7 +228,10 @@ fn compress<S: Simd, E: Real>(v: Vec3<S, E>, lanes: Mask<S, E>, into: &mut Colum
 
 /// All spheres but the object itself, where it is one that cannot be in its own light.
 #[inline(always)]
-fn own_shadow<E: Real, const EYE: bool>(scene: &Prepared<E>, entry: &Entry<E>) -> u64 {
+fn own_shadow<E: Real, F: Features<E>, const EYE: bool>(scene: &Prepared<E>, entry: &Entry<E>) -> u64 {
+    if F::BODIES && entry.is_body {
+        return u64::MAX;
+    }
     let outside = EYE && scene.shapes.is_seen_from_outside(entry.kind, entry.index as usize);
     if outside && scene.tree.is_none() { !(1 << entry.index) } else { u64::MAX }
 }
@@ -237,6 +245,12 @@ pub(super) fn surface<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
     ray: Ray<S, E>,
     distance: Lanes<S, E>,
 ) -> Surface<S, E> {
+    if F::BODIES
+        && entry.is_body
+        && let Some(beyond) = &scene.beyond
+    {
+        return beyond.bodies.surface(simd, entry.index as usize, ray, distance);
+    }
     let object = (F::one_of_these(entry.kind), entry.index as usize);
     scene.shapes.surface::<S, F::By, EYE>(simd, object, ray, distance)
 }

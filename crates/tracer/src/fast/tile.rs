@@ -7,17 +7,21 @@
 //! steps a tile takes, and in which variants ([`fitted!`]).
 
 use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+use rayfold_scene::Tone;
 
-use super::band::{Band, Tile, fill, write_pixels};
+use super::band::{Band, Tile, fill, rays_of, write_encoded, write_pixels};
+use super::beyond::Beyond;
 use super::bounce::{Columns, Hits, Queue, columns};
 use super::candidates::{Candidates, Picked};
-use super::features::{BUILT, Kernel, Variant, fitted};
+use super::features::{Anything, BUILT, Kernel, Variant, fitted};
 use super::kind::ByKind;
-use super::light::{InTheWay, light_up};
-use super::look::{aim_along_axis, look, look_from_eye};
+use super::light::{InTheWay, light_up, light_up_beyond};
+use super::look::{aim_along_axis, look, look_at_bodies, look_from_eye};
 use super::prepare::Prepared;
 use super::rays::Rays;
-use super::real::Real;
+use super::real::{Lanes, Real};
+use super::sky::show_sky;
 use super::surfaces::{ambient, reflect, surfaces};
 
 /// Memory of a worker, used again for each of its tiles; what is in it does not matter.
@@ -54,7 +58,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     scratch: &mut Scratch<E>,
     band: &mut Band,
 ) {
-    if tile.candidates == 0 {
+    if tile.candidates == 0 && scene.is_plain() {
         return fill(tile, band);
     }
     let Scratch { queue, hits, next, pixels, in_the_way, sights } = scratch;
@@ -62,7 +66,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     let all = scene.all();
     let candidates = match &scene.sights {
         Some(all) if BUILT.tree && all.gather(tile.place.0, tile.place.1, sights) => {
-            if sights.is_empty() {
+            if sights.is_empty() && scene.is_plain() {
                 return fill(tile, band);
             }
             Candidates::listed(sights)
@@ -80,7 +84,8 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             fitted!(N, seen, tree, C T D => {
                 look_from_eye::<S, E, Variant<N::By, C, T, D>>(simd, scene, image, rays, candidates, queue, hits)
             });
-            let met = Met { kinds: seen, background, queue, next: Some(&mut *next) };
+            let count = rays_of::<S, E>(tile);
+            let met = Met { kinds: seen, background, queue, count, next: Some(&mut *next) };
             shade::<S, E, N, true>(simd, scene, met, hits, in_the_way);
         }
         Rays::Parallel(rays) => {
@@ -88,7 +93,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             fitted!(N, seen, tree, C T D => {
                 look::<S, E, Variant<N::By, C, T, D>>(simd, scene, candidates, background, queue, hits)
             });
-            let met = Met { kinds: seen, background, queue, next: Some(&mut *next) };
+            let met = Met { kinds: seen, background, queue, count: queue.count, next: Some(&mut *next) };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
         }
     }
@@ -103,7 +108,8 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             fitted!(N, all.kinds, tree, C T D => {
                 look::<S, E, Variant<N::By, C, T, D>>(simd, scene, all, scene.background, queue, hits)
             });
-            let met = Met { kinds: all.kinds, background: scene.background, queue, next: after };
+            let (kinds, background, count) = (all.kinds, scene.background, queue.count);
+            let met = Met { kinds, background, queue, count, next: after };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
             for ray in 0..queue.count {
                 let pixel = queue.pixel.0[ray].to_index();
@@ -117,7 +123,10 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
         }
         core::mem::swap(&mut hits.color, pixels);
     }
-    write_pixels::<S, E>(simd, tile, &hits.color, band);
+    match band.tone {
+        Tone::Plain => write_pixels::<S, E>(simd, tile, &hits.color, band),
+        Tone::Srgb => write_encoded::<S, E>(tile, &hits.color, band),
+    }
 }
 
 /// Rays that have met something.
@@ -126,6 +135,8 @@ struct Met<'a, E> {
     kinds: ByKind<bool>,
     background: [E; 3],
     queue: &'a Queue<E>,
+    /// How many they are, those beyond the tile's edges included.
+    count: usize,
     /// Where mirrors send them on to, if they do.
     next: Option<&'a mut Queue<E>>,
 }
@@ -135,7 +146,57 @@ struct Met<'a, E> {
 fn shade<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
-    Met { kinds, background, queue, next }: Met<E>,
+    met: Met<E>,
+    hits: &mut Hits<E>,
+    in_the_way: &mut InTheWay,
+) {
+    if scene.is_plain() {
+        return shade_plain::<S, E, N, EYE>(simd, scene, met, hits, in_the_way);
+    }
+    let (queue, count) = (met.queue, met.count);
+    match &scene.beyond {
+        Some(beyond) => shade_beyond::<S, E, N, EYE>(simd, scene, beyond, met, hits, in_the_way),
+        None => shade_plain::<S, E, N, EYE>(simd, scene, met, hits, in_the_way),
+    }
+    if let Some(sky) = &scene.sky {
+        show_sky::<S, E, EYE>(simd, sky, count, queue, hits);
+    }
+}
+
+/// In scenes with more than spheres, boxes, triangles and suns.
+#[inline(always)]
+fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    beyond: &Beyond<E>,
+    Met { kinds: _, background, queue, count, next }: Met<E>,
+    hits: &mut Hits<E>,
+    in_the_way: &mut InTheWay,
+) {
+    look_at_bodies::<S, E, EYE>(simd, &beyond.bodies, count, queue, hits);
+    if hits.packets.is_empty() {
+        return;
+    }
+    surfaces::<S, E, Anything<N::By>, EYE, true, true>(simd, scene, background, queue, hits);
+    let painted = beyond.finishes.as_ref().filter(|finishes| finishes.has_patterns);
+    if let Some(finishes) = painted {
+        finishes.paint::<E, EYE>(queue, hits, Lanes::<S, E>::LEN);
+    }
+    in_the_way.find(simd, scene, hits);
+    light_up_beyond::<S, E, Anything<N::By>, EYE>(simd, scene, beyond, queue, hits, in_the_way);
+    match next {
+        Some(next) if painted.is_some() => reflect::<S, E, EYE, true>(simd, scene, queue, hits, next),
+        Some(next) => reflect::<S, E, EYE, false>(simd, scene, queue, hits, next),
+        None => {}
+    }
+}
+
+/// In those that have nothing else.
+#[inline(always)]
+fn shade_plain<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    Met { kinds, background, queue, count: _, next }: Met<E>,
     hits: &mut Hits<E>,
     in_the_way: &mut InTheWay,
 ) {
@@ -171,6 +232,6 @@ fn shade<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
         ambient::<S, E, EYE>(simd, scene, background, queue, hits);
     }
     if mirrors && let Some(next) = next {
-        reflect::<S, E, EYE>(simd, scene, queue, hits, next);
+        reflect::<S, E, EYE, false>(simd, scene, queue, hits, next);
     }
 }

@@ -108,9 +108,27 @@ impl Boundable for Item {
     }
 }
 
+/// What a tree is grown of.
+pub(super) trait Grouped: Copy + Sync {
+    fn bounds(&self) -> Bounds;
+
+    /// A leaf has solids of one number alone, that of their kind.
+    fn number(&self) -> u32;
+}
+
+impl Grouped for Solid {
+    fn bounds(&self) -> Bounds {
+        self.shape.bounds()
+    }
+
+    fn number(&self) -> u32 {
+        self.shape.kind().number()
+    }
+}
+
 /// Brings solids into the order of a tree's leaves and gives its shape, if there are more than masks can hold or `tree`
 /// asks for it.
-pub(super) fn group(solids: &mut Vec<Solid>, tree: Option<bool>) -> Option<Branches> {
+pub(super) fn group<T: Grouped>(solids: &mut Vec<T>, tree: Option<bool>) -> Option<Branches> {
     let is_needed = solids.len() > MASKED || tree == Some(true) && !solids.is_empty();
     is_needed.then(|| plant(solids))
 }
@@ -118,16 +136,16 @@ pub(super) fn group(solids: &mut Vec<Solid>, tree: Option<bool>) -> Option<Branc
 /// All solids in one leaf a kind.
 pub(super) fn stump(solids: &[Solid]) -> (Vec<Solid>, Branches) {
     let mut solids = solids.to_vec();
-    solids.sort_by_key(|solid| solid.shape.kind().number());
+    solids.sort_by_key(|solid| solid.number());
     let mut branches = vec![Branch::EMPTY];
     leaf(&mut branches, 0, &solids, 0);
     let branches = Branches::bounded(branches, &solids);
     (solids, branches)
 }
 
-fn plant(solids: &mut Vec<Solid>) -> Branches {
+fn plant<T: Grouped>(solids: &mut Vec<T>) -> Branches {
     let bounds = map(solids, |solid| {
-        let (min, max) = solid.shape.bounds();
+        let (min, max) = solid.bounds();
         Item(Aabb { min: Vec3A::from(min.as_vec3()), max: Vec3A::from(max.as_vec3()) })
     });
     let params = BvhBuildParams { max_prims_per_leaf: LEAF, ..BvhBuildParams::fast_build() };
@@ -135,7 +153,7 @@ fn plant(solids: &mut Vec<Solid>) -> Branches {
     // Depth first, children side by side and after their parent.
     let mut branches = Vec::with_capacity(grown.nodes.len());
     branches.push(Branch::EMPTY);
-    let mut order: Vec<Solid> = Vec::with_capacity(solids.len());
+    let mut order: Vec<T> = Vec::with_capacity(solids.len());
     let mut pending = vec![(0usize, 0usize)];
     while let Some((node, at)) = pending.pop() {
         let node = &grown.nodes[node];
@@ -149,7 +167,7 @@ fn plant(solids: &mut Vec<Solid>) -> Branches {
             let from = order.len();
             let items = &grown.primitive_indices[first..first + node.prim_count as usize];
             order.extend(items.iter().map(|&item| solids[item as usize]));
-            order[from..].sort_by_key(|solid| solid.shape.kind().number());
+            order[from..].sort_by_key(|solid| solid.number());
             leaf(&mut branches, at, &order[from..], from);
         }
     }
@@ -163,17 +181,14 @@ impl Branch {
 
 impl Branches {
     /// With the boxes worked out.
-    fn bounded(mut branches: Vec<Branch>, solids: &[Solid]) -> Self {
+    fn bounded<T: Grouped>(mut branches: Vec<Branch>, solids: &[T]) -> Self {
         for at in (0..branches.len()).rev() {
             let Branch { first, count, bounds } = branches[at];
             let first = first as usize;
             branches[at].bounds = if count == 0 {
                 [branches[first].bounds, branches[first + 1].bounds].into_iter().fold(bounds, join)
             } else {
-                solids[first..first + count as usize]
-                    .iter()
-                    .map(|solid| solid.shape.bounds())
-                    .fold(bounds, join)
+                solids[first..first + count as usize].iter().map(Grouped::bounds).fold(bounds, join)
             };
         }
         Self(branches)
@@ -181,9 +196,9 @@ impl Branches {
 }
 
 /// Makes a leaf of solids that are sorted by kind, and more where they are of several; `from` is the place of the first.
-fn leaf(branches: &mut Vec<Branch>, at: usize, solids: &[Solid], from: usize) {
-    let kind = solids[0].shape.kind();
-    let alike = solids.partition_point(|solid| solid.shape.kind() == kind);
+fn leaf<T: Grouped>(branches: &mut Vec<Branch>, at: usize, solids: &[T], from: usize) {
+    let number = solids[0].number();
+    let alike = solids.partition_point(|solid| solid.number() == number);
     if alike == solids.len() {
         branches[at] = Branch { first: from as u32, count: alike as u32, ..Branch::EMPTY };
         return;
@@ -196,9 +211,8 @@ fn leaf(branches: &mut Vec<Branch>, at: usize, solids: &[Solid], from: usize) {
 }
 
 impl<E: Real> Tree<E> {
-    /// `solids` are in the order of [`group`]; `index` is the position of each in the array of its kind, by its order in
-    /// the script.
-    pub(super) fn new(branches: &Branches, solids: &[Solid], index: impl Fn(u32) -> u32) -> Self {
+    /// `solids` are in the order of [`group`]; `index` is the position of each in the array of its kind, by its place there.
+    pub(super) fn new<T: Grouped>(branches: &Branches, solids: &[T], index: impl Fn(usize) -> u32) -> Self {
         let branches = &branches.0;
         // Children change places so that the first comes first along the axis on which they lie farthest apart.
         let mut place: Vec<u32> = (0..branches.len() as u32).collect();
@@ -220,7 +234,7 @@ impl<E: Real> Tree<E> {
                 (first, axes[from as usize])
             } else {
                 let solid = &solids[first as usize];
-                (index(solid.order), count << Kind::BITS | solid.shape.kind().number())
+                (index(first as usize), count << Kind::BITS | solid.number())
             };
             let (low, high) = padded(bounds);
             Node { low, high, first, content }

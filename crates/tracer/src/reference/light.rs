@@ -99,7 +99,7 @@ impl Arriving {
 
 /// The highlight of light `towards` which is seen from `towards_eye`, both unit vectors: max(0, N·h)ⁿ for the vector h
 /// halfway between them.
-pub(super) fn highlight(shine: &Shine, normal: DVec3, towards: DVec3, towards_eye: DVec3) -> f64 {
+pub(crate) fn highlight(shine: &Shine, normal: DVec3, towards: DVec3, towards_eye: DVec3) -> f64 {
     let sum = towards + towards_eye;
     if sum == DVec3::ZERO {
         return 0.0;

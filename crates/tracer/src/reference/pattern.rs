@@ -17,7 +17,7 @@ const WALL: f64 = 1.0 / (1u64 << 40) as f64;
 ///
 /// `place` is where it is hit and `normal` its normal, in the coordinates of the object's numbers; `object` is not an
 /// instance.
-pub(super) fn coefficients(object: &Object, place: DVec3, normal: DVec3, surface: &Surface) -> Coefficients {
+pub(crate) fn coefficients(object: &Object, place: DVec3, normal: DVec3, surface: &Surface) -> Coefficients {
     let material = object.material();
     let own = material.coefficients();
     let Some(pattern) = material.finish().and_then(|finish| finish.pattern) else { return own };

@@ -3,6 +3,7 @@
 //! This is the one place that leads from a kind to its file. A kind that somewhere lacks its arm does not compile.
 
 pub(super) mod cuboid;
+pub(super) mod instance;
 pub(super) mod sphere;
 pub(super) mod triangle;
 
@@ -67,34 +68,17 @@ impl Shape {
     }
 
     /// An object of the scene in the kernels' coordinates: moved so that `center` is the origin, then scaled. None if it
-    /// can never be hit.
+    /// can never be hit, or is a [body](super::bodies).
     pub(super) fn new(object: &Object, center: DVec3, scale: f64) -> Option<Self> {
         match object {
             Object::Sphere(sphere) => Some(Self::Sphere(sphere::Placed::new(sphere, center, scale))),
             Object::Cuboid(cuboid) => Some(Self::Cuboid(cuboid::Placed::new(cuboid, center, scale))),
             Object::Triangle(triangle) => triangle::Placed::new(triangle, center, scale).map(Self::Triangle),
-            Object::Plane(_)
-            | Object::Disc(_)
-            | Object::Cylinder(_)
-            | Object::Cone(_)
-            | Object::Torus(_)
-            | Object::Instance(_) => unreachable!("no kernel for {object:?}"),
+            Object::Instance(instance) => Self::new(&instance::in_world(instance)?, center, scale),
+            Object::Plane(_) | Object::Disc(_) | Object::Cylinder(_) | Object::Cone(_) | Object::Torus(_) => {
+                None
+            }
         }
-    }
-}
-
-/// What an object is.
-pub(super) fn kind(object: &Object) -> Kind {
-    match object {
-        Object::Sphere(_) => Kind::Sphere,
-        Object::Cuboid(_) => Kind::Cuboid,
-        Object::Triangle(_) => Kind::Triangle,
-        Object::Plane(_)
-        | Object::Disc(_)
-        | Object::Cylinder(_)
-        | Object::Cone(_)
-        | Object::Torus(_)
-        | Object::Instance(_) => unreachable!("no kernel for {object:?}"),
     }
 }
 
@@ -104,12 +88,10 @@ pub(super) fn reach(object: &Object, center: DVec3) -> f64 {
         Object::Sphere(sphere) => sphere::reach(sphere, center),
         Object::Cuboid(cuboid) => cuboid::reach(cuboid, center),
         Object::Triangle(triangle) => triangle::reach(triangle, center),
-        Object::Plane(_)
-        | Object::Disc(_)
-        | Object::Cylinder(_)
-        | Object::Cone(_)
-        | Object::Torus(_)
-        | Object::Instance(_) => unreachable!("no kernel for {object:?}"),
+        Object::Instance(instance) => {
+            instance::in_world(instance).map_or(0.0, |object| reach(&object, center))
+        }
+        Object::Plane(_) | Object::Disc(_) | Object::Cylinder(_) | Object::Cone(_) | Object::Torus(_) => 0.0,
     }
 }
 

@@ -1,0 +1,34 @@
+//! What few scenes have beyond spheres, boxes, triangles and suns: steps of their own draw it, so that the others pay
+//! nothing for it.
+
+use rayfold_scene::Scene;
+
+use super::bodies::Bodies;
+use super::finish::Finishes;
+use super::geometry::Geometry;
+use super::lights::lamp::Lamp;
+use super::real::Real;
+
+/// What few scenes have.
+#[derive(Debug)]
+pub(super) struct Beyond<E> {
+    pub(super) bodies: Bodies<E>,
+    pub(super) lamps: Vec<Lamp<E>>,
+    pub(super) finishes: Option<Finishes>,
+}
+
+impl<E: Real> Beyond<E> {
+    /// None for scenes that have nothing of it.
+    pub(super) fn new(scene: &Scene, geometry: &Geometry) -> Option<Self> {
+        is_needed(geometry).then(|| Self {
+            bodies: Bodies::new(&geometry.bodies),
+            lamps: geometry.lamps.iter().map(Lamp::new).collect(),
+            finishes: Finishes::new(scene, geometry),
+        })
+    }
+}
+
+/// Whether the scene has something of it; it is drawn in `f64`, then.
+pub(super) fn is_needed(geometry: &Geometry) -> bool {
+    !geometry.bodies.is_empty() || !geometry.lamps.is_empty() || geometry.is_finished
+}

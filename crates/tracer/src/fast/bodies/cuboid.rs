@@ -1,0 +1,110 @@
+//! Boxes that stand askew: slabs along axes of their own (Kay and Kajiya), faces, edges and corners with them.
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+use glam::DVec3;
+
+use super::{Local, Met};
+use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::rounding::LATE;
+
+/// A box around the origin.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cuboid<E> {
+    half: [E; 3],
+}
+
+/// Where rays enter each slab and leave it.
+struct Slabs<S: Simd, E: Real> {
+    near: Vec3<S, E>,
+    far: Vec3<S, E>,
+    enter: Lanes<S, E>,
+    leave: Lanes<S, E>,
+}
+
+impl<E: Real> Cuboid<E> {
+    pub(super) fn new(half: DVec3) -> Self {
+        Self { half: half.to_array().map(E::narrow) }
+    }
+
+    #[inline(always)]
+    fn slabs<S: Simd>(&self, simd: S, ray: Local<S, E>) -> Slabs<S, E> {
+        let [x, y, z] = self.half;
+        let (x, y, z) = (
+            slab::<S, E>(simd, splat::<S, E>(simd, x), ray.origin.x, ray.direction.x),
+            slab::<S, E>(simd, splat::<S, E>(simd, y), ray.origin.y, ray.direction.y),
+            slab::<S, E>(simd, splat::<S, E>(simd, z), ray.origin.z, ray.direction.z),
+        );
+        Slabs {
+            near: Vec3::<S, E>::new(x.0, y.0, z.0),
+            far: Vec3::<S, E>::new(x.1, y.1, z.1),
+            enter: x.0.max(y.0).max(z.0),
+            leave: x.1.min(y.1).min(z.1),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn meet<S: Simd>(&self, simd: S, ray: Local<S, E>) -> (Mask<S, E>, Lanes<S, E>) {
+        let zero = constant::<S, E>(simd, 0.0);
+        let Slabs { enter, leave, .. } = self.slabs(simd, ray);
+        let hit = enter.simd_le(leave * constant::<S, E>(simd, 1.0 + LATE * E::ROUNDOFF));
+        let distance = enter.simd_gt(zero).select(enter, leave);
+        (hit & distance.simd_gt(zero), distance)
+    }
+
+    /// Where faces meet, that of the first axis counts.
+    #[inline(always)]
+    pub(super) fn surface<S: Simd>(&self, simd: S, ray: Local<S, E>, distance: Lanes<S, E>) -> Met<S, E> {
+        let zero = constant::<S, E>(simd, 0.0);
+        let Slabs { near, far, enter, leave } = self.slabs(simd, ray);
+        let entering = enter.simd_gt(zero);
+        let is_x = (entering & near.x.simd_eq(enter)) | (!entering & far.x.simd_eq(leave));
+        let is_y = !is_x & ((entering & near.y.simd_eq(enter)) | (!entering & far.y.simd_eq(leave)));
+        let is_z = !is_x & !is_y;
+        let place = ray.direction.scale_add(distance, ray.origin);
+        let [hx, hy, hz] = self.half.map(
+            #[inline(always)]
+            |half| splat::<S, E>(simd, half),
+        );
+        let (x, nx) = face::<S, E>(simd, is_x, entering, ray.direction.x, hx, place.x);
+        let (y, ny) = face::<S, E>(simd, is_y, entering, ray.direction.y, hy, place.y);
+        let (z, nz) = face::<S, E>(simd, is_z, entering, ray.direction.z, hz, place.z);
+        Met { point: Vec3::<S, E>::new(x, y, z), normal: Vec3::<S, E>::new(nx, ny, nz) }
+    }
+}
+
+/// Where rays enter and leave a slab; one along it is in it for ever, or never.
+#[inline(always)]
+fn slab<S: Simd, E: Real>(
+    simd: S,
+    half: Lanes<S, E>,
+    origin: Lanes<S, E>,
+    direction: Lanes<S, E>,
+) -> (Lanes<S, E>, Lanes<S, E>) {
+    let (zero, far) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, E::FAR));
+    let inverse = constant::<S, E>(simd, 1.0) / direction;
+    let (a, b) = ((zero - half - origin) * inverse, (half - origin) * inverse);
+    let is_along = direction.simd_eq(zero);
+    let within = origin.abs().simd_le(half);
+    (
+        is_along.select(within.select(zero - far, far), a.min(b)),
+        is_along.select(within.select(far, zero - far), a.max(b)),
+    )
+}
+
+/// A coordinate, brought onto the face if the ray meets it there, and that of the normal.
+#[inline(always)]
+fn face<S: Simd, E: Real>(
+    simd: S,
+    here: Mask<S, E>,
+    entering: Mask<S, E>,
+    direction: Lanes<S, E>,
+    half: Lanes<S, E>,
+    place: Lanes<S, E>,
+) -> (Lanes<S, E>, Lanes<S, E>) {
+    let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
+    let forwards = direction.simd_gt(zero);
+    let low = !(forwards ^ entering);
+    let within = place.max(zero - half).min(half);
+    (here.select(low.select(zero - half, half), within), here.select(forwards.select(zero - one, one), zero))
+}

@@ -1,0 +1,256 @@
+//! Shapes that have axes of their own: planes, discs, cylinders, cones, tori, and boxes that stand askew.
+//!
+//! A shape is a file here: where rays in its own coordinates meet it, and the surface there. What is common stands in this
+//! one: the way into these coordinates and back, the offset of new rays, the search. None of it is part of the steps that
+//! look for spheres, boxes and triangles, or of their masks, lists and trees: scenes without bodies execute nothing for
+//! them. Bodies are found down a tree of their own; planes, which have no bounds, stand beside it.
+//!
+//! Scenes with bodies are drawn in `f64`. Lengths are at most about 1, and all errors here are some roundoffs of that: a
+//! place in the coordinates of a body has one of the difference to its middle, and three of a product with an axis; the
+//! tests add what their files say, at most 32 of the body's size and of where it lies. New rays start off a surface by
+//! twice that ([`Solid::offset`]).
+
+mod cone;
+mod cuboid;
+mod disc;
+mod placed;
+mod plane;
+mod torus;
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+
+use self::cone::Cone;
+use self::cuboid::Cuboid;
+use self::disc::Disc;
+pub(super) use self::placed::{Form, Solid, body, reach};
+use self::torus::Torus;
+use super::bounds::Crossing;
+use super::packet::{Nearest, Ray, Surface};
+use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use super::search::{backwards, descend};
+use super::tree::{Tree, group};
+
+/// A packet of rays in the coordinates of a body.
+#[derive(Clone, Copy)]
+struct Local<S: Simd, E: Real> {
+    origin: Vec3<S, E>,
+    direction: Vec3<S, E>,
+}
+
+/// Where rays meet a body, in its coordinates: the place brought onto it, and the unit normal on the side that they came
+/// from.
+struct Met<S: Simd, E: Real> {
+    point: Vec3<S, E>,
+    normal: Vec3<S, E>,
+}
+
+/// A shape in its own coordinates.
+#[derive(Clone, Copy, Debug)]
+enum Shape<E> {
+    Plane,
+    Disc(Disc<E>),
+    /// With the middle of the end b.
+    Cone(Cone<E>, [E; 3]),
+    Torus(Torus<E>),
+    Cuboid(Cuboid<E>),
+}
+
+/// A body as the kernels read it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Body<E> {
+    /// Orthonormal; the last is that of what is round.
+    axes: [[E; 3]; 3],
+    /// Where they start.
+    center: [E; 3],
+    /// How far off its surface a new ray starts, beside what depends on the place.
+    offset: E,
+    order: E,
+    shape: Shape<E>,
+}
+
+impl<E: Real> Body<E> {
+    fn new(solid: &Solid) -> Self {
+        let shape = match solid.form {
+            Form::Plane => Shape::Plane,
+            Form::Disc { radius } => Shape::Disc(Disc::new(radius)),
+            Form::Cone { radii, height, end } => {
+                Shape::Cone(Cone::new(radii, height), end.to_array().map(E::narrow))
+            }
+            Form::Torus { radius, thickness } => Shape::Torus(Torus::new(radius, thickness)),
+            Form::Cuboid { half } => Shape::Cuboid(Cuboid::new(half)),
+        };
+        Self {
+            axes: solid.axes.map(|axis| axis.to_array().map(E::narrow)),
+            center: solid.center.to_array().map(E::narrow),
+            offset: E::narrow(OFFSET * E::ROUNDOFF * solid.extent()),
+            order: E::narrow(f64::from(solid.order)),
+            shape,
+        }
+    }
+
+    #[inline(always)]
+    fn local<S: Simd>(&self, simd: S, ray: Ray<S, E>) -> Local<S, E> {
+        let origin = ray.origin.sub(Vec3::splat(simd, self.center));
+        Local { origin: self.turned(simd, origin), direction: self.turned(simd, ray.direction) }
+    }
+
+    #[inline(always)]
+    fn turned<S: Simd>(&self, simd: S, v: Vec3<S, E>) -> Vec3<S, E> {
+        let [x, y, z] = self.axes;
+        Vec3::<S, E>::new(
+            Vec3::splat(simd, x).dot(v),
+            Vec3::splat(simd, y).dot(v),
+            Vec3::splat(simd, z).dot(v),
+        )
+    }
+
+    #[inline(always)]
+    fn turned_back<S: Simd>(&self, simd: S, v: Vec3<S, E>) -> Vec3<S, E> {
+        let [x, y, z] = self.axes;
+        let along = Vec3::splat(simd, x).scale(v.x);
+        let along = Vec3::splat(simd, y).scale_add(v.y, along);
+        Vec3::splat(simd, z).scale_add(v.z, along)
+    }
+
+    /// How high over the end b rays start, as exactly as over the end a: caps in the plane of a face are met where that is.
+    #[inline(always)]
+    fn over<S: Simd>(&self, simd: S, end: [E; 3], ray: Ray<S, E>) -> Lanes<S, E> {
+        Vec3::splat(simd, self.axes[2]).dot(ray.origin.sub(Vec3::splat(simd, end)))
+    }
+
+    /// Offers where the rays meet the body.
+    // Out of line, so that there is one piece of code for all that looks for bodies.
+    #[inline(never)]
+    fn meet<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let local = self.local(simd, ray);
+                let (hit, distance) = match &self.shape {
+                    Shape::Plane => plane::along(simd, local),
+                    Shape::Disc(disc) => disc.meet(simd, local),
+                    Shape::Cone(cone, end) => cone.meet(simd, local, self.over(simd, *end, ray)),
+                    Shape::Torus(torus) => torus.meet(simd, local, nearest.distance),
+                    Shape::Cuboid(cuboid) => cuboid.meet(simd, local),
+                };
+                nearest.offer(simd, hit, distance, self.order);
+            },
+        );
+    }
+
+    /// The surface where the rays meet the body.
+    #[inline(never)]
+    pub(super) fn surface<S: Simd>(&self, simd: S, ray: Ray<S, E>, distance: Lanes<S, E>) -> Surface<S, E> {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let local = self.local(simd, ray);
+                let met = match &self.shape {
+                    Shape::Plane | Shape::Disc(_) => plane::surface(simd, local, distance),
+                    Shape::Cone(cone, end) => cone.surface(simd, local, self.over(simd, *end, ray), distance),
+                    Shape::Torus(torus) => torus.surface(simd, local, distance),
+                    Shape::Cuboid(cuboid) => cuboid.surface(simd, local, distance),
+                };
+                let center = Vec3::splat(simd, self.center);
+                let point = self.turned_back(simd, met.point).scale_add(constant::<S, E>(simd, 1.0), center);
+                let normal = self.turned_back(simd, met.normal);
+                let size = point.x.abs() + point.y.abs() + point.z.abs();
+                let offset = size
+                    .mul_add(constant::<S, E>(simd, OFFSET * E::ROUNDOFF), splat::<S, E>(simd, self.offset));
+                Surface { start: normal.scale_add(offset, point), normal }
+            },
+        )
+    }
+}
+
+/// How far off its surface a new ray starts, in roundoffs of the place and of the body.
+const OFFSET: f64 = 64.0;
+
+/// All bodies of a scene.
+#[derive(Debug)]
+pub(super) struct Bodies<E> {
+    /// Planes first, then in the order of the tree's leaves.
+    bodies: Vec<Body<E>>,
+    planes: usize,
+    tree: Option<Tree<E>>,
+}
+
+impl<E: Real> Bodies<E> {
+    pub(super) fn new(solids: &[Solid]) -> Self {
+        let (mut planes, mut bounded): (Vec<Solid>, Vec<Solid>) =
+            solids.iter().copied().partition(|solid| solid.bounds().is_none());
+        let branches = group(&mut bounded, Some(true));
+        let count = planes.len();
+        let tree = branches.map(|branches| Tree::new(&branches, &bounded, |place| (count + place) as u32));
+        planes.append(&mut bounded);
+        Self { bodies: planes.iter().map(Body::new).collect(), planes: count, tree }
+    }
+
+    /// Where each stands, by its order in the script.
+    pub(super) fn places(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.bodies.iter().enumerate().map(|(at, body)| (body.order.to_index(), at))
+    }
+
+    /// Offers where the rays meet a body that is not farther than what they met before.
+    #[inline(always)]
+    pub(super) fn meet<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+        for plane in &self.bodies[..self.planes] {
+            plane.meet(simd, ray, nearest);
+        }
+        let Some(tree) = &self.tree else { return };
+        // Computed distances are no nearer than this to those of boxes beyond them.
+        let slack = constant::<S, E>(simd, super::rounding::distance_error::<E>());
+        let crossing = Crossing::new(simd, ray);
+        let found = core::cell::Cell::new(*nearest);
+        descend(
+            tree,
+            backwards(ray.direction),
+            #[inline(always)]
+            |node| {
+                let distance = found.get().distance;
+                let limit = distance.mul_add(slack, distance + slack);
+                crossing.meets(simd, node.low, node.high, limit).any_true()
+            },
+            #[inline(always)]
+            |_, items| {
+                let mut nearest = found.get();
+                for body in &self.bodies[items] {
+                    body.meet(simd, ray, &mut nearest);
+                }
+                found.set(nearest);
+                true
+            },
+        );
+        *nearest = found.get();
+    }
+
+    /// Which of the rays that `lit` names meet no body nearer than `far`.
+    #[inline(always)]
+    pub(super) fn unoccluded<S: Simd>(
+        &self,
+        simd: S,
+        ray: Ray<S, E>,
+        far: Lanes<S, E>,
+        lit: Mask<S, E>,
+    ) -> Mask<S, E> {
+        let mut nearest = Nearest::none(simd);
+        // What is in the dark has no way to go.
+        nearest.distance = lit.select(far, constant::<S, E>(simd, -1.0));
+        let limit = nearest.distance;
+        self.meet(simd, ray, &mut nearest);
+        lit & !nearest.distance.simd_lt(limit)
+    }
+
+    /// The surface of one of the bodies.
+    #[inline(always)]
+    pub(super) fn surface<S: Simd>(
+        &self,
+        simd: S,
+        at: usize,
+        ray: Ray<S, E>,
+        distance: Lanes<S, E>,
+    ) -> Surface<S, E> {
+        self.bodies[at].surface(simd, ray, distance)
+    }
+}

@@ -1,0 +1,76 @@
+//! A lamp: light from a place. Its shadow rays end there.
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+use glam::DVec3;
+
+use crate::fast::packet::Ray;
+use crate::fast::real::{Lanes, Real, Vec3, constant, splat};
+
+/// A lamp in the kernels' coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::fast) struct Place {
+    position: DVec3,
+    color: DVec3,
+    /// The distance at which its colour arrives; 0 where it does at all.
+    reach: f64,
+}
+
+impl Place {
+    /// Moved so that `center` is the origin, and then scaled.
+    pub(in crate::fast) fn new(lamp: &rayfold_scene::Lamp, center: DVec3, scale: f64) -> Self {
+        let position = (lamp.position() - center) * scale;
+        Self { position, color: lamp.color(), reach: lamp.reach() * scale }
+    }
+}
+
+/// How near the lamp, in roundoffs of its distance, a surface is taken for one that it lies in, which does not hide it.
+///
+/// The distance to a surface errs by some roundoffs over the sine of the angle at which the ray meets it; a surface in
+/// which the lamp lies is met at angles down to 2⁻¹⁴ and less.
+const AT_THE_LAMP: f64 = 1048576.0;
+
+/// A lamp as the kernels read it.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::fast) struct Lamp<E> {
+    position: [E; 3],
+    pub(in crate::fast) color: [E; 3],
+    /// Its square.
+    reach: Option<E>,
+}
+
+/// Shadow rays to a lamp.
+#[derive(Clone, Copy)]
+pub(in crate::fast) struct Rays<S: Simd, E: Real> {
+    pub(in crate::fast) ray: Ray<S, E>,
+    /// What is met nearer than this hides the lamp.
+    pub(in crate::fast) far: Lanes<S, E>,
+    /// What arrives of each channel's light.
+    pub(in crate::fast) part: Lanes<S, E>,
+}
+
+impl<E: Real> Lamp<E> {
+    pub(in crate::fast) fn new(place: &Place) -> Self {
+        Self {
+            position: place.position.to_array().map(E::narrow),
+            color: place.color.to_array().map(E::narrow),
+            reach: (place.reach > 0.0).then(|| E::narrow(place.reach * place.reach)),
+        }
+    }
+
+    /// From where rays leave a surface to the lamp. From the lamp's own place they lead back into the surface.
+    #[inline(always)]
+    pub(in crate::fast) fn rays<S: Simd>(&self, simd: S, start: Vec3<S, E>) -> Rays<S, E> {
+        let one = constant::<S, E>(simd, 1.0);
+        let to = Vec3::splat(simd, self.position).sub(start);
+        let square = to.dot(to);
+        let distance = square.sqrt();
+        let direction = to.scale(one / distance);
+        let far = distance * constant::<S, E>(simd, 1.0 - AT_THE_LAMP * E::ROUNDOFF);
+        let part = match self.reach {
+            Some(reach) => splat::<S, E>(simd, reach) / square,
+            None => one,
+        };
+        Rays { ray: Ray { origin: start, direction }, far, part }
+    }
+}

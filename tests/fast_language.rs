@@ -1,0 +1,508 @@
+//! What version 2 of the language brings is drawn by the packets as the plain tracer draws it, whatever it is drawn with.
+//!
+//! Scenes are drawn at random; a failure prints the seed. `RAYFOLD_SEED` tries another one.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+use image::RgbImage;
+use rayfold_scene::model::{Finish, Pattern, Shine, Weight};
+use rayfold_scene::{
+    Background, Camera, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Instance, Lamp, Light, Limits,
+    Look, Material, Object, Placement, Plane, Scene, Screen, SharedSlice, Sphere, Tone, Torus, Triangle,
+    parse,
+};
+use rayfold_tracer::{Level, Precision, RenderOptions, reference, render};
+
+/// Pixels of all pictures that rounding may put on the other side of an outline, as a share.
+const ISOLATED: f64 = 4e-4;
+
+struct Dice(fastrand::Rng);
+
+impl Dice {
+    fn new(test: &str) -> Self {
+        let seed =
+            std::env::var("RAYFOLD_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(20_261_122);
+        println!("{test}: RAYFOLD_SEED={seed}");
+        Self(fastrand::Rng::with_seed(seed))
+    }
+
+    fn within(&mut self, from: f64, to: f64) -> f64 {
+        from + (to - from) * self.0.f64()
+    }
+
+    fn point(&mut self, size: f64) -> DVec3 {
+        DVec3::new(self.within(-size, size), self.within(-size, size), self.within(-size, size))
+    }
+
+    fn color(&mut self) -> DVec3 {
+        self.point(0.5) + 0.5
+    }
+
+    fn material(&mut self) -> Material {
+        let mirror = if self.0.bool() { 0.6 * self.color() } else { DVec3::ZERO };
+        Material::new(0.1 * self.color(), self.color(), mirror).unwrap()
+    }
+
+    /// A sphere, a box or a triangle, any of which may be a mirror.
+    fn object(&mut self) -> Object {
+        let at = self.point(3.0);
+        let material = self.material();
+        match self.0.u8(0..3) {
+            0 => Sphere::new(self.within(0.1, 0.8), at, material).unwrap().into(),
+            1 => Cuboid::new([at, at + self.point(0.8)], material).unwrap().into(),
+            _ => Triangle::new([at, at + self.point(1.5), at + self.point(1.5)], material).unwrap().into(),
+        }
+    }
+
+    fn scene(&mut self, objects: Vec<Object>) -> Scene {
+        let eye = self.point(1.0).normalize() * 9.0;
+        let up = if self.0.bool() { Some(self.point(1.0)) } else { None };
+        let look = Look::new(eye, self.point(0.5), self.within(35.0, 70.0), up).unwrap();
+        let screen = Screen::new(self.0.u32(50..90), self.0.u32(50..90)).unwrap();
+        let camera = if self.0.u8(0..4) == 0 { Camera::Orthographic } else { Camera::Look(look) };
+        let mut scene = Scene::new(screen, camera);
+        if camera == Camera::Orthographic {
+            let place = |p: DVec3| p * 12.0 + DVec3::new(35.0, 35.0, -80.0);
+            scene.objects = objects.iter().map(|object| object.placed(12.0, place).unwrap()).collect();
+        } else {
+            scene.objects = objects.into();
+        }
+        scene.background = Background::sky(self.color(), self.color()).unwrap();
+        scene.tone = if self.0.bool() { Tone::Srgb } else { Tone::Plain };
+        scene.depth = Depth::new(self.0.u32(0..8)).unwrap();
+        scene.lights = (0..self.0.usize(0..4))
+            .map(|_| Light::Directional(DirectionalLight::new(0.6 * self.color(), self.point(1.0)).unwrap()))
+            .collect();
+        scene
+    }
+}
+
+fn draw(scene: &Scene, options: RenderOptions) -> RgbImage {
+    render(scene, &options).unwrap()
+}
+
+fn levels() -> Vec<(&'static str, Level)> {
+    let best = Level::new();
+    let mut levels = vec![("the best", best)];
+    #[cfg(target_arch = "x86_64")]
+    {
+        levels.extend(best.as_avx2().map(|level| ("AVX2", Level::Avx2(level))));
+        levels.extend(best.as_sse4_2().map(|level| ("SSE4.2", Level::Sse4_2(level))));
+    }
+    levels
+}
+
+/// Pixels that are off by more than one level in a channel.
+fn off(a: &RgbImage, b: &RgbImage) -> usize {
+    assert_eq!(a.dimensions(), b.dimensions());
+    a.pixels().zip(b.pixels()).filter(|(p, q)| (0..3).any(|c| p[c].abs_diff(q[c]) > 1)).count()
+}
+
+/// Holds the packets to the plain tracer, and to themselves: in all numbers, on all instructions, for any tile and tree.
+fn hold(scenes: &[Scene]) {
+    let (mut differ, mut pixels) = (0, 0);
+    for (number, scene) in scenes.iter().enumerate() {
+        let expected = reference::render(scene, &RenderOptions::default()).unwrap();
+        let mut before = None;
+        for precision in [Precision::Auto, Precision::F32, Precision::F64] {
+            let options = RenderOptions { precision, ..Default::default() };
+            let drawn = draw(scene, options);
+            // What is drawn with the same numbers needs no second look.
+            if before.as_ref() == Some(&drawn) {
+                continue;
+            }
+            before = Some(drawn.clone());
+            let wrong = off(&expected, &drawn);
+            if wrong > 0 {
+                println!("scene {number}, {precision:?}: {wrong} of {} pixels are off", drawn.pixels().len());
+            }
+            differ += wrong;
+            pixels += drawn.pixels().len();
+            for (name, level) in levels() {
+                let other = draw(scene, RenderOptions { level: Some(level), ..options });
+                if name == "SSE4.2" {
+                    differ += off(&drawn, &other);
+                } else {
+                    assert!(drawn == other, "scene {number} on {name}, {precision:?}");
+                }
+            }
+            let tiles = [(4, 4), (32, 8)].map(|tile| RenderOptions { tile: Some(tile), ..options });
+            let trees = [true, false].map(|tree| RenderOptions { tree: Some(tree), ..options });
+            for options in tiles.into_iter().chain(trees) {
+                let other = draw(scene, options);
+                assert!(
+                    drawn == other,
+                    "scene {number}, {:?} {:?} {precision:?}",
+                    options.tile,
+                    options.tree
+                );
+            }
+        }
+    }
+    println!("{differ} of {pixels} pixels are off by more than one level");
+    assert!(differ as f64 <= ISOLATED * pixels as f64, "{differ} of {pixels} pixels");
+}
+
+#[test]
+fn skies_tones_depths_and_mirrors_of_all_kinds_are_the_references() {
+    let mut dice = Dice::new("sky");
+    let scenes: Vec<Scene> = [0, 1, 6, 30, 90]
+        .into_iter()
+        .cycle()
+        .take(10)
+        .map(|count| {
+            let objects = (0..count).map(|_| dice.object()).collect();
+            dice.scene(objects)
+        })
+        .collect();
+    hold(&scenes);
+}
+
+/// An object of a group of one, moved, turned and scaled.
+fn placed(dice: &mut Dice, object: Object) -> Object {
+    let right_angles = dice.0.bool();
+    let turns = DVec3::from_array(
+        [(); 3].map(|()| if right_angles { f64::from(dice.0.u8(0..4)) } else { dice.within(0.0, 4.0) }),
+    );
+    // Right angles are exact.
+    let (cosine, sine) = (
+        turns
+            .to_array()
+            .map(|turn| if right_angles { [1.0, 0.0, -1.0, 0.0][turn as usize] } else { turn.cos() }),
+        turns
+            .to_array()
+            .map(|turn| if right_angles { [0.0, 1.0, 0.0, -1.0][turn as usize] } else { turn.sin() }),
+    );
+    let x =
+        DMat3::from_cols(DVec3::X, DVec3::new(0.0, cosine[0], sine[0]), DVec3::new(0.0, -sine[0], cosine[0]));
+    let y =
+        DMat3::from_cols(DVec3::new(cosine[1], 0.0, -sine[1]), DVec3::Y, DVec3::new(sine[1], 0.0, cosine[1]));
+    let z =
+        DMat3::from_cols(DVec3::new(cosine[2], sine[2], 0.0), DVec3::new(-sine[2], cosine[2], 0.0), DVec3::Z);
+    let placement = Placement::new(dice.point(1.0), z * y * x, dice.within(0.3, 1.5)).unwrap();
+    let objects: SharedSlice<Object> = vec![object].into();
+    Instance::new(&objects, 0, &Arc::new(placement)).into()
+}
+
+#[test]
+fn groups_are_the_references() {
+    let mut dice = Dice::new("groups");
+    let scenes: Vec<Scene> = [1, 6, 30, 90]
+        .into_iter()
+        .cycle()
+        .take(12)
+        .map(|count| {
+            let objects = (0..count)
+                .map(|_| {
+                    let object = dice.object();
+                    placed(&mut dice, object)
+                })
+                .collect();
+            dice.scene(objects)
+        })
+        .collect();
+    hold(&scenes);
+}
+
+impl Dice {
+    /// A plane, a disc, a cylinder, a cone, a torus, or an object of version 1, any of which may be turned with a group.
+    fn body(&mut self, kinds: u8) -> Object {
+        let at = self.point(3.0);
+        let material = self.material();
+        // Also along the axes and about them.
+        let about = match self.0.u8(0..4) {
+            0 => DVec3::AXES[self.0.usize(0..3)],
+            _ => self.point(1.0),
+        };
+        let length = self.within(0.2, 2.0) / about.length();
+        let radius = self.within(0.1, 0.8);
+        let body: Object = match self.0.u8(0..kinds) {
+            0 => Disc::new(radius, at, about, material).unwrap().into(),
+            1 => Cylinder::new(radius, [at, at + length * about], material).unwrap().into(),
+            2 => {
+                let other = if self.0.bool() { 0.0 } else { self.within(0.0, 1.0) };
+                let radii = if self.0.bool() { [radius, other] } else { [other, radius] };
+                Cone::new(radii, [at, at + length * about], material).unwrap().into()
+            }
+            3 => {
+                let thickness = radius * self.within(0.05, 0.95);
+                Torus::new(radius, thickness, at, about, material).unwrap().into()
+            }
+            4 => Plane::new(2.0 * at, about, material).unwrap().into(),
+            _ => self.object(),
+        };
+        if self.0.u8(0..3) == 0 { placed(self, body) } else { body }
+    }
+
+    fn bodies(&mut self, count: usize, kinds: u8) -> Scene {
+        let objects = (0..count).map(|_| self.body(kinds)).collect();
+        self.scene(objects)
+    }
+
+    /// Beside its suns.
+    fn add_lamps(&mut self, scene: &mut Scene) {
+        let (size, middle) = match scene.camera {
+            Camera::Orthographic => (50.0, DVec3::new(35.0, 35.0, -60.0)),
+            Camera::Pinhole(_) | Camera::Look(_) => (5.0, DVec3::ZERO),
+        };
+        let mut lights = scene.lights.to_vec();
+        for _ in 0..self.0.usize(1..4) {
+            let reach = if self.0.bool() { self.within(0.2, 0.8) * size } else { 0.0 };
+            let lamp = Lamp::new(0.6 * self.color(), middle + self.point(size), 0.0, reach).unwrap();
+            let at = self.0.usize(0..=lights.len());
+            lights.insert(at, Light::Lamp(lamp));
+        }
+        scene.lights = lights.into();
+    }
+}
+
+#[test]
+fn shapes_with_axes_of_their_own_are_the_references() {
+    let mut dice = Dice::new("bodies");
+    let mut scenes: Vec<Scene> = vec![];
+    for (count, kinds) in [(1, 4), (1, 5), (3, 5), (8, 6), (20, 8), (40, 4), (100, 8)] {
+        scenes.extend([(); 3].map(|()| dice.bodies(count, kinds)));
+    }
+    hold(&scenes);
+}
+
+#[test]
+fn lamps_are_the_references() {
+    let mut dice = Dice::new("lamps");
+    let mut scenes: Vec<Scene> = vec![];
+    for (count, kinds) in [(1, 6), (3, 6), (10, 8), (30, 8), (90, 9)] {
+        scenes.extend([(); 2].map(|()| {
+            let mut scene = dice.bodies(count, kinds);
+            dice.add_lamps(&mut scene);
+            scene
+        }));
+    }
+    hold(&scenes);
+}
+
+impl Dice {
+    /// Coefficients with highlights, a pattern, or both.
+    fn finished(&mut self) -> Material {
+        let own = self.material().coefficients();
+        let shine = if self.0.bool() {
+            Some(Shine::new(self.color(), self.within(1.0, 80.0)).unwrap())
+        } else {
+            None
+        };
+        let other = self.material().coefficients();
+        let size = self.within(0.2, 1.0);
+        let weight = match self.0.u8(0..6) {
+            0 => Some(Weight::Checker(size)),
+            1 => Some(Weight::Stripes(size)),
+            2 => Some(Weight::Noise(size)),
+            3 => Some(Weight::Gradient(-size, 2.0 * size)),
+            _ => None,
+        };
+        let pattern = weight.map(|weight| Pattern { weight, other });
+        Material::finished(own, Finish { shine, glass: None, pattern })
+    }
+
+    /// An object of any kind with a finish, in a group or not.
+    fn finished_object(&mut self) -> Object {
+        let (at, about) = (self.point(3.0), self.point(1.0));
+        let end = at + self.within(0.2, 2.0) / about.length() * about;
+        let radius = self.within(0.2, 0.9);
+        let material = self.finished();
+        let floor = DVec3::new(0.0, -2.0, 0.0);
+        let object: Object = match self.0.u8(0..8) {
+            0 => Disc::new(radius, at, about, material).unwrap().into(),
+            1 => Cylinder::new(radius, [at, end], material).unwrap().into(),
+            2 => Cone::new([radius, 0.3], [at, end], material).unwrap().into(),
+            3 => Torus::new(radius, 0.4 * radius, at, about, material).unwrap().into(),
+            4 => Plane::new(floor, DVec3::Y, material).unwrap().into(),
+            5 => Sphere::new(radius, at, material).unwrap().into(),
+            6 => Cuboid::new([at, end], material).unwrap().into(),
+            _ => Triangle::new([at, end, at + self.point(1.5)], material).unwrap().into(),
+        };
+        if self.0.u8(0..3) == 0 { placed(self, object) } else { object }
+    }
+}
+
+#[test]
+fn highlights_and_patterns_are_the_references() {
+    let mut dice = Dice::new("finishes");
+    let mut scenes: Vec<Scene> = vec![];
+    for count in [1, 3, 10, 30, 90] {
+        scenes.extend([(); 2].map(|()| {
+            let objects = (0..count).map(|_| dice.finished_object()).collect();
+            let mut scene = dice.scene(objects);
+            dice.add_lamps(&mut scene);
+            scene
+        }));
+    }
+    hold(&scenes);
+}
+
+fn scripted(view: &str, objects: &str) -> Scene {
+    let text = format!("{view}\n{objects}\nTrace\n");
+    let parsed = parse("scene.txt", text.as_bytes(), &Limits::default());
+    let script = parsed.script.unwrap_or_else(|| panic!("{text}\n{:?}", parsed.diagnostics));
+    script.frame(0).unwrap()
+}
+
+const FROM_THE_FRONT: &str = "Screen 41 41\nLook 0 0 9  0 0 0  50\nBackground 0.1 0.2 0.3  0.5 0.7 0.9\n\
+                              Ilight 0.6 0.6 0.6  -1 -2 -3";
+const PARALLEL: &str =
+    "Screen 41 41\nOrthocamera\nIlight 0.6 0.6 0.6  -1 -2 -3\nPlight 0.3 0.2 0.1  20 30 -10";
+
+/// Places at which a formula that is nearly right is wrong.
+const EDGES: [(&str, &str, &str); 15] = [
+    (
+        "eye in a cylinder",
+        FROM_THE_FRONT,
+        "Cylinder 3  0 -2 8.5  0 2 8.5  0.2 0.1 0.1  0.5 0.5 0.5\nPlight 1 1 1  1 1 8",
+    ),
+    (
+        "eye in a cone",
+        FROM_THE_FRONT,
+        "Cone 3 0.5  0 -2 8.5  0 2 8.5  0.2 0.1 0.1  0.5 0.5 0.5\nPlight 1 1 1  0 1 8",
+    ),
+    (
+        "eye in the tube of a torus",
+        FROM_THE_FRONT,
+        "Torus 9 1  0 0 0  0 1 0  0.2 0.1 0.1  0.5 0.5 0.5\nPlight 1 1 1  9 0 0",
+    ),
+    (
+        "eye in the middle of a torus",
+        FROM_THE_FRONT,
+        "Torus 3 1  0 0 9  0 1 0.3  0.2 0.1 0.1  0.5 0.5 0.5  0.2 0.2 0.2",
+    ),
+    (
+        "eye on a plane",
+        FROM_THE_FRONT,
+        "Plane 0 0 9  0 0 1  1 0 0  0 0 0\nSphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7",
+    ),
+    (
+        "the horizon",
+        FROM_THE_FRONT,
+        "Plane 0 -1 0  0 1 0  0.1 0.1 0.1  0.7 0.7 0.7  0.3 0.3 0.3\nSphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7",
+    ),
+    (
+        "a lamp on the floor",
+        FROM_THE_FRONT,
+        "Plane 0 -1 0  0 1 0  0.1 0.1 0.1  0.7 0.7 0.7\nSphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7\nPlight 1 1 1  2 -1 2  0 3",
+    ),
+    (
+        "a lamp on a ball",
+        FROM_THE_FRONT,
+        "Sphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7\nPlight 1 1 1  0 0 1\nTorus 3 0.5  0 0 0  1 1 1  0.1 0.1 0.1  0.7 0.7 0.7",
+    ),
+    (
+        "a lamp in a ball",
+        FROM_THE_FRONT,
+        "Sphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7\nPlight 1 1 1  0 0 0\nBox -3 -3 -3  3 3 -2  0.1 0.1 0.1  0.7 0.7 0.7",
+    ),
+    ("rays along a cylinder", PARALLEL, "Cylinder 10  20 20 -30  20 20 -60  0.1 0.2 0.3  0.7 0.7 0.7"),
+    ("rays along a cone", PARALLEL, "Cone 10 0  20 20 -60  20 20 -30  0.1 0.2 0.3  0.7 0.7 0.7"),
+    (
+        "rays along and square to tori",
+        PARALLEL,
+        "Torus 10 5  20 20 -30  0 0 1  0.1 0.2 0.3  0.7 0.7 0.7\nTorus 12 3  20 20 -30  0 1 0  0.3 0.2 0.1  0.7 0.7 0.7",
+    ),
+    (
+        "discs edge on",
+        PARALLEL,
+        "Disc 10  20 20 -30  0 1 0  1 0 0  0 0 0\nDisc 10  20 20 -30  1 0 0  1 0 0  0 0 0\nDisc 10  20 20 -40  0 0 1  0 1 0  0 0 0",
+    ),
+    (
+        "lying cylinders touch rays",
+        PARALLEL,
+        "Cylinder 10  5 20 -30  35 20 -30  0.1 0.2 0.3  0.7 0.7 0.7\nCylinder 5  20 5 -60  20 35 -60  0.1 0.2 0.3  0.7 0.7 0.7",
+    ),
+    (
+        "mirrors that face each other",
+        FROM_THE_FRONT,
+        "Plane 0 -1.5 0  0 1 0  0.1 0.1 0.1  0 0 0  0.9 0.9 0.9\nPlane 0 1.5 0  0 1 0  0.1 0.1 0.2  0 0 0  0.9 0.9 0.9\nTorus 1 0.3  0 0 0  0 1 1  0.5 0.2 0.1  0.7 0.7 0.7  0.3 0.3 0.3",
+    ),
+];
+
+#[test]
+fn edges_of_bodies_and_lamps_are_where_the_reference_has_them() {
+    for (name, view, objects) in EDGES {
+        let scene = scripted(view, objects);
+        let expected = reference::render(&scene, &RenderOptions::default()).unwrap();
+        let drawn = draw(&scene, RenderOptions::default());
+        for (x, y, pixel) in drawn.enumerate_pixels() {
+            let wanted = expected.get_pixel(x, y);
+            if (0..3).any(|c| pixel[c].abs_diff(wanted[c]) > 1) {
+                println!("{name}: {pixel:?} and not {wanted:?} at {x}, {y}");
+            }
+        }
+        assert!(off(&expected, &drawn) <= 1, "{name}: {} pixels", off(&expected, &drawn));
+    }
+}
+
+#[test]
+fn a_power_of_two_changes_no_byte() {
+    let mut dice = Dice::new("powers");
+    for count in [1, 5, 20] {
+        let objects: Vec<Object> = (0..count).map(|_| dice.body(8)).collect();
+        let scene = dice.scene(objects);
+        let Camera::Look(look) = scene.camera else { continue };
+        let expected = draw(&scene, RenderOptions::default());
+        for exponent in [-300, -9, 7, 300] {
+            let scale = 2f64.powi(exponent);
+            let mut scaled = scene.clone();
+            scaled.objects = scene.objects.iter().map(|o| o.placed(scale, |p| scale * p).unwrap()).collect();
+            let (eye, target) = (scale * look.eye(), scale * look.target());
+            scaled.camera =
+                Camera::Look(Look::new(eye, target, look.field_of_view(), Some(look.up())).unwrap());
+            assert!(expected == draw(&scaled, RenderOptions::default()), "2^{exponent}");
+        }
+    }
+}
+
+#[test]
+fn a_group_is_its_copy_written_out() {
+    let body = "Cylinder 0.5  0 0 0  0 1 0  0.1 0.2 0.3  0.7 0.7 0.7\nTorus 1 0.25  0 0 0  0 1 0  0.3 0.2 0.3  0.7 0.7 0.7\n\
+                Box 1 0 0  1.5 0.5 2  0.1 0.4 0.3  0.7 0.7 0.7\nCone 0.5 0  -1 0 0  -1 1 0  0.1 0.2 0.6  0.7 0.7 0.7\n\
+                Disc 0.5  0 2 0  0 1 0  0.5 0.2 0.3  0.7 0.7 0.7\nSphere 0.5  1 2 0  0.1 0.2 0.3  0.7 0.7 0.7  0.5 0.5 0.5\n";
+    // (x, y, z) to (1 - 2z, -2 + 2y, 0.5 + 2x): a quarter turn about y, twice the size.
+    let written = "Cylinder 1  1 -2 0.5  1 0 0.5  0.1 0.2 0.3  0.7 0.7 0.7\nTorus 2 0.5  1 -2 0.5  0 1 0  0.3 0.2 0.3  0.7 0.7 0.7\n\
+                   Box 1 -2 2.5  -3 -1 3.5  0.1 0.4 0.3  0.7 0.7 0.7\nCone 1 0  1 -2 -1.5  1 0 -1.5  0.1 0.2 0.6  0.7 0.7 0.7\n\
+                   Disc 1  1 2 0.5  0 1 0  0.5 0.2 0.3  0.7 0.7 0.7\nSphere 1  1 2 2.5  0.1 0.2 0.3  0.7 0.7 0.7  0.5 0.5 0.5\n";
+    let grouped = scripted(FROM_THE_FRONT, &format!("Group g\n{body}End\nUse g  1 -2 0.5  0 -90 0  2"));
+    let written = scripted(FROM_THE_FRONT, written);
+    assert!(draw(&grouped, RenderOptions::default()) == draw(&written, RenderOptions::default()));
+}
+
+#[test]
+fn of_faces_in_one_plane_the_first_is_seen() {
+    // Each covers the middle of the picture at z = 0.3, up to x and y of 0.5 at least.
+    let flat = [
+        "Plane 5 5 0.3  0 0 -7",
+        "Disc 2  0 0 0.3  0 0 1",
+        "Box -2 -2 -2  2 2 0.3",
+        "Box -2 -2 0.3  2 2 0.3",
+        "Cylinder 2  0 0 -1  0 0 0.3",
+        "Cylinder 2  0.1 0 0.3  0.1 0 -5",
+        "Cone 1 2  0 0 -1.1  0 0 0.3",
+        "Cone 2 0  0 0 0.3  0 0 -7",
+        "Triangle -3 -3 0.3  3 -3 0.3  0 3 0.3",
+    ];
+    let grouped = |object: &str| format!("Group g\n{}\nEnd\nUse g  0 0 0  0 0 90", object);
+    let view = "Screen 33 33\nLook 0 0 9  0 0 0.3  6";
+    for one in flat {
+        for other in flat {
+            if one == other {
+                continue;
+            }
+            let (red, green) = (format!("{one}  1 0 0  0 0 0"), format!("{other}  0 1 0  0 0 0"));
+            for objects in [format!("{red}\n{green}"), format!("{red}\n{}", grouped(&green))] {
+                for precision in [Precision::Auto, Precision::F64] {
+                    let scene = scripted(view, &objects);
+                    let drawn = draw(&scene, RenderOptions { precision, ..Default::default() });
+                    assert!(drawn.pixels().all(|pixel| pixel.0 == [255, 0, 0]), "{objects}");
+                }
+            }
+        }
+    }
+}
