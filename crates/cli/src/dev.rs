@@ -18,6 +18,7 @@ use tokio::sync::mpsc::unbounded_channel;
 use crate::console::Console;
 use crate::interrupt;
 use crate::outcome::Outcome;
+use crate::values;
 use news::News;
 
 /// Between two looks at whether to stop.
@@ -49,7 +50,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// How many processes of a function run at once
-    #[arg(long, value_name = "N", default_value = "10", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", default_value = "10", value_parser = values::count::<u16>)]
     concurrency: u16,
     /// Where S3 listens; port 0 stands for any [default: 127.0.0.1:9000, or any port when that is taken]
     #[arg(long, value_name = "IP:PORT")]

@@ -12,6 +12,7 @@ use crate::interrupt;
 use crate::outcome::Outcome;
 use crate::output::OutputFile;
 use crate::survey::Faults;
+use crate::values;
 use crate::wording::number;
 
 /// Split a script with many Traces into one script a frame
@@ -28,7 +29,7 @@ pub(crate) struct Args {
     /// The folder to write to; it is made when it is not there
     dir: PathBuf,
     /// The largest image that a script may ask for, in pixels
-    #[arg(long, value_name = "N", default_value_t = Limits::PIXELS)]
+    #[arg(long, value_name = "N", value_parser = values::count::<u64>, default_value_t = Limits::PIXELS)]
     max_pixels: u64,
 }
 
