@@ -35,9 +35,12 @@ Options:
   -V, --version       Print version
 
 Examples:
-  rayfold render scenes/hello -o hello.gif         render a folder of scripts to an animation
-  rayfold check scenes/hello                       show what is wrong with its scripts
-  rayfold submit scenes/hello --bucket my-bucket   render it in the cloud
+  rayfold render scenes/hello -o hello.gif
+      render a folder of scripts to an animation
+  rayfold check scenes/hello
+      show what is wrong with its scripts
+  rayfold submit scenes/hello --bucket my-bucket
+      render it in the cloud
 
 Exit codes: 0 done, 1 the input or the rendering failed, 2 wrong usage, 130 interrupted.
 

@@ -18,10 +18,14 @@ use crate::wording::number;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  rayfold check scenes/hello                  a folder: its scripts and its animation.json
-  rayfold check scenes/*                      several
-  rayfold check --format json a.txt           for an editor, on standard output
-  cat a.txt | rayfold check -                 a buffer that is not saved
+  rayfold check scenes/hello
+      a folder: its scripts and its animation.json
+  rayfold check scenes/*
+      several
+  rayfold check --format json a.txt
+      for an editor, on standard output
+  cat a.txt | rayfold check -
+      a buffer that is not saved
 
 The JSON document holds the number of files, frames, errors and warnings; `diagnostics`, each with file, line,
 column, span (byte offsets), severity, code, message and, where there is one, expected and help; `unreadable`, the

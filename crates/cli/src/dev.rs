@@ -40,8 +40,10 @@ names; without it those beside rayfold, or on the PATH, or they are built where 
 Stop with Ctrl-C; the data is kept, and the next start goes on where this one was.
 
 Examples:
-  rayfold dev                                            prints what to set in another terminal
-  aws s3 sync scenes/hello s3://rayfold/scripts/hello/   there; the GIF appears below animations/")]
+  rayfold dev
+      prints what to set in another terminal
+  aws s3 sync scenes/hello s3://rayfold/scripts/hello/
+      there; the GIF appears below animations/")]
 pub(crate) struct Args {
     /// What keeps the bucket
     #[arg(long, value_name = "STORE", default_value = StoreKind::BuiltIn.name(), value_parser = stores())]

@@ -149,7 +149,8 @@ fn words(of: &str, done: u64, total: u64, pace: Pace) -> String {
 }
 
 fn remaining(left: Duration) -> String {
-    match left.as_secs() {
+    // Rounded up: as long as there is something to do, something is left.
+    match left.as_secs_f64().ceil() as u64 {
         seconds @ 0..60 => format!(", {seconds} s left"),
         seconds @ 60..3600 => format!(", {} min left", seconds.div_ceil(60)),
         seconds => format!(", {} h {} min left", seconds / 3600, seconds % 3600 / 60),
@@ -191,6 +192,10 @@ mod tests {
     #[test]
     fn paces_are_rounded() {
         let told = |rate, left| words("frames", 1, 2, pace(rate, Duration::from_secs(left)));
+        assert_eq!(
+            words("frames", 1, 2, pace(20.0, Duration::from_millis(2))),
+            "1 of 2 frames, 20 a second, 1 s left"
+        );
         assert_eq!(told(8.66, 59), "1 of 2 frames, 8.7 a second, 59 s left");
         assert_eq!(told(0.05, 61), "1 of 2 frames, 3.0 a minute, 2 min left");
         assert_eq!(told(12.5, 7_265), "1 of 2 frames, 12 a second, 2 h 1 min left");

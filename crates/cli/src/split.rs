@@ -21,8 +21,10 @@ use crate::wording::number;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  rayfold split flight.txt flight        writes flight/flight-001.txt and on
-  rayfold render flight -o flight.gif    draws the same as flight.txt")]
+  rayfold split flight.txt flight
+      writes flight/flight-001.txt and on
+  rayfold render flight -o flight.gif
+      draws the same as flight.txt")]
 pub(crate) struct Args {
     /// The script, or - for standard input
     script: PathBuf,

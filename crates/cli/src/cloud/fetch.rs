@@ -21,9 +21,11 @@ use crate::wording::{Age, Size, number};
 #[command(after_help = "\
 Examples:
   rayfold fetch hello --bucket my-bucket -o hello.gif
-  rayfold fetch hello --bucket my-bucket -o hello.gif --last             while a new one is made
+  rayfold fetch hello --bucket my-bucket -o hello.gif --last
+      while a new one is made
   rayfold fetch hello --bucket my-bucket -o 'frames/%04d.png'
-  rayfold fetch hello --bucket my-bucket -o 'frames/%04d.png' --partial  those that are drawn")]
+  rayfold fetch hello --bucket my-bucket -o 'frames/%04d.png' --partial
+      those that are drawn")]
 pub(crate) struct Args {
     /// The animation
     #[arg(value_parser = parse_animation)]

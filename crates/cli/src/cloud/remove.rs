@@ -14,9 +14,12 @@ use crate::wording::number;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  rayfold remove hello --bucket my-bucket              asks
-  rayfold remove hello --bucket my-bucket --dry-run    shows what would go
-  rayfold remove hello --bucket my-bucket --delete     does not ask")]
+  rayfold remove hello --bucket my-bucket
+      asks
+  rayfold remove hello --bucket my-bucket --dry-run
+      shows what would go
+  rayfold remove hello --bucket my-bucket --delete
+      does not ask")]
 pub(crate) struct Args {
     /// The animation
     #[arg(value_parser = parse_animation)]

@@ -22,10 +22,14 @@ const APART: Duration = Duration::from_secs(2);
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  rayfold status --bucket my-bucket                       all animations
-  rayfold status hello --bucket my-bucket                 one, with what failed and why
-  rayfold status hello --bucket my-bucket --watch         until it is done; exit code 1 if it failed
-  rayfold status hello --bucket my-bucket --format json   for programs, on standard output")]
+  rayfold status --bucket my-bucket
+      all animations
+  rayfold status hello --bucket my-bucket
+      one, with what failed and why
+  rayfold status hello --bucket my-bucket --watch
+      until it is done; exit code 1 if it failed
+  rayfold status hello --bucket my-bucket --format json
+      for programs, on standard output")]
 pub(crate) struct Args {
     /// The animation
     #[arg(value_parser = parse_animation)]

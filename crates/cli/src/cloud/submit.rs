@@ -38,11 +38,16 @@ const LONGEST_NAME_ON_MINIO: usize = 200;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  rayfold submit scenes/hello --bucket my-bucket               writes hello.gif
-  rayfold submit scenes/hello --bucket my-bucket -o a.gif      writes a.gif
-  rayfold submit scenes/hello --bucket my-bucket --no-wait     only uploads
-  rayfold submit shots/7 --bucket my-bucket --name film/7      under a name of its own
-  rayfold submit scenes/hello --bucket my-bucket --dry-run     shows what would be done")]
+  rayfold submit scenes/hello --bucket my-bucket
+      writes hello.gif
+  rayfold submit scenes/hello --bucket my-bucket -o a.gif
+      writes a.gif
+  rayfold submit scenes/hello --bucket my-bucket --no-wait
+      only uploads
+  rayfold submit shots/7 --bucket my-bucket --name film/7
+      under a name of its own
+  rayfold submit scenes/hello --bucket my-bucket --dry-run
+      shows what would be done")]
 pub(crate) struct Args {
     /// The folder
     folder: PathBuf,

@@ -41,8 +41,10 @@ const LEAST_SHOWN: f64 = 0.000_05;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  rayfold cost scenes/hello                                     draws some frames to see how long that takes
-  rayfold cost --frames 50 --ms 180                             50 frames of 512x512
+  rayfold cost scenes/hello
+      draws some frames to see how long that takes
+  rayfold cost --frames 50 --ms 180
+      50 frames of 512x512
   rayfold cost --frames 1000 --ms 1500 --size 1920x1080
   rayfold cost --frames 1000 --ms 750 --memory 3538 --architecture arm64
 

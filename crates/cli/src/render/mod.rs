@@ -42,13 +42,20 @@ use target::{Container, Format, Movie, Pattern, Place, Target};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  rayfold render scenes/hello -o hello.gif             a folder, as an animation
-  rayfold render a.txt b.txt -o ab.gif --fps 25        scripts in the given order
-  rayfold render scenes/hello -o hello.png --frame 7   one frame
-  rayfold render scenes/hello -o 'frames/%04d.png'     each frame: frames/0001.png and on
-  rayfold render my-scene -o my.gif --watch            again whenever a script is saved
-  rayfold render scenes/hello -o - | ffplay -          to another program; see docs/video.md
-  generate | rayfold render - -o out.gif               a script from another program")]
+  rayfold render scenes/hello -o hello.gif
+      a folder, as an animation
+  rayfold render a.txt b.txt -o ab.gif --fps 25
+      scripts in the given order
+  rayfold render scenes/hello -o hello.png --frame 7
+      one frame
+  rayfold render scenes/hello -o 'frames/%04d.png'
+      each frame: frames/0001.png and on
+  rayfold render my-scene -o my.gif --watch
+      again whenever a script is saved
+  rayfold render scenes/hello -o - | ffplay -
+      to another program; see docs/video.md
+  generate | rayfold render - -o out.gif
+      a script from another program")]
 pub(crate) struct Args {
     /// A folder (its *.txt in natural order), script files (in the given order), or - for standard input
     #[arg(required = true)]
