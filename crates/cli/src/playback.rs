@@ -7,7 +7,8 @@ use crate::values;
 /// `--loop`, `--once` and `--final-delay`.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub(crate) struct Playback {
-    /// How often to repeat the animation after it was shown once, 0 for ever [default: what animation.json says, or 0]
+    /// How often to repeat the animation after it was shown once; 0, the default unless an animation.json says otherwise,
+    /// is for ever
     #[arg(long = "loop", value_name = "TIMES", value_parser = values::repetitions, allow_negative_numbers = true)]
     loops: Option<u16>,
     /// Show the animation once: do not repeat it

@@ -206,9 +206,8 @@ async fn fetch_frames(
     client.fetch_frames(&drawn, take).await?;
     let took = progress.finish().as_secs_f64();
     console.note(format_args!(
-        "{} to {}: {}, in {took:.2} s",
-        pattern.path(first.number).display(),
-        pattern.path(last.number).display(),
+        "{}: {}, in {took:.2} s",
+        pattern.range(first.number, last.number),
         number(done, "frame")
     ));
     if !missing.is_empty() {

@@ -295,12 +295,11 @@ fn images(
     );
     let took = progress.finish().as_secs_f64();
     written.with_context(|| format!("{} of {} written", files.into_inner(), number(plan.len(), "frame")))?;
-    let path = |job: Option<Job>| pattern.path(job.map_or(1, |job| job.number));
+    let number_of = |job: Option<Job>| job.map_or(1, |job| job.number);
     let there = if skipped > 0 { format!(" ({skipped} were there)") } else { String::new() };
     console.note(format_args!(
-        "{} to {}: {}{there}, {}, in {took:.2} s",
-        path(plan.jobs().next()).display(),
-        path(plan.jobs().last()).display(),
+        "{}: {}{there}, {}, in {took:.2} s",
+        pattern.range(number_of(plan.jobs().next()), number_of(plan.jobs().last())),
         number(plan.len(), "frame"),
         Size(bytes)
     ));

@@ -54,7 +54,7 @@ pub(crate) fn write(
     movie: Movie,
     fill: impl FnOnce(Push<'_>) -> anyhow::Result<()>,
 ) -> anyhow::Result<Written> {
-    let failed = |source| place_of(place, source);
+    let failed = |source| error_at(place, source);
     let mut out = BufWriter::with_capacity(BUFFER, Sink::open(place)?);
     let mut frames = 0;
     let dropped = {
@@ -152,13 +152,13 @@ impl From<rayfold_gif::Error> for Failure {
 impl Failure {
     fn at(self, place: &Place) -> MovieError {
         match self {
-            Self::Write(source) => place_of(place, source),
+            Self::Write(source) => error_at(place, source),
             Self::Gif(error) => MovieError::Gif(error),
         }
     }
 }
 
-fn place_of(place: &Place, source: io::Error) -> MovieError {
+fn error_at(place: &Place, source: io::Error) -> MovieError {
     match place {
         Place::File(path) => OutputError::Io { path: path.clone(), source }.into(),
         Place::StandardOutput if source.kind() == io::ErrorKind::BrokenPipe => MovieError::Closed,

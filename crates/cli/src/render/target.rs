@@ -164,6 +164,16 @@ impl Pattern {
             .with_context(|| format!("cannot make the folder {}", folder.display()))
     }
 
+    /// The files of frames `first` to `last`, for people.
+    pub(crate) fn range(&self, first: u64, last: u64) -> String {
+        let (from, to) = (self.path(first), self.path(last));
+        if first == last {
+            from.display().to_string()
+        } else {
+            format!("{} to {}", from.display(), to.display())
+        }
+    }
+
     /// The file of frame `number`, counted from 1.
     pub(crate) fn path(&self, number: u64) -> PathBuf {
         self.folder.join(format!("{}{number:0width$}{}", self.before, self.after, width = self.digits))
@@ -250,6 +260,10 @@ mod tests {
         assert_eq!(pattern.path(1), Path::new("frames/a0001.png"));
         assert_eq!(pattern.path(12345), Path::new("frames/a12345.png"));
         assert_eq!(images("%d.tiff").path(10), Path::new("10.tiff"));
+        assert_eq!(
+            (pattern.range(9, 9), images("%d.png").range(1, 3)),
+            ("frames/a0009.png".into(), "1.png to 3.png".into())
+        );
         assert_eq!(images("%3d.tiff").path(10), Path::new("010.tiff"));
     }
 
