@@ -113,8 +113,8 @@ async fn a_submitted_folder_becomes_the_gif_that_render_makes() {
         cloud.write("film/f2.txt", scene(13.0));
         cloud.write("film/f11.txt", scene(20.0));
         cloud.delete("film/f1.txt");
-        let said = cloud.says("submit film", 0);
-        assert!(said.contains("1 script no longer in the folder, deleted"), "{said}");
+        let said = cloud.says("submit film --delete", 0);
+        assert!(said.contains("1 script that the folder does not have: deleted"), "{said}");
         assert!(said.contains("2 scripts uploaded") && said.contains("unchanged"), "{said}");
         cloud.rayfold("render film -o local.gif", 0);
         assert!(cloud.read("film.gif") == cloud.read("local.gif"), "the GIF is not the local one");
@@ -163,14 +163,21 @@ async fn removing_leaves_nothing_of_an_animation_and_everything_of_others() {
         cloud.rayfold("submit b --name film/two", 0);
         let said = cloud.says("submit b/f.txt", 2);
         assert!(said.contains("b/f.txt is a file: expected a folder"), "{said}");
-        let said = cloud.says("remove film", 0);
+        let said = cloud.says("remove film --delete", 0);
         assert!(said.starts_with("film: ") && said.contains("removed"), "{said}");
         cloud.stage.settle().await;
         let left = cloud.keys("").await;
         assert!(!left.is_empty() && left.iter().all(|key| key.contains("film/two")), "{left:?}");
         let table = cloud.prints("status");
         assert!(table.starts_with("film/two  done       2 of 2 frames"), "{table}");
-        for command in ["remove film", "status film", "fetch film -o film.gif", "retry film"] {
+        for command in [
+            "remove film",
+            "remove film --delete",
+            "status film",
+            "status film --watch",
+            "fetch film -o film.gif",
+            "retry film",
+        ] {
             let said = cloud.says(command, 1);
             assert_eq!(
                 said,
@@ -221,6 +228,132 @@ async fn what_fails_in_the_cloud_is_named_with_its_reason() {
         cloud.rayfold("submit film", 0);
         cloud.rayfold("render film -o local.gif", 0);
         assert!(cloud.read("film.gif") == cloud.read("local.gif"), "the GIF is not the local one");
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn watching_an_animation_that_does_not_exist_never_ended() {
+    on_every_store(async |store| {
+        let cloud = cloud(store, |_| {}).await;
+        let start = Instant::now();
+        let said = cloud.says("status nothing --watch", 1);
+        assert_eq!(
+            said,
+            format!("error: there is no animation nothing in {}\n", cloud.stage.store().bucket())
+        );
+        assert!(start.elapsed() < PATIENCE);
+        // An upload that begins a moment later is waited for.
+        let watching = cloud.command("status film --watch").stdout(Stdio::piped()).spawn().unwrap();
+        tokio::time::sleep(Duration::from_millis(500)).await;
+        cloud.stage.put("scripts/film/f1.txt", scene(8.0)).await;
+        let output = watching.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        let table = String::from_utf8(output.stdout).unwrap();
+        assert!(
+            table.lines().last().unwrap().starts_with("film  done       1 of 1 frame, GIF of "),
+            "{table}"
+        );
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_last_gif_was_denied_while_it_was_being_replaced() {
+    on_every_store(async |store| {
+        let mut cloud = cloud(store, |_| {}).await;
+        cloud.write("film/f1.txt", scene(8.0));
+        cloud.write("film/f2.txt", scene(9.0));
+        cloud.rayfold("submit film", 0);
+        // The beginning of an upload of three frames.
+        cloud.stage.put("scripts/film/animation.json", "{\"frames\": 3}").await;
+        cloud.stage.until("film", Status::Waiting).await;
+        let table = cloud.prints("status film");
+        assert!(table.starts_with("film  waiting    2 of 3 frames, last GIF of "), "{table}");
+        assert!(table.ends_with(" old\n"), "{table}");
+        let report: serde_json::Value =
+            serde_json::from_str(&cloud.prints("status film --format json")).unwrap();
+        let gif = &report["animations"][0]["gif"];
+        assert!(gif["current"] == false && gif["modified_ms"].as_u64() > Some(1_000_000_000_000), "{gif}");
+        let said = cloud.says("fetch film -o last.gif", 1);
+        assert!(said.contains("waiting (2 of 3 frames); --last fetches the one before, of "), "{said}");
+        let said = cloud.says("fetch film -o last.gif --last", 0);
+        assert!(said.contains(" old and shows older scripts: film is waiting (2 of 3 frames)"), "{said}");
+        assert!(cloud.read("last.gif") == cloud.read("film.gif"), "not the last GIF");
+        cloud.says("fetch film -o %d.png --last", 2);
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn one_failed_frame_kept_the_others_from_being_fetched() {
+    on_every_store(async |store| {
+        let mut cloud = cloud(store, |_| {}).await;
+        for (name, x) in [("f1", 8.0), ("f2", 9.0), ("f3", 10.0)] {
+            cloud.write(&format!("film/{name}.txt"), scene(x));
+        }
+        cloud.rayfold("submit film", 0);
+        cloud.rayfold("render film -o local%d.png", 0);
+        cloud.stage.put("scripts/film/f2.txt", "Spere 1\n").await;
+        cloud.stage.until("film", Status::Failed).await;
+        let said = cloud.says("fetch film -o f/%d.png", 1);
+        assert!(said.ends_with("f2.txt is not drawn; --partial fetches 2 other frames\n"), "{said}");
+        assert!(!cloud.folder.path().join("f").exists(), "nothing to put into it");
+        let said = cloud.says("fetch film -o f/%d.png --partial", 0);
+        assert!(said.starts_with("f/1.png to f/3.png: 2 frames, in "), "{said}");
+        assert!(said.ends_with("warning: not drawn, and not fetched: f2.txt\n"), "{said}");
+        for number in [1, 3] {
+            let image = |name: String| image::load_from_memory(&cloud.read(&name)).unwrap();
+            assert_eq!(image(format!("f/{number}.png")), image(format!("local{number}.png")));
+        }
+        assert!(!cloud.folder.path().join("f/2.png").exists());
+        cloud.says("fetch film -o film.gif --partial", 2);
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn scripts_of_others_were_deleted_unasked() {
+    on_every_store(async |store| {
+        let mut cloud = cloud(store, |_| {}).await;
+        let bucket = cloud.stage.store().bucket().to_owned();
+        cloud.write("mine/f1.txt", scene(8.0));
+        cloud.write("theirs/f2.txt", scene(9.0));
+        cloud.write("theirs/f3.txt", scene(9.5));
+        cloud.rayfold("submit theirs --name film", 0);
+        cloud.stage.until("film", Status::Done).await;
+        let before = cloud.keys("").await;
+        let said = cloud.says("submit mine --name film", 1);
+        assert_eq!(
+            said,
+            format!(
+                "error: there are 2 scripts in s3://{bucket}/scripts/film/ that mine does not have: f2.txt, f3.txt; \
+                 nothing was uploaded: give --delete to delete them, or --name to submit another animation\n"
+            )
+        );
+        let output = cloud.rayfold("submit mine --name film --dry-run", 0);
+        let shown = String::from_utf8(output.stdout).unwrap();
+        let expected = [
+            "upload scripts/film/animation.json",
+            "upload scripts/film/f1.txt",
+            "delete scripts/film/f2.txt",
+            "delete scripts/film/f3.txt",
+        ];
+        assert_eq!(shown.lines().collect::<Vec<_>>(), expected);
+        let said = cloud.says("remove film", 1);
+        assert!(said.contains("film has 3 uploaded files and ") && said.contains("nothing was removed"), "{said}");
+        let shown = cloud.prints("remove film --dry-run");
+        let mut listed: Vec<&str> = shown.lines().map(|line| line.strip_prefix("delete ").unwrap()).collect();
+        listed.sort_unstable();
+        assert_eq!(listed, before.iter().map(String::as_str).collect::<Vec<_>>());
+        assert_eq!(cloud.keys("").await, before, "something was changed");
+
+        cloud.rayfold("submit mine --name film --delete", 0);
+        let scripts = cloud.keys("scripts/").await;
+        assert_eq!(scripts, ["scripts/film/animation.json", "scripts/film/f1.txt"]);
+        cloud.rayfold("remove film --delete", 0);
+        cloud.stage.settle().await;
+        assert!(cloud.keys("scripts/").await.is_empty());
     })
     .await;
 }

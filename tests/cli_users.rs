@@ -98,7 +98,7 @@ async fn each_kind_of_user_can_do_what_its_name_says_and_no_more() {
         {
             let uploader = User::new(&stage, "uploader").await;
             uploader.cannot("retry film --all");
-            uploader.cannot("remove film");
+            uploader.cannot("remove film --delete");
             let viewer = User::new(&stage, "viewer").await;
             assert!(viewer.can("status").contains("film"));
             viewer.can("status film");
@@ -109,7 +109,7 @@ async fn each_kind_of_user_can_do_what_its_name_says_and_no_more() {
             viewer.write("film/f2.txt", &scene(7.0));
             viewer.cannot("submit film");
             viewer.cannot("retry film --all");
-            viewer.cannot("remove film");
+            viewer.cannot("remove film --delete");
         }
         stage.settle().await;
         assert_eq!(objects(&stage).await, before, "what was denied has changed something");
@@ -127,7 +127,7 @@ async fn each_kind_of_user_can_do_what_its_name_says_and_no_more() {
         stage.until("film", Status::Done).await;
         {
             let operator = User::new(&stage, "operator").await;
-            operator.can("remove film");
+            operator.can("remove film --delete");
         }
         stage.settle().await;
         let left: Vec<_> = objects(&stage).await.into_iter().map(|(key, _)| key).collect();

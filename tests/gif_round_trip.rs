@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use image::{Rgb, RgbImage};
-use rayfold_gif::{Encoder, Error, Settings, Summary};
+use rayfold_gif::{Encoder, Error, Plays, Settings, Summary};
 
 fn encode(frames: &[RgbImage], settings: Settings) -> Result<(Vec<u8>, Summary), Error> {
     let mut bytes = Vec::new();
@@ -199,12 +199,31 @@ fn too_many_frames_a_second_are_dropped_and_counted() {
 
 #[test]
 fn repeats_as_often_as_asked() {
-    let repeat = |loops| {
-        let (bytes, _) = encode(&[RgbImage::new(2, 2)], Settings { loops, ..Settings::default() }).unwrap();
-        gif::DecodeOptions::new().read_info(&bytes[..]).unwrap().repeat()
-    };
-    assert_eq!(repeat(0), gif::Repeat::Infinite);
-    assert_eq!(repeat(7), gif::Repeat::Finite(7));
+    let bytes = |plays| encode(&[RgbImage::new(2, 2)], Settings { plays, ..Settings::default() }).unwrap().0;
+    let repeat = |plays| gif::DecodeOptions::new().read_info(&bytes(plays)[..]).unwrap().repeat();
+    assert_eq!(repeat(Plays::Endless), gif::Repeat::Infinite);
+    assert_eq!(repeat(Plays::repeated(0)), gif::Repeat::Infinite);
+    assert_eq!(repeat(Plays::repeated(7)), gif::Repeat::Finite(7));
+    // The decoder says 0 repetitions both of a file that says so (for ever) and of one that says nothing.
+    let says = |bytes: &[u8]| bytes.windows(11).any(|word| word == b"NETSCAPE2.0");
+    assert!(says(&bytes(Plays::Endless)) && !says(&bytes(Plays::Once)));
+}
+
+#[test]
+fn the_last_frame_stays_as_long_as_asked() {
+    for fps in [10.0, 80.0] {
+        let frames = (0..9).map(|k| ball(40, 30, k)).collect::<Vec<_>>();
+        let delays = |last_delay_cs| {
+            let (bytes, summary) =
+                encode(&frames, Settings { fps, last_delay_cs, ..Settings::default() }).unwrap();
+            let delays: Vec<u16> = decode(&bytes).iter().map(|(_, delay)| *delay).collect();
+            assert_eq!(summary.duration_cs, delays.iter().map(|delay| u64::from(*delay)).sum::<u64>());
+            delays
+        };
+        let (mut plain, held) = (delays(None), delays(Some(250)));
+        *plain.last_mut().unwrap() = 250;
+        assert_eq!(held, plain, "{fps} frames a second");
+    }
 }
 
 #[test]

@@ -144,7 +144,7 @@ fn script(x: u32, traces: usize) -> String {
 /// What rendering the same scripts in one process gives.
 fn local_gif(scripts: &[String], fps: f64) -> Vec<u8> {
     let mut file = Vec::new();
-    let settings = rayfold_gif::Settings { fps, loops: 0 };
+    let settings = rayfold_gif::Settings::new(fps, 0);
     let mut encoder = rayfold_gif::Encoder::new(&mut file, settings).unwrap();
     for script in scripts {
         let parsed = rayfold_scene::parse("x.txt", script.as_bytes(), &rayfold_scene::Limits::default());

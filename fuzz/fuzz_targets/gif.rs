@@ -80,7 +80,7 @@ fuzz_target!(|data: &[u8]| {
     let width = u32::from(animation.width) % 1000 + 1;
     let height = u32::from(animation.height) % (PIXELS / width).clamp(1, 1000) + 1;
     let fps = f64::from(animation.pace % 20_000) / 100.0;
-    let settings = Settings { fps, loops: animation.loops };
+    let settings = Settings::new(fps, animation.loops);
 
     let mut bytes = Vec::new();
     let Ok(mut encoder) = Encoder::new(&mut bytes, settings.clone()) else {

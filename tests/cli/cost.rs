@@ -12,14 +12,12 @@ fn an_estimate_for_people() {
 Prices of us-east-1 on 2026-03-14, in USD, free allowances left out
 
 Making it, once
-  Lambda: invocations                        51       0.0000
   Lambda: rendering                 15.548 GB-s       0.0003
-  Lambda: assembling                 5.248 GB-s       0.0001
+  Lambda: assembling                 4.093 GB-s       0.0001
   S3: puts and lists                        303       0.0015
   S3: gets                                  250       0.0001
-  Logs                                 0.000 GB       0.0000
-  Traces                                  2.550       0.0000
   Downloading the GIF once             0.001 GB       0.0001
+  What costs less than 0.0001                         0.0001
   Together                                            0.0021
 
 Keeping it, each month
@@ -37,6 +35,10 @@ The stack, each month, however many animations
   S3: lists of the sweep                  5,760       0.0288
   Reading the failure queue             648,000       0.2592
   Together                                            5.7620
+
+Total
+  The first month                                     5.7959
+  Each month after                                    5.7938
 
 "#]]);
 }
@@ -105,6 +107,10 @@ fn nonsense_is_wrong_usage() {
     let folder = Folder::new();
     for flags in [
         "",
+        "--frames 1",
+        "--ms 1",
+        "scenes --frames 1 --ms 1",
+        "scenes --size 4x3",
         "--frames 0 --ms 1",
         "--frames 1 --ms 0",
         "--frames 1 --ms -3",

@@ -10,9 +10,14 @@ mod cost;
 mod encode;
 mod images;
 mod interrupted;
+mod movies;
+mod newcomer;
+mod pages;
 mod render;
 mod split;
 mod usage;
+#[cfg(unix)]
+mod watch;
 
 use std::path::{Path, PathBuf};
 

@@ -29,14 +29,18 @@ Commands:
 
 Options:
   -q, --quiet         Say nothing but errors
-      --color <WHEN>  When to write in colour [default: auto]
+      --color <WHEN>  When to write in colour; auto: on a terminal, unless NO_COLOR is set [default:
+                      auto] [possible values: auto, always, never]
   -h, --help          Print help
   -V, --version       Print version
 
 Examples:
-  rayfold render scenes/hello -o hello.gif         render a folder of scripts to an animation
-  rayfold check scenes/hello                       show what is wrong with its scripts
-  rayfold submit scenes/hello --bucket my-bucket   render it in the cloud
+  rayfold render scenes/hello -o hello.gif
+      render a folder of scripts to an animation
+  rayfold check scenes/hello
+      show what is wrong with its scripts
+  rayfold submit scenes/hello --bucket my-bucket
+      render it in the cloud
 
 Exit codes: 0 done, 1 the input or the rendering failed, 2 wrong usage, 130 interrupted.
 
@@ -102,11 +106,11 @@ For more information, try '--help'.
 fn unknown_output_ending() {
     let folder = Folder::with("a.txt", BALL);
     folder.rayfold("render a.txt -o a.jpg").assert().code(2).stderr_eq(str![[r#"
-error: cannot tell from its ending what a.jpg should be: expected .gif for an animation, .png, .tif or .tiff for one frame, or a pattern such as frames/%04d.png for many
+error: cannot tell from its ending what a.jpg should be: expected .gif, .apng or .y4m for an animation, .png, .tif or .tiff for one frame, or a pattern such as frames/%04d.png for many
 
 "#]]);
     folder.rayfold("render a.txt -o a").assert().code(2).stderr_eq(str![[r#"
-error: cannot tell from its ending what a should be: expected .gif for an animation, .png, .tif or .tiff for one frame, or a pattern such as frames/%04d.png for many
+error: cannot tell from its ending what a should be: expected .gif, .apng or .y4m for an animation, .png, .tif or .tiff for one frame, or a pattern such as frames/%04d.png for many
 
 "#]]);
     assert_eq!(folder.list("."), ["a.txt"]);
@@ -116,7 +120,7 @@ error: cannot tell from its ending what a should be: expected .gif for an animat
 fn many_frames_for_one_image() {
     let folder = Folder::with("a.txt", BALL.to_owned() + "Trace");
     folder.rayfold("render a.txt -o a.png").assert().code(1).stderr_eq(str![[r#"
-error: 2 frames do not fit into a.png: expected --frame N, a pattern such as %04d.png, or .gif
+error: 2 frames do not fit into a.png: expected --frame N, a pattern such as frames/%04d.png, or .gif
 
 "#]]);
 }
@@ -169,13 +173,13 @@ error: --fps 0: `fps` must be from 0.01 to 1000
 
 "#]]);
     folder.rayfold("render a.txt -o a.gif --threads 0").assert().code(2).stderr_eq(str![[r#"
-error: invalid value '0' for '--threads <N>': number would be zero for non-zero type
+error: invalid value '0' for '--threads <N>': expected a whole number, 1 or more
 
 For more information, try '--help'.
 
 "#]]);
     folder.rayfold("render a.txt -o a.png --fps 20").assert().code(2).stderr_eq(str![[r#"
-error: --fps and --loop are for animations: expected an output that ends in .gif
+error: --fps, --loop, --once and --final-delay are for animations: expected an output that ends in .gif or .apng
 
 "#]]);
 }

@@ -259,7 +259,7 @@ pub fn locally(files: &[(&str, String)]) -> Vec<u8> {
     }
     scripts.sort_by(|(a, _), (b, _)| natural_cmp(a, b));
     let mut gif = Vec::new();
-    let settings = rayfold_gif::Settings { fps: settings.fps(), loops: settings.loops() };
+    let settings = rayfold_gif::Settings::new(settings.fps(), settings.loops());
     let mut encoder = rayfold_gif::Encoder::new(&mut gif, settings).unwrap();
     for (_, script) in &scripts {
         for scene in script.frames() {

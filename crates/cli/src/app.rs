@@ -22,9 +22,12 @@ use crate::{check, completions, cost, encode, interrupt, render, split};
     arg_required_else_help = true,
     after_help = "\
 Examples:
-  rayfold render scenes/hello -o hello.gif         render a folder of scripts to an animation
-  rayfold check scenes/hello                       show what is wrong with its scripts
-  rayfold submit scenes/hello --bucket my-bucket   render it in the cloud
+  rayfold render scenes/hello -o hello.gif
+      render a folder of scripts to an animation
+  rayfold check scenes/hello
+      show what is wrong with its scripts
+  rayfold submit scenes/hello --bucket my-bucket
+      render it in the cloud
 
 Exit codes: 0 done, 1 the input or the rendering failed, 2 wrong usage, 130 interrupted."
 )]
@@ -40,8 +43,8 @@ struct Global {
     /// Say nothing but errors
     #[arg(long, short, global = true)]
     quiet: bool,
-    /// When to write in colour
-    #[arg(long, global = true, value_name = "WHEN", default_value = "auto", hide_possible_values = true)]
+    /// When to write in colour; auto: on a terminal, unless NO_COLOR is set
+    #[arg(long, global = true, value_name = "WHEN", value_enum, default_value_t)]
     color: Color,
 }
 

@@ -2,29 +2,36 @@
 
 use std::path::PathBuf;
 
-use rayfold_scene::{Diagnostic, Language, Limits, SETTINGS_FILE};
+use rayfold_scene::{Diagnostic, Language, Limits, SETTINGS_FILE, Severity};
 use serde::Serialize;
 
 use crate::console::{Console, Format, describe};
 use crate::input::Input;
 use crate::outcome::Outcome;
-use crate::survey::{Faults, parse_all};
+use crate::plan::{Plan, Wishes};
+use crate::survey::{Conflict, Faults};
 use crate::threads::Threads;
+use crate::values;
 use crate::wording::number;
 
 /// Show what is wrong with scripts, without rendering them
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  rayfold check scenes/hello                  a folder: its scripts and its animation.json
-  rayfold check scenes/*                      several
-  rayfold check --format json a.txt           for an editor, on standard output
-  cat a.txt | rayfold check -                 a buffer that is not saved
+  rayfold check scenes/hello
+      a folder: its scripts and its animation.json
+  rayfold check scenes/*
+      several
+  rayfold check --format json a.txt
+      for an editor, on standard output
+  cat a.txt | rayfold check -
+      a buffer that is not saved
 
 The JSON document holds the number of files, frames, errors and warnings; `diagnostics`, each with file, line,
 column, span (byte offsets), severity, code, message and, where there is one, expected and help; `unreadable`, the
-files that could not be read; and `language`, the table of the scene language: its commands, the clauses of materials
-and the modes of curves, each number with its name, kind, unit, range and default.")]
+files that could not be read; `conflicts`, why scripts that are fine by themselves are no animation together, each
+with its input, severity and message; and `language`, the table of the scene language: its commands, the clauses of
+materials and the modes of curves, each number with its name, kind, unit, range and default.")]
 pub(crate) struct Args {
     /// Folders, script files, animation.json, or - for standard input
     #[arg(required = true)]
@@ -33,7 +40,7 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value_t)]
     format: Format,
     /// The largest image that a script may ask for, in pixels
-    #[arg(long, value_name = "N", default_value_t = Limits::PIXELS)]
+    #[arg(long, value_name = "N", value_parser = values::count::<u64>, default_value_t = Limits::PIXELS)]
     max_pixels: u64,
     #[command(flatten)]
     threads: Threads,
@@ -42,12 +49,13 @@ pub(crate) struct Args {
 #[derive(Serialize)]
 struct Report<'a> {
     files: usize,
-    frames: usize,
+    frames: u64,
     errors: usize,
     warnings: usize,
     diagnostics: &'a [Diagnostic],
     unreadable: Vec<String>,
     language: Language,
+    conflicts: &'a [Conflict],
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
@@ -62,7 +70,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         faults.settings(path);
     }
     let mut frames = 0;
-    for input in Input::each(&inputs, &limits) {
+    for (path, input) in inputs.iter().zip(Input::each(&inputs, &limits)) {
         let input = match input {
             Ok(input) => input,
             Err(error) => {
@@ -70,17 +78,19 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
                 continue;
             }
         };
-        if let Some(path) = &input.settings {
-            faults.settings(path);
-        }
-        let found = parse_all(&input.scripts, &limits, |_, parsed| {
-            let mut faults = Faults::default();
-            let frames = faults.script(parsed).map_or(0, |script| script.frame_count());
-            (faults, frames)
-        })?;
-        for (found, count) in found {
-            faults.add(found);
-            frames += count;
+        let (found, plan) = Plan::survey(&input, &limits, &Wishes::default())?;
+        faults.add(found);
+        match plan {
+            None => {}
+            Some(Err(error)) => faults.conflict(path, Severity::Error, &error),
+            Some(Ok(plan)) => {
+                frames += plan.len();
+                if let Err(error) = plan.one_size() {
+                    // A script of unlike frames cannot be an animation, but it can be pictures.
+                    let severity = if path.is_dir() { Severity::Error } else { Severity::Warning };
+                    faults.conflict(path, severity, &error);
+                }
+            }
         }
     }
     match args.format {
@@ -94,25 +104,26 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
                 diagnostics: &faults.diagnostics,
                 unreadable: faults.unreadable.iter().map(describe).collect(),
                 language: rayfold_scene::language(),
+                conflicts: &faults.conflicts,
             };
             let mut text = serde_json::to_vec_pretty(&report)?;
             text.push(b'\n');
             console.print(text)?;
         }
     }
-    Ok(if faults.bad > 0 { Outcome::Failed } else { Outcome::Done })
+    Ok(if faults.errors() > 0 { Outcome::Failed } else { Outcome::Done })
 }
 
-fn tell(faults: &Faults, frames: usize, console: &Console) {
+fn tell(faults: &Faults, frames: u64, console: &Console) {
     faults.show(console);
     let warnings = match faults.warnings() {
         0 => String::new(),
         n => format!(", {}", number(n as u64, "warning")),
     };
-    if faults.bad > 0 {
+    if faults.errors() > 0 {
         console.note(format_args!("{}{warnings}", faults.count()));
     } else {
         let files = number(faults.files as u64, "file");
-        console.note(format_args!("{files}, {}: no errors{warnings}", number(frames as u64, "frame")));
+        console.note(format_args!("{files}, {}: no errors{warnings}", number(frames, "frame")));
     }
 }

@@ -10,12 +10,9 @@ use clap::ValueEnum;
 /// When to write in colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Color {
-    /// On a terminal, unless NO_COLOR is set
     #[default]
     Auto,
-    /// Always
     Always,
-    /// Never
     Never,
 }
 
@@ -85,8 +82,27 @@ impl Console {
         self.say(format_args!("{}: {}: {}", self.label(), visible(what), visible(why)));
     }
 
+    /// Something that may not be what was meant, unless they asked for quiet.
+    pub(crate) fn warn(&self, text: impl std::fmt::Display) {
+        if !self.quiet {
+            let label = if self.color { "\x1b[1;33mwarning\x1b[0m" } else { "warning" };
+            self.say(format_args!("{label}: {}", visible(&text.to_string())));
+        }
+    }
+
     fn label(&self) -> &'static str {
         if self.color { "\x1b[1;31merror\x1b[0m" } else { "error" }
+    }
+
+    /// Somebody sits at a terminal who sees what is said here and can answer.
+    pub(crate) fn can_ask(&self) -> bool {
+        std::io::stdin().is_terminal() && std::io::stderr().is_terminal()
+    }
+
+    /// A question, which the cursor stays behind.
+    pub(crate) fn ask(&self, question: &str) {
+        let mut err = std::io::stderr().lock();
+        let _ = write!(err, "{question} ").and_then(|()| err.flush());
     }
 
     /// Diagnostics and other text that must be seen. There is nowhere left to report that standard error is gone.

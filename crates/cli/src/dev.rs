@@ -18,6 +18,7 @@ use tokio::sync::mpsc::unbounded_channel;
 use crate::console::Console;
 use crate::interrupt;
 use crate::outcome::Outcome;
+use crate::values;
 use news::News;
 
 /// Between two looks at whether to stop.
@@ -39,8 +40,10 @@ names; without it those beside rayfold, or on the PATH, or they are built where 
 Stop with Ctrl-C; the data is kept, and the next start goes on where this one was.
 
 Examples:
-  rayfold dev                                            prints what to set in another terminal
-  aws s3 sync scenes/hello s3://rayfold/scripts/hello/   there; the GIF appears below animations/")]
+  rayfold dev
+      prints what to set in another terminal
+  aws s3 sync scenes/hello s3://rayfold/scripts/hello/
+      there; the GIF appears below animations/")]
 pub(crate) struct Args {
     /// What keeps the bucket
     #[arg(long, value_name = "STORE", default_value = StoreKind::BuiltIn.name(), value_parser = stores())]
@@ -49,7 +52,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// How many processes of a function run at once
-    #[arg(long, value_name = "N", default_value = "10", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", default_value = "10", value_parser = values::count::<u16>)]
     concurrency: u16,
     /// Where S3 listens; port 0 stands for any [default: 127.0.0.1:9000, or any port when that is taken]
     #[arg(long, value_name = "IP:PORT")]

@@ -1,21 +1,25 @@
 //! `rayfold encode`: images that are already there to an animation.
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use image::{DynamicImage, ImageFormat, ImageReader, Rgb, RgbImage};
-use rayfold_gif::{Encoder, Error, Settings};
+use rayfold_gif::{Encoder, Plays, Settings};
+use rayfold_scene::natural_cmp;
 
 use crate::ahead;
 use crate::console::Console;
 use crate::interrupt;
 use crate::outcome::{Outcome, Usage};
-use crate::output::{OutputError, OutputFile, probe};
+use crate::output::probe;
+use crate::playback::Playback;
 use crate::progress::Progress;
-use crate::render::tell;
+use crate::render::movie::{self, MovieError};
+use crate::render::target::{Container, Movie, Place, must_be_gif};
 use crate::threads::Threads;
+use crate::values;
 use crate::wording::number;
 
 /// Files at fault that are named, at most.
@@ -31,75 +35,100 @@ const AHEAD: u64 = 14 << 20;
 #[command(after_help = "\
 Examples:
   rayfold encode frames/*.png -o hello.gif
-  rayfold encode a.png b.png a.png -o blink.gif --fps 2 --loop 3")]
+  rayfold encode a.png b.png a.png --no-sort -o blink.gif --fps 2 --loop 3")]
 pub(crate) struct Args {
-    /// PNG or TIFF files, in the order in which they are shown
+    /// PNG or TIFF files; they are shown in natural order of their names: f2.png before f10.png
     #[arg(required = true, value_name = "FRAME")]
     frames: Vec<PathBuf>,
     /// The GIF to write
-    #[arg(long, short, value_name = "OUT")]
+    #[arg(long, short, value_name = "OUT.gif")]
     output: PathBuf,
+    /// Show the files in the order in which they are given
+    #[arg(long)]
+    no_sort: bool,
     /// Frames a second; above 50 some are left out, because a GIF cannot show them
-    #[arg(long, value_name = "N", default_value_t = Settings::default().fps, allow_negative_numbers = true)]
+    #[arg(long, value_name = "RATE", default_value_t = Settings::default().fps, value_parser = values::rate, allow_negative_numbers = true)]
     fps: f64,
-    /// How often to repeat; 0 is for ever
-    #[arg(long = "loop", value_name = "TIMES", default_value_t = Settings::default().loops, allow_negative_numbers = true)]
-    loops: u16,
+    #[command(flatten)]
+    playback: Playback,
     #[command(flatten)]
     threads: Threads,
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
-    let path = &args.output;
-    if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gif")) {
-        let message = format!("cannot write {}: its name does not end in .gif", path.display());
-        return Err(Usage(message).into());
-    }
-    probe(path)?;
+    must_be_gif(&args.output)?;
+    probe(&args.output)?;
+    let fps = args.fps;
+    Encoder::new(std::io::sink(), Settings { fps, ..Settings::default() })
+        .map_err(|error| Usage(format!("--fps {fps}: {error}")))?;
     check(&args.frames, console)?;
+    let files = in_order(args, console);
     args.threads.start()?;
-    let mut out = BufWriter::with_capacity(1 << 16, OutputFile::create(path)?);
-    let settings = Settings { fps: args.fps, loops: args.loops };
-    let mut encoder =
-        Encoder::new(&mut out, settings).map_err(|error| Usage(format!("--fps {}: {error}", args.fps)))?;
-    let mut progress = Progress::start(console, "frames", args.frames.len() as u64);
-    let window = window(&args.frames)?;
-    let (mut frames, mut done) = (args.frames.iter(), 0);
-    let take = |image| {
-        anyhow::ensure!(!interrupt::stopping(), "interrupted");
-        let frame = frames.next().context("a file for each image")?;
-        encoder.push(image).map_err(|error| explain(error, frame, path))?;
-        done += 1;
-        progress.set(console, done);
-        Ok(())
+    let movie = Movie {
+        size: size(&files)?,
+        frames: files.len() as u64,
+        fps,
+        plays: args.playback.plays(Plays::Endless),
+        last_delay_cs: args.playback.last_delay_cs(),
     };
-    // On a thread of the pool: it need not wait for another one to encode.
-    rayon::scope(|_| ahead::in_order(args.frames.iter(), window, |frame| read(frame), take))?;
-    let summary = encoder.finish().map_err(|error| explain(error, path, path))?;
-    let took = progress.finish();
-    let failed = |source| OutputError::Io { path: path.clone(), source };
-    out.into_inner().map_err(|error| failed(error.into_error()))?.finish(true)?;
-    tell(path, &summary, args.fps, took, console);
+    let mut progress = Progress::start(console, "frames", movie.frames);
+    let place = Place::File(args.output.clone());
+    let written = movie::write(&place, Container::Gif, movie, |push| {
+        let (mut names, mut done) = (files.iter(), 0);
+        let take = |image| {
+            anyhow::ensure!(!interrupt::stopping(), "interrupted");
+            let file = names.next().context("a file for each image")?;
+            push(image).map_err(|error| explain(error, file))?;
+            done += 1;
+            progress.set(console, done);
+            Ok(())
+        };
+        // On a thread of the pool: it need not wait for another one to encode.
+        rayon::scope(|_| ahead::in_order(files.iter(), window(movie.size), |file| read(file), take))
+    })?;
+    movie::tell(&place, &written, fps, progress.finish(), console);
     Ok(Outcome::Done)
 }
 
+/// The files as they are shown. That they are not in the order in which they were given is told.
+fn in_order(args: &Args, console: &Console) -> Vec<PathBuf> {
+    let mut files = args.frames.clone();
+    if !args.no_sort {
+        let name = |path: &PathBuf| path.with_extension("").to_string_lossy().into_owned();
+        files.sort_by(|a, b| natural_cmp(&name(a), &name(b)));
+    }
+    if let [first, .., last] = files.as_slice()
+        && files != args.frames
+    {
+        console.note(format_args!(
+            "sorted by name, from {} to {}; --no-sort keeps the order of the command line",
+            first.display(),
+            last.display()
+        ));
+    }
+    files
+}
+
+/// Columns and rows of the first image.
+fn size(files: &[PathBuf]) -> anyhow::Result<(u32, u32)> {
+    let first = files.first().context("at least one frame")?;
+    open(first)?
+        .into_dimensions()
+        .map_err(|error| anyhow::anyhow!("cannot read {}: {error}", first.display()))
+}
+
 /// How many images may be read before the encoder takes them.
-fn window(frames: &[PathBuf]) -> anyhow::Result<usize> {
-    let first = frames.first().context("at least one frame")?;
-    let dimensions = open(first)?.into_dimensions();
-    let (width, height) =
-        dimensions.map_err(|error| anyhow::anyhow!("cannot read {}: {error}", first.display()))?;
+fn window((width, height): (u32, u32)) -> usize {
     let most = rayon::current_num_threads() + 2;
     let images = AHEAD / (3 * u64::from(width) * u64::from(height)).max(1);
-    Ok(usize::try_from(images).unwrap_or(most).clamp(1, most))
+    usize::try_from(images).unwrap_or(most).clamp(1, most)
 }
 
 /// Names the file that is at fault.
-fn explain(error: Error, frame: &Path, output: &Path) -> anyhow::Error {
-    match error {
-        Error::Write { source, .. } => OutputError::Io { path: output.to_path_buf(), source }.into(),
-        other => anyhow::Error::new(other).context(frame.display().to_string()),
-    }
+fn explain(error: MovieError, file: &Path) -> anyhow::Error {
+    let of_the_frame = matches!(error, MovieError::Gif(_));
+    let error = anyhow::Error::new(error);
+    if of_the_frame { error.context(file.display().to_string()) } else { error }
 }
 
 /// Looks at all files before any is encoded: that each is there, and by its first bytes a PNG or TIFF image.

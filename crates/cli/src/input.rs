@@ -124,8 +124,15 @@ fn read_limited(from: impl Read, into: &mut Vec<u8>, limits: &Limits) -> std::io
     from.take(limits.max_script_bytes as u64 + 1).read_to_end(into).map(drop)
 }
 
-fn is_stdin(input: &Path) -> bool {
+/// It is `-`, which is no file.
+pub(crate) fn is_stdin(input: &Path) -> bool {
     input.as_os_str() == "-"
+}
+
+/// By its name, something in a folder is a script or the settings.
+pub(crate) fn is_part_of_animation(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name == SETTINGS_FILE || name.ends_with(".txt")
 }
 
 fn folder(path: &Path) -> anyhow::Result<Input> {
@@ -141,7 +148,7 @@ fn folder(path: &Path) -> anyhow::Result<Input> {
         let name = entry.file_name().to_string_lossy().into_owned();
         if name == SETTINGS_FILE {
             settings = Some(path);
-        } else if name.ends_with(".txt") && !path.is_dir() {
+        } else if is_part_of_animation(&path) && !path.is_dir() {
             scripts.push((name, ScriptFile::at(path)));
         }
     }

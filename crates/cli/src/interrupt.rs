@@ -45,6 +45,14 @@ pub(crate) fn stop() {
     STOPPING.store(true, Ordering::SeqCst);
 }
 
+/// Lets work begin again after a failure that was told; not after a signal.
+pub(crate) fn go_on() {
+    STOPPING.store(false, Ordering::SeqCst);
+    if signalled() {
+        stop();
+    }
+}
+
 /// Work is to come back early, because of a signal or of a failure elsewhere.
 pub(crate) fn stopping() -> bool {
     STOPPING.load(Ordering::SeqCst)

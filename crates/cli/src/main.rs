@@ -21,11 +21,13 @@ mod interrupt;
 mod outcome;
 mod output;
 mod plan;
+mod playback;
 mod progress;
 mod render;
 mod split;
 mod survey;
 mod threads;
+mod values;
 mod wording;
 
 fn main() -> ExitCode {

@@ -21,6 +21,9 @@ const KEPT_TEXT: usize = 64 << 20;
 /// Memory that frames ahead of the encoder may take, in bytes: fifteen images of 1920 x 1080 with what goes with them.
 const AHEAD: u64 = 192 << 20;
 
+/// Pixels of a side that a GIF has room for.
+const LONGEST_SIDE: u32 = 65_535;
+
 /// Frames in order, and what they are drawn with.
 #[derive(Debug)]
 pub(crate) struct Plan {
@@ -83,16 +86,17 @@ pub(crate) enum PlanError {
         "--size needs a pinhole camera: frame {frame} ({name}) is drawn by Orthocamera, whose pixels are world units"
     )]
     Orthographic { frame: u64, name: String },
+    #[error("an animation has {LONGEST_SIDE} pixels on a side at most, but frame {frame} ({name}) is {} x {}", .size.width(), .size.height())]
+    TooLong { frame: u64, name: String, size: Screen },
     #[error(
-        "a GIF has one size, but frame {first} ({first_name}) is {} x {} and frame {frame} ({name}) is {} x {}: give \
-         them one with --size",
+        "an animation has one size, but frame {first} ({first_name}) is {} x {} and frame {frame} ({name}) is {} x {}",
         .first_size.width(), .first_size.height(), .size.width(), .size.height()
     )]
     UnlikeSizes { first: u64, first_name: String, first_size: Screen, frame: u64, name: String, size: Screen },
 }
 
 impl Plan {
-    /// Parses everything and shows what is wrong. `None` when a script has an error.
+    /// Parses everything and shows what is wrong. The faults when a script has an error.
     ///
     /// # Errors
     /// When the scripts are fine but the wishes cannot be fulfilled.
@@ -102,6 +106,23 @@ impl Plan {
         wishes: &Wishes,
         console: &Console,
     ) -> anyhow::Result<Result<Self, Faults>> {
+        let (faults, plan) = Self::survey(input, limits, wishes)?;
+        faults.show(console);
+        Ok(match plan {
+            Some(plan) => Ok(plan?),
+            None => Err(faults),
+        })
+    }
+
+    /// Parses everything, and says what is wrong. There is a plan, or why there is none, exactly if no script has an error.
+    ///
+    /// # Errors
+    /// Only when the run was told to stop.
+    pub(crate) fn survey(
+        input: &Input,
+        limits: &Limits,
+        wishes: &Wishes,
+    ) -> anyhow::Result<(Faults, Option<Result<Self, PlanError>>)> {
         let kept = AtomicUsize::new(0);
         let parsed = parse_all(&input.scripts, limits, |file, parsed| {
             let mut faults = Faults::default();
@@ -119,20 +140,26 @@ impl Plan {
             faults.add(found);
             parts.extend(part);
         }
-        faults.show(console);
-        if faults.bad > 0 {
-            return Ok(Err(faults));
-        }
-        let frames: u64 = parts.iter().map(|part| part.frames as u64).sum();
         let settings = settings.flatten().unwrap_or_default();
+        let plan = (faults.bad == 0).then(|| Self::of(parts, settings, limits, wishes));
+        Ok((faults, plan))
+    }
+
+    fn of(
+        parts: Vec<Part>,
+        settings: AnimationSettings,
+        limits: &Limits,
+        wishes: &Wishes,
+    ) -> Result<Self, PlanError> {
+        let frames: u64 = parts.iter().map(|part| part.frames as u64).sum();
         if let Some(expected) = settings.frames()
             && frames < expected
         {
-            return Err(PlanError::TooFew { frames, expected }.into());
+            return Err(PlanError::TooFew { frames, expected });
         }
         let (first, last) = (wishes.frames.0.unwrap_or(1), wishes.frames.1.unwrap_or(frames));
         if let Some(wanted) = [first, last].into_iter().find(|n| *n < 1 || *n > frames) {
-            return Err(PlanError::NoSuchFrame { frames, wanted }.into());
+            return Err(PlanError::NoSuchFrame { frames, wanted });
         }
         let plan = Self {
             parts,
@@ -145,9 +172,9 @@ impl Plan {
         if plan.size.is_some()
             && let Some((frame, part, _)) = plan.runs().find(|(_, _, shape)| shape.orthographic)
         {
-            return Err(PlanError::Orthographic { frame, name: part.file.name.clone() }.into());
+            return Err(PlanError::Orthographic { frame, name: part.file.name.clone() });
         }
-        Ok(Ok(plan))
+        Ok(plan)
     }
 
     /// How many frames are to be drawn.
@@ -156,11 +183,15 @@ impl Plan {
     }
 
     /// # Errors
-    /// When the frames have several sizes.
+    /// When the frames have several sizes, or one that no GIF can have.
     pub(crate) fn one_size(&self) -> Result<Screen, PlanError> {
         let mut runs = self.runs();
         let (first, first_part, shape) = runs.next().expect("a plan has a frame");
         let first_size = self.size.unwrap_or(shape.screen);
+        if first_size.width().max(first_size.height()) > LONGEST_SIDE {
+            let name = first_part.file.name.clone();
+            return Err(PlanError::TooLong { frame: first, name, size: first_size });
+        }
         match runs.find(|(_, _, shape)| self.size.is_none() && shape.screen != first_size) {
             None => Ok(first_size),
             Some((frame, part, shape)) => Err(PlanError::UnlikeSizes {

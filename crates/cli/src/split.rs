@@ -12,6 +12,7 @@ use crate::interrupt;
 use crate::outcome::Outcome;
 use crate::output::OutputFile;
 use crate::survey::Faults;
+use crate::values;
 use crate::wording::number;
 
 /// Split a script with many Traces into one script a frame
@@ -20,15 +21,17 @@ use crate::wording::number;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  rayfold split flight.txt flight        writes flight/flight-001.txt and on
-  rayfold render flight -o flight.gif    draws the same as flight.txt")]
+  rayfold split flight.txt flight
+      writes flight/flight-001.txt and on
+  rayfold render flight -o flight.gif
+      draws the same as flight.txt")]
 pub(crate) struct Args {
     /// The script, or - for standard input
     script: PathBuf,
     /// The folder to write to; it is made when it is not there
     dir: PathBuf,
     /// The largest image that a script may ask for, in pixels
-    #[arg(long, value_name = "N", default_value_t = Limits::PIXELS)]
+    #[arg(long, value_name = "N", value_parser = values::count::<u64>, default_value_t = Limits::PIXELS)]
     max_pixels: u64,
 }
 

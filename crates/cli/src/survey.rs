@@ -1,10 +1,12 @@
 //! Looking at all scripts before anything is done with any of them, so that all faults are told in one go.
 
+use std::fmt::Display;
 use std::path::Path;
 
 use anyhow::Context;
 use rayfold_scene::{AnimationSettings, Code, Diagnostic, Limits, Parsed, Script, Severity, parse_settings};
 use rayon::prelude::*;
+use serde::Serialize;
 
 use crate::console::Console;
 use crate::input::ScriptFile;
@@ -18,21 +20,45 @@ pub(crate) struct Faults {
     pub(crate) diagnostics: Vec<Diagnostic>,
     /// Files that could not be read.
     pub(crate) unreadable: Vec<anyhow::Error>,
+    /// Why scripts that are fine by themselves are no animation together.
+    pub(crate) conflicts: Vec<Conflict>,
     /// How many files have an error.
     pub(crate) bad: usize,
     /// How many were looked at.
     pub(crate) files: usize,
 }
 
+/// Why scripts are no animation together.
+#[derive(Debug, Serialize)]
+pub(crate) struct Conflict {
+    /// As the user named them.
+    input: String,
+    severity: Severity,
+    message: String,
+}
+
 impl Faults {
     /// How many errors there are in all.
     pub(crate) fn errors(&self) -> usize {
-        self.unreadable.len() + self.diagnostics.iter().filter(|d| d.is_error()).count()
+        self.unreadable.len()
+            + self.diagnostics.iter().filter(|d| d.is_error()).count()
+            + self.conflicts_of(Severity::Error)
     }
 
     /// How many warnings there are in all.
     pub(crate) fn warnings(&self) -> usize {
         self.diagnostics.iter().filter(|d| d.severity == Severity::Warning).count()
+            + self.conflicts_of(Severity::Warning)
+    }
+
+    fn conflicts_of(&self, severity: Severity) -> usize {
+        self.conflicts.iter().filter(|conflict| conflict.severity == severity).count()
+    }
+
+    /// Notes why the scripts of an input, which are fine by themselves, are no animation together.
+    pub(crate) fn conflict(&mut self, input: &Path, severity: Severity, why: &impl Display) {
+        let (input, message) = (input.display().to_string(), why.to_string());
+        self.conflicts.push(Conflict { input, severity, message });
     }
 
     /// Notes what is wrong with the next script, which is `None` when it is of no use.
@@ -60,6 +86,7 @@ impl Faults {
     pub(crate) fn add(&mut self, others: Self) {
         self.diagnostics.extend(others.diagnostics);
         self.unreadable.extend(others.unreadable);
+        self.conflicts.extend(others.conflicts);
         self.bad += others.bad;
         self.files += others.files;
     }
@@ -90,6 +117,12 @@ impl Faults {
                 console.say(format_args!("{}\n", diagnostic.render(console.color)));
             }
         }
+        for Conflict { input, severity, message } in &self.conflicts {
+            match severity {
+                Severity::Error => console.fault(input, message),
+                Severity::Warning => console.warn(format_args!("{input}: {message}")),
+            }
+        }
         let too_large = |d: &Diagnostic| d.code == Code::LimitExceeded && d.message.contains("pixels");
         if self.diagnostics.iter().any(too_large) {
             console.note("--max-pixels sets the limit on pixels");
@@ -99,7 +132,11 @@ impl Faults {
     /// `3 errors in 2 of 50 files`.
     pub(crate) fn count(&self) -> String {
         let errors = number(self.errors() as u64, "error");
-        if self.files == 1 { errors } else { format!("{errors} in {} of {} files", self.bad, self.files) }
+        if self.files == 1 || self.bad == 0 {
+            errors
+        } else {
+            format!("{errors} in {} of {} files", self.bad, self.files)
+        }
     }
 }
 

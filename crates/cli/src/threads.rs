@@ -1,15 +1,15 @@
 //! How many cores to use.
 
-use std::num::NonZeroUsize;
-
 use anyhow::Context;
+
+use crate::values;
 
 /// `--threads`, for every subcommand that draws or encodes.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub(crate) struct Threads {
     /// How many threads to use; all cores when not given. The result is the same for any number
-    #[arg(long, value_name = "N")]
-    threads: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = values::count::<usize>)]
+    threads: Option<usize>,
 }
 
 impl Threads {
@@ -19,7 +19,7 @@ impl Threads {
     /// When the threads cannot be started.
     pub(crate) fn start(self) -> anyhow::Result<()> {
         rayon::ThreadPoolBuilder::new()
-            .num_threads(self.threads.map_or(0, NonZeroUsize::get))
+            .num_threads(self.threads.unwrap_or(0))
             .build_global()
             .context("cannot start the threads")
     }

@@ -29,6 +29,12 @@ pub enum Error {
         /// Where it was to go.
         key: String,
     },
+    /// The bucket's folder holds scripts that a submission lacks and was not told to delete; nothing was changed.
+    #[error("in the bucket, but not in the submission: {}", keys.join(", "))]
+    WouldDelete {
+        /// Their keys.
+        keys: Vec<String>,
+    },
     /// The scripts in the bucket are no longer those that were submitted.
     #[error("somebody else has changed {key} meanwhile")]
     ChangedMeanwhile {

@@ -49,13 +49,34 @@ pub struct FetchedFrame<'a> {
     pub png: Bytes,
 }
 
-/// The keys of an animation's frames in their order.
-///
-/// # Errors
-/// The first frame that is not drawn.
-pub fn frame_keys(manifest: &Manifest) -> Result<Vec<String>, &Frame> {
-    let key = |frame| frame_key(&manifest.head.animation, frame).ok_or(frame);
-    manifest.frames.iter().map(key).collect()
+/// A frame that is drawn.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FrameKey {
+    /// Its place in the animation, from 1.
+    pub number: u64,
+    /// Its key.
+    pub key: String,
+}
+
+/// An animation's frames in their order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frames<'a> {
+    /// Those that are drawn.
+    pub drawn: Vec<FrameKey>,
+    /// Those that are not, or not yet.
+    pub missing: Vec<&'a Frame>,
+}
+
+/// Which of an animation's frames are drawn.
+pub fn frames(manifest: &Manifest) -> Frames<'_> {
+    let mut frames = Frames { drawn: Vec::new(), missing: Vec::new() };
+    for (frame, number) in manifest.frames.iter().zip(1..) {
+        match frame_key(&manifest.head.animation, frame) {
+            Some(key) => frames.drawn.push(FrameKey { number, key }),
+            None => frames.missing.push(frame),
+        }
+    }
+    frames
 }
 
 impl<S: Store, C: Clock> Client<'_, S, C> {
@@ -97,13 +118,13 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
     /// Those of the store and of `take`, and [`Error::FrameGone`].
     pub async fn fetch_frames(
         &self,
-        keys: &[String],
+        frames: &[FrameKey],
         mut take: impl FnMut(FetchedFrame<'_>) -> io::Result<()>,
     ) -> Result<()> {
-        let reads = keys.iter().zip(1..).map(|(key, number)| async move {
+        let reads = frames.iter().map(|FrameKey { number, key }| async move {
             let object = found(self.store.get(key).await)?;
             let png = object.ok_or_else(|| Error::FrameGone { key: key.clone() })?.body;
-            Ok::<_, Error>(FetchedFrame { number, key, png })
+            Ok::<_, Error>(FetchedFrame { number: *number, key, png })
         });
         let reads: Vec<_> = reads.collect();
         let mut reads = stream::iter(reads).buffer_unordered(SIDE_BY_SIDE);
@@ -180,24 +201,30 @@ mod tests {
         }
         world.functions().await;
         let watch = world.client().look(&[world.film()]).await.unwrap().remove(0);
-        let keys = frame_keys(watch.manifest().unwrap()).unwrap();
-        let mut frames = Vec::new();
+        let keys = frames(watch.manifest().unwrap()).drawn;
+        let mut fetched = Vec::new();
         let take = |frame: FetchedFrame<'_>| {
-            frames.push((frame.number, String::from_utf8(frame.png.to_vec()).unwrap()));
+            fetched.push((frame.number, String::from_utf8(frame.png.to_vec()).unwrap()));
             Ok(())
         };
         world.client().fetch_frames(&keys, take).await.unwrap();
-        frames.sort();
+        fetched.sort();
         let expected = [(1, "1: frame 1"), (2, "2: frame 2"), (3, "10: frame 10")];
-        assert_eq!(frames, expected.map(|(number, text)| (number, text.to_owned())));
+        assert_eq!(fetched, expected.map(|(number, text)| (number, text.to_owned())));
 
-        world.store.delete(&keys[1]).await.unwrap();
+        world.store.delete(&keys[1].key).await.unwrap();
         let error = world.client().fetch_frames(&keys, |_| Ok(())).await.unwrap_err();
-        assert!(matches!(error, Error::FrameGone { key } if key == keys[1]));
+        assert!(matches!(error, Error::FrameGone { key } if key == keys[1].key));
 
         world.put("scripts/film/2.txt", "bad").await;
         world.functions().await;
         let watch = world.client().look(&[world.film()]).await.unwrap().remove(0);
-        assert_eq!(frame_keys(watch.manifest().unwrap()).unwrap_err().script.as_str(), "2");
+        let Frames { drawn, missing } = frames(watch.manifest().unwrap());
+        assert_eq!((missing.len(), missing[0].script.as_str()), (1, "2"));
+        assert_eq!(
+            drawn.iter().map(|frame| frame.number).collect::<Vec<_>>(),
+            [1, 3],
+            "they keep their places"
+        );
     }
 }

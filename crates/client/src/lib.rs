@@ -34,11 +34,11 @@ mod world;
 
 pub use client::Client;
 pub use error::{Error, Result};
-pub use fetch::{FetchedFrame, Output, frame_keys};
+pub use fetch::{FetchedFrame, FrameKey, Frames, Output, frames};
 pub use file::{Content, File};
-pub use remove::Removing;
+pub use remove::{Contents, Removing};
 pub use status::{Obstacle, frame_name, obstacles};
-pub use submit::{Sending, Submission, Submitted, settings_with_frames};
+pub use submit::{Preview, Sending, Submission, Submitted, settings_with_frames};
 pub use watch::{Ended, Waiting, Watch};
 
 #[cfg(test)]

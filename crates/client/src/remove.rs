@@ -24,18 +24,36 @@ pub enum Removing {
     WaitingForFunctions,
 }
 
+/// What the bucket holds of an animation, by key.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Contents {
+    /// The folder's scripts and settings.
+    pub scripts: Vec<String>,
+    /// What was made of them: frames, the GIF, the manifest.
+    pub made: Vec<String>,
+}
+
 impl<S: Store, C: Clock> Client<'_, S, C> {
-    /// Removes an animation; says how many objects there were.
+    /// What [`remove`](Self::remove) would remove.
     ///
     /// # Errors
     /// [`Error::NoAnimation`], and those of the store.
-    pub async fn remove(&self, animation: &Animation, mut told: impl FnMut(Removing)) -> Result<u64> {
+    pub async fn contents(&self, animation: &Animation) -> Result<Contents> {
         let scripts = self.keys_of(animation, &[animation.scripts()]).await?;
         // Listed before anything goes: whoever may not see all of an animation removes nothing of it.
         let made = self.made_of(animation).await?;
         if scripts.is_empty() && made.is_empty() {
             return Err(Error::NoAnimation(animation.clone()));
         }
+        Ok(Contents { scripts, made })
+    }
+
+    /// Removes an animation; says how many objects there were.
+    ///
+    /// # Errors
+    /// [`Error::NoAnimation`], and those of the store.
+    pub async fn remove(&self, animation: &Animation, mut told: impl FnMut(Removing)) -> Result<u64> {
+        let Contents { scripts, .. } = self.contents(animation).await?;
         self.delete(&scripts, |done| told(Removing::Deleted(done))).await?;
         let mut removed = scripts.len() as u64;
         let mut watch = Watch::new(*self, animation.clone());

@@ -3,7 +3,7 @@
 //! What goes first matters: with scripts deleted, then the new number of frames, then new scripts, the animation is
 //! never complete before it is what it should be.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use bytes::Bytes;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
@@ -25,6 +25,28 @@ pub struct Submission {
     animation: Animation,
     /// By key.
     files: BTreeMap<String, File>,
+    deletable: Deletable,
+}
+
+/// Which scripts that are not part of a submission it may delete from the bucket's folder.
+#[derive(Debug, Clone, Default)]
+enum Deletable {
+    #[default]
+    None,
+    /// Those of these keys.
+    These(BTreeSet<String>),
+    All,
+}
+
+/// What a submission would do, and has not done.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Preview {
+    /// The keys of scripts, and of the settings, that would be uploaded.
+    pub upload: Vec<String>,
+    /// The keys of scripts that would be deleted.
+    pub delete: Vec<String>,
+    /// Files, with the settings, that are there already.
+    pub unchanged: u64,
 }
 
 /// How far a submission is.
@@ -97,7 +119,19 @@ impl Submission {
             key.parse::<Key>()?;
             files.insert(key, file);
         }
-        Ok(Self { animation, files })
+        Ok(Self { animation, files, deletable: Deletable::None })
+    }
+
+    /// Lets it delete the scripts of these keys if they are not part of it.
+    pub fn deleting(mut self, keys: impl IntoIterator<Item = String>) -> Self {
+        self.deletable = Deletable::These(keys.into_iter().collect());
+        self
+    }
+
+    /// Lets it delete every script of the folder that is not part of it.
+    pub fn deleting_all_others(mut self) -> Self {
+        self.deletable = Deletable::All;
+        self
     }
 
     /// The animation.
@@ -107,13 +141,33 @@ impl Submission {
 }
 
 impl<S: Store, C: Clock> Client<'_, S, C> {
+    /// What [`submit`](Self::submit) would do.
+    ///
+    /// # Errors
+    /// Those of the store.
+    pub async fn preview(&self, submission: &Submission) -> Result<Preview> {
+        let Difference { changed, surplus, same } =
+            self.compare(&submission.animation, &submission.files).await?;
+        Ok(Preview { upload: changed, delete: surplus, unchanged: same.len() as u64 })
+    }
+
     /// Makes the bucket's folder as wanted.
     ///
     /// # Errors
-    /// Those of the store, and when a file can no longer be read or is no longer what it was.
+    /// [`Error::WouldDelete`] before anything is changed, those of the store, and when a file can no longer be read or is
+    /// no longer what it was.
     pub async fn submit(&self, submission: &Submission, mut told: impl FnMut(Sending)) -> Result<Submitted> {
-        let Submission { animation, files } = submission;
+        let Submission { animation, files, deletable } = submission;
         let Difference { mut changed, surplus, same: mut versions } = self.compare(animation, files).await?;
+        let may_go = |key: &String| match deletable {
+            Deletable::None => false,
+            Deletable::These(keys) => keys.contains(key),
+            Deletable::All => true,
+        };
+        let keys: Vec<String> = surplus.iter().filter(|key| !may_go(key)).cloned().collect();
+        if !keys.is_empty() {
+            return Err(Error::WouldDelete { keys });
+        }
         if !surplus.is_empty() {
             self.delete(&surplus, |_| {}).await?;
             told(Sending::Deleted { scripts: surplus.len() as u64 });
@@ -220,7 +274,7 @@ mod tests {
 
     async fn submit(world: &World, scripts: &[(&str, &str)], settings: &str) -> (Submitted, Vec<Sending>) {
         let mut told = Vec::new();
-        let submission = submission(scripts, settings);
+        let submission = submission(scripts, settings).deleting_all_others();
         let submitted = world.client().submit(&submission, |sending| told.push(sending)).await.unwrap();
         (submitted, told)
     }
@@ -249,6 +303,33 @@ mod tests {
         let (changed, told) = submit(&world, &[("1", "A"), ("2", "b")], "{}").await;
         assert_eq!(told.last(), Some(&Sending::Finished { uploaded: 1, unchanged: 2 }));
         assert_ne!(changed.versions["scripts/film/1.txt"], submitted.versions["scripts/film/1.txt"]);
+    }
+
+    #[tokio::test]
+    async fn scripts_of_others_are_not_deleted_unasked() {
+        let world = World::new();
+        for name in ["mine", "other1", "other2"] {
+            world.put(&format!("scripts/film/{name}.txt"), name).await;
+        }
+        let others = ["scripts/film/other1.txt", "scripts/film/other2.txt"].map(String::from);
+        let before = world.keys("").await;
+        let wanted = || submission(&[("mine", "changed")], "{}");
+        let preview = world.client().preview(&wanted()).await.unwrap();
+        let upload = ["scripts/film/animation.json", "scripts/film/mine.txt"].map(String::from).to_vec();
+        assert_eq!(preview, Preview { upload, delete: others.to_vec(), unchanged: 0 });
+
+        let refused = world.client().submit(&wanted(), |_| {}).await;
+        assert!(matches!(refused, Err(Error::WouldDelete { keys }) if keys == others));
+        // Whoever has agreed to one has not agreed to the other.
+        let half = wanted().deleting([others[0].clone()]);
+        let refused = world.client().submit(&half, |_| {}).await;
+        assert!(matches!(refused, Err(Error::WouldDelete { keys }) if keys == others[1..]));
+        assert_eq!(world.keys("").await, before);
+        let mine = world.store.get("scripts/film/mine.txt").await.unwrap().body;
+        assert_eq!(mine, "mine", "nothing was uploaded either");
+
+        world.client().submit(&wanted().deleting(others), |_| {}).await.unwrap();
+        assert_eq!(world.keys("scripts/").await, ["scripts/film/animation.json", "scripts/film/mine.txt"]);
     }
 
     #[tokio::test]

@@ -16,6 +16,9 @@ use crate::submit::Submitted;
 /// How long nothing may happen before whoever waits is told that this is unusual.
 const UNUSUAL: Duration = Duration::from_secs(20);
 
+/// How long an upload that has just begun may take to show.
+const GRACE: Duration = Duration::from_secs(5);
+
 /// How long a store may be busy or out of reach.
 const PATIENCE: Duration = Duration::from_secs(3600);
 
@@ -28,6 +31,7 @@ pub struct Watch<'a, S, C> {
     manifest: Option<Manifest>,
     is_unreadable: bool,
     gif: Option<ObjectInfo>,
+    has_looked: bool,
     started: Timestamp,
 }
 
@@ -58,7 +62,16 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
     /// Nothing is known before the first look.
     pub fn new(client: Client<'a, S, C>, animation: Animation) -> Self {
         let started = client.clock.now();
-        Self { client, animation, version: None, manifest: None, is_unreadable: false, gif: None, started }
+        Self {
+            client,
+            animation,
+            version: None,
+            manifest: None,
+            is_unreadable: false,
+            gif: None,
+            has_looked: false,
+            started,
+        }
     }
 
     /// The animation.
@@ -81,8 +94,13 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
         self.gif.as_ref()
     }
 
-    /// Looks. The manifest, which may be large, is read only when it has changed, the GIF's version only once all
-    /// frames are drawn. Says whether anything changed.
+    /// How long ago the GIF was written.
+    pub fn gif_age(&self) -> Option<Duration> {
+        Some(self.client.clock.now().since(self.gif.as_ref()?.modified))
+    }
+
+    /// Looks. The manifest, which may be large, is read only when it has changed, the GIF's version at first, and again
+    /// once all frames are drawn. Says whether anything changed.
     ///
     /// # Errors
     /// Those of the store.
@@ -104,7 +122,9 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
             self.is_unreadable = object.is_some() && self.manifest.is_none();
             self.version = version;
         }
-        if self.manifest.as_ref().is_some_and(|manifest| manifest.head.is_terminal()) {
+        let is_first = !std::mem::replace(&mut self.has_looked, true);
+        let is_terminal = self.manifest.as_ref().is_some_and(|manifest| manifest.head.is_terminal());
+        if is_terminal || (is_first && self.version.is_some()) {
             let gif = found(store.head(&self.animation.gif()).await)?;
             changed |= gif != self.gif;
             self.gif = gif;
@@ -120,6 +140,27 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
         match self.look().await {
             Err(Error::Store(error)) if error.is_retryable() && self.elapsed() < PATIENCE => Ok(false),
             answer => answer,
+        }
+    }
+
+    /// The same, but waits a moment for an upload that has just begun when nothing is there.
+    ///
+    /// # Errors
+    /// [`Error::NoAnimation`] when there is still nothing then, and when the store refuses.
+    pub async fn look_for(&mut self) -> Result<bool> {
+        let begun = self.client.clock.now();
+        loop {
+            let changed = self.look_patiently().await?;
+            if self.version.is_some() {
+                return Ok(changed);
+            }
+            match self.client.must_exist(&self.animation).await {
+                Ok(()) => return Ok(changed),
+                Err(Error::NoAnimation(_)) if self.client.clock.now().since(begun) < GRACE => {}
+                Err(Error::Store(error)) if error.is_retryable() && self.elapsed() < PATIENCE => {}
+                Err(error) => return Err(error),
+            }
+            self.pause().await;
         }
     }
 
@@ -289,6 +330,40 @@ mod tests {
         world.functions().await;
         assert!(watch.look().await.unwrap());
         assert!(!watch.is_unreadable() && watch.is_current());
+    }
+
+    #[tokio::test]
+    async fn an_animation_that_does_not_exist_is_not_waited_for_for_ever() {
+        let world = World::new();
+        let mut watch = Watch::new(world.client(), world.film());
+        assert!(matches!(watch.look_for().await, Err(Error::NoAnimation(name)) if name == world.film()));
+        assert!(watch.elapsed() >= GRACE);
+
+        // What comes within the moment's grace is waited for.
+        let mut watch = Watch::new(world.client(), world.film());
+        let upload = async {
+            for _ in 0..10 {
+                tokio::task::yield_now().await;
+            }
+            world.put("scripts/film/1.txt", "frame").await;
+        };
+        let (looked, ()) = futures_util::future::join(watch.look_for(), upload).await;
+        assert!(looked.is_ok() && watch.manifest().is_none() && watch.elapsed() < GRACE);
+    }
+
+    #[tokio::test]
+    async fn the_last_gif_is_seen_while_it_is_being_replaced() {
+        let world = World::new();
+        world.put("scripts/film/1.txt", "frame").await;
+        world.functions().await;
+        let gif = world.store.head("animations/film.gif").await.unwrap();
+        // Two frames are wanted, and one is there.
+        world.put("scripts/film/animation.json", r#"{"frames": 2}"#).await;
+        world.functions().await;
+        let watch = world.client().look(&[world.film()]).await.unwrap().remove(0);
+        assert_eq!(watch.manifest().unwrap().head.status, Status::Waiting);
+        assert_eq!(watch.gif(), Some(&gif));
+        assert!(!watch.is_current() && watch.gif_age().is_some());
     }
 
     #[tokio::test]

@@ -1,6 +1,7 @@
 //! Frames in, bytes out: checks each frame, gives it its delay, and writes the blocks in order.
 
 use std::io::{self, Write};
+use std::num::NonZeroU16;
 
 use gif::{DisposalMethod, Repeat};
 use image::RgbImage;
@@ -15,13 +16,41 @@ use crate::timeline::Timeline;
 pub struct Settings {
     /// Frames a second: above 0, at least 100 / 65,535. Above 50, frames are dropped.
     pub fps: f64,
-    /// How often the animation is repeated; 0: for ever.
-    pub loops: u16,
+    /// How often the animation is shown.
+    pub plays: Plays,
+    /// How long the last frame is shown, in hundredths of a second; as long as `fps` says if not given.
+    pub last_delay_cs: Option<u16>,
+}
+
+/// How often an animation is shown.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Plays {
+    /// For ever.
+    #[default]
+    Endless,
+    /// Once; then the last frame stays.
+    Once,
+    /// Once, and then so many times again.
+    Repeated(NonZeroU16),
+}
+
+impl Plays {
+    /// As a GIF counts: repetitions, of which 0 stands for ever.
+    pub fn repeated(times: u16) -> Self {
+        NonZeroU16::new(times).map_or(Self::Endless, Self::Repeated)
+    }
+}
+
+impl Settings {
+    /// So many frames a second, repeated so many times (0: for ever).
+    pub fn new(fps: f64, repetitions: u16) -> Self {
+        Self { fps, plays: Plays::repeated(repetitions), last_delay_cs: None }
+    }
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { fps: 10.0, loops: 0 }
+        Self::new(10.0, 0)
     }
 }
 
@@ -98,7 +127,7 @@ impl<W: Write> Encoder<W> {
 
         let mut running = match std::mem::replace(&mut self.stage, Stage::Failed) {
             Stage::Empty(writer) => {
-                let file = begin(writer, found, self.settings.loops)
+                let file = begin(writer, found, self.settings.plays)
                     .map_err(|source| Error::Write { frame: number, source })?;
                 Box::new(Running { size: found, file, quantiser: Quantiser::new() })
             }
@@ -124,7 +153,8 @@ impl<W: Write> Encoder<W> {
                 Stage::Running(running) => *running,
                 Stage::Failed => return Err(self.failed_before()),
             };
-        if let Some(block) = quantiser.finish() {
+        if let Some(mut block) = quantiser.finish() {
+            block.delay_cs = self.settings.last_delay_cs.unwrap_or(block.delay_cs);
             self.write(&mut file, block)?;
         }
         let end = || {
@@ -150,10 +180,16 @@ impl<W: Write> Encoder<W> {
     }
 }
 
-fn begin<W: Write>(writer: W, size: (u32, u32), loops: u16) -> io::Result<gif::Encoder<Counting<W>>> {
+fn begin<W: Write>(writer: W, size: (u32, u32), plays: Plays) -> io::Result<gif::Encoder<Counting<W>>> {
     let mut file = gif::Encoder::new(Counting { inner: writer, bytes: 0 }, size.0 as u16, size.1 as u16, &[])
         .map_err(into_io)?;
-    file.set_repeat(if loops == 0 { Repeat::Infinite } else { Repeat::Finite(loops) }).map_err(into_io)?;
+    let repeat = match plays {
+        Plays::Endless => Some(Repeat::Infinite),
+        // Without a word on repetitions a GIF is shown once.
+        Plays::Once => None,
+        Plays::Repeated(times) => Some(Repeat::Finite(times.get())),
+    };
+    repeat.map_or(Ok(()), |repeat| file.set_repeat(repeat)).map_err(into_io)?;
     Ok(file)
 }
 

@@ -46,5 +46,5 @@ mod quantise;
 mod stripe;
 mod timeline;
 
-pub use encoder::{Encoder, Settings, Summary};
+pub use encoder::{Encoder, Plays, Settings, Summary};
 pub use error::Error;

@@ -20,7 +20,7 @@ impl Animator for GifAnimator {
 
     fn begin(&self, settings: &AnimationSettings) -> Result<GifEncoding, Reason> {
         let ready = Shelf::default();
-        let settings = rayfold_gif::Settings { fps: settings.fps(), loops: settings.loops() };
+        let settings = rayfold_gif::Settings::new(settings.fps(), settings.loops());
         let encoder = Encoder::new(ready.clone(), settings).map_err(reason)?;
         Ok(GifEncoding { encoder: Some(encoder), ready })
     }

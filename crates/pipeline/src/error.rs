@@ -51,6 +51,9 @@ pub enum Error {
         /// What the store said.
         source: Cause,
     },
+    /// The environment does not say in which region the bucket is; nothing was asked of the store.
+    #[error("found no AWS region: set AWS_REGION, or a region in the AWS profile")]
+    NoRegion,
     /// A key that is none of the pipeline's.
     #[error("{key}: {problem}")]
     Key {

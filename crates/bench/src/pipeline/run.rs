@@ -174,7 +174,7 @@ async fn compile(store: &S3Store, animation: &Animation, folder: &Folder) -> Res
     let fetches = keys.iter().map(|key| store.get(key));
     let fetches: Vec<_> = fetches.collect();
     let mut images = stream::iter(fetches).buffered(UPLOADS);
-    let settings = rayfold_gif::Settings { fps: folder.settings.fps(), loops: folder.settings.loops() };
+    let settings = rayfold_gif::Settings::new(folder.settings.fps(), folder.settings.loops());
     let mut gif = Vec::new();
     let mut encoder = rayfold_gif::Encoder::new(&mut gif, settings)?;
     while let Some(image) = images.try_next().await? {

@@ -4,46 +4,75 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use rayfold_client::{FetchedFrame, Output, frame_keys, frame_name};
+use rayfold_client::{FetchedFrame, Frames, Output, frame_name, frames};
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Manifest, Status};
 
-use super::{BucketArgs, Client, address, parse_animation, report, with_bucket};
+use super::{BucketArgs, Client, Watch, address, named, parse_animation, report, with_bucket};
 use crate::console::Console;
 use crate::outcome::{Outcome, Usage};
 use crate::output::{OutputFile, probe};
 use crate::progress::Progress;
-use crate::render::target::{Format, Pattern, Target};
-use crate::wording::{Size, number};
+use crate::render::target::{Container, Format, Pattern, Place, Target};
+use crate::wording::{Age, Size, number};
 
 /// Download the GIF of an animation, or its frames
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   rayfold fetch hello --bucket my-bucket -o hello.gif
-  rayfold fetch hello --bucket my-bucket -o 'frames/%04d.png'")]
+  rayfold fetch hello --bucket my-bucket -o hello.gif --last
+      while a new one is made
+  rayfold fetch hello --bucket my-bucket -o 'frames/%04d.png'
+  rayfold fetch hello --bucket my-bucket -o 'frames/%04d.png' --partial
+      those that are drawn")]
 pub(crate) struct Args {
     /// The animation
     #[arg(value_parser = parse_animation)]
     animation: Animation,
     #[command(flatten)]
     bucket: BucketArgs,
-    /// What to write: .gif, or a pattern such as frames/%04d.png (or .tif) for the frames
+    /// What to write: .gif, or a pattern such as frames/%04d.png (or .tif) for the frames, whose folder is made
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
+    /// The GIF that there is, also when it does not show the scripts as they are now
+    #[arg(long)]
+    last: bool,
+    /// The frames that are drawn, also when others are not; each keeps its number
+    #[arg(long, conflicts_with = "last")]
+    partial: bool,
+}
+
+/// What is to be fetched.
+enum Wanted {
+    Gif(PathBuf),
+    Frames(Pattern, Format),
+}
+
+/// # Errors
+/// When OUT is neither a GIF nor a pattern, or a flag does not go with it.
+fn wanted(args: &Args) -> Result<Wanted, Usage> {
+    let shown = args.output.display();
+    match Target::parse(&args.output) {
+        Ok(Target::Animation(Container::Gif, Place::File(path))) if !args.partial => Ok(Wanted::Gif(path)),
+        Ok(Target::Images(pattern, format)) if !args.last => Ok(Wanted::Frames(pattern, format)),
+        Ok(Target::Images(..)) => {
+            Err(Usage("--last is for the GIF: expected an output that ends in .gif".into()))
+        }
+        Ok(Target::Animation(Container::Gif, _)) => {
+            Err(Usage("--partial is for frames: expected a pattern such as frames/%04d.png".into()))
+        }
+        Ok(_) | Err(_) => Err(Usage(format!(
+            "cannot write {shown}: expected .gif, or a pattern such as frames/%04d.png (or .tif)"
+        ))),
+    }
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
-    let target = Target::parse(&args.output)?;
-    match &target {
-        Target::Gif(path) => probe(path)?,
-        Target::Images(pattern, _) => probe(&pattern.path(1))?,
-        Target::Image(path, _) => {
-            let shown = path.display();
-            return Err(
-                Usage(format!("{shown} is one image: expected .gif, or a pattern such as %04d.png")).into()
-            );
-        }
+    let wanted = wanted(args)?;
+    match &wanted {
+        Wanted::Gif(path) => probe(path)?,
+        Wanted::Frames(pattern, _) => pattern.probe(1)?,
     }
     let animation = &args.animation;
     with_bucket(&args.bucket, async |client| {
@@ -56,28 +85,45 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
             );
             anyhow::bail!("no function has looked at {animation} yet");
         };
-        match &target {
-            Target::Gif(path) => {
-                if !watch.is_current() {
-                    return Err(not_there(manifest, console));
+        match &wanted {
+            Wanted::Gif(path) => {
+                let is_of_use = watch.is_current() || (args.last && watch.gif().is_some());
+                if !is_of_use {
+                    return Err(not_there(&watch, manifest, console));
+                }
+                if let (false, Some(age)) = (watch.is_current(), watch.gif_age()) {
+                    console.note(format_args!(
+                        "this GIF is {} old and shows older scripts: {animation} is {} ({})",
+                        Age(age),
+                        report::word(manifest.head.status),
+                        report::count(manifest)
+                    ));
                 }
                 gif(client, animation, path, &args.bucket, console).await?;
             }
-            Target::Images(pattern, format) => frames(client, manifest, pattern, *format, console).await?,
-            Target::Image(..) => {}
+            Wanted::Frames(pattern, format) => {
+                fetch_frames(client, manifest, args.partial, pattern, *format, console).await?;
+            }
         }
         Ok(Outcome::Done)
     })
 }
 
-fn not_there(manifest: &Manifest, console: &Console) -> anyhow::Error {
+fn not_there(watch: &Watch<'_>, manifest: &Manifest, console: &Console) -> anyhow::Error {
     report::show_faults(manifest, console);
     let head = &manifest.head;
     let why = match head.status {
         Status::Done => "its GIF is being assembled",
         other => report::word(other),
     };
-    anyhow::anyhow!("there is no GIF of {} as it is now: {why} ({})", head.animation, report::count(manifest))
+    let last = match (watch.gif(), watch.gif_age()) {
+        (Some(gif), Some(age)) => {
+            format!("; --last fetches the one before, of {} and {} old", Size(gif.size), Age(age))
+        }
+        _ => String::new(),
+    };
+    let count = report::count(manifest);
+    anyhow::anyhow!("there is no GIF of {} as it is now: {why} ({count}){last}", head.animation)
 }
 
 /// A file that appears once all of it is there.
@@ -120,25 +166,36 @@ pub(crate) async fn gif(
     Ok(())
 }
 
-async fn frames(
+async fn fetch_frames(
     client: Client<'_>,
     manifest: &Manifest,
+    partial: bool,
     pattern: &Pattern,
     format: Format,
     console: &Console,
 ) -> anyhow::Result<()> {
     let animation = &manifest.head.animation;
-    let keys = frame_keys(manifest).map_err(|frame| {
+    let Frames { drawn, missing } = frames(manifest);
+    if let Some(first) = missing.first()
+        && !partial
+    {
         report::show_faults(manifest, console);
-        anyhow::anyhow!(
-            "{animation} is {} ({}): {} is not drawn",
+        let rest = match drawn.len() {
+            0 => String::new(),
+            others => format!("; --partial fetches {}", number(others as u64, "other frame")),
+        };
+        anyhow::bail!(
+            "{animation} is {} ({}): {} is not drawn{rest}",
             report::word(manifest.head.status),
             report::count(manifest),
-            frame_name(frame)
-        )
-    })?;
-    anyhow::ensure!(!keys.is_empty(), "{animation} has no frames");
-    let mut progress = Progress::start(console, "frames", keys.len() as u64);
+            frame_name(first)
+        );
+    }
+    let (Some(first), Some(last)) = (drawn.first(), drawn.last()) else {
+        anyhow::bail!("{animation} has no frames that are drawn");
+    };
+    pattern.make_folder()?;
+    let mut progress = Progress::start(console, "frames", drawn.len() as u64);
     let mut done = 0;
     let take = |frame: FetchedFrame<'_>| {
         write_frame(&frame, pattern, format).map_err(io::Error::other)?;
@@ -146,15 +203,17 @@ async fn frames(
         progress.set(console, done);
         Ok(())
     };
-    client.fetch_frames(&keys, take).await?;
+    client.fetch_frames(&drawn, take).await?;
     let took = progress.finish().as_secs_f64();
-    let (first, last) = (pattern.path(1), pattern.path(keys.len() as u64));
     console.note(format_args!(
-        "{} to {}: {}, in {took:.2} s",
-        first.display(),
-        last.display(),
+        "{}: {}, in {took:.2} s",
+        pattern.range(first.number, last.number),
         number(done, "frame")
     ));
+    if !missing.is_empty() {
+        let names: Vec<String> = missing.into_iter().map(frame_name).collect();
+        console.warn(format_args!("not drawn, and not fetched: {}", named(&names)));
+    }
     Ok(())
 }
 

@@ -3,6 +3,7 @@
 //! One face of `rayfold-client`, which does the work: these subcommands have the flags and the words. Who and where comes
 //! from the standard AWS environment.
 
+use std::sync::mpsc;
 use std::time::Duration;
 
 use anyhow::{Context, anyhow};
@@ -11,6 +12,7 @@ use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::store::S3Store;
 use rayfold_pipeline::{Error, SystemClock};
 
+use crate::console::{Console, visible};
 use crate::interrupt;
 
 pub(crate) mod fetch;
@@ -22,6 +24,9 @@ pub(crate) mod submit;
 
 /// Between two looks at whether the run was told to stop.
 const LOOK: Duration = Duration::from_millis(50);
+
+/// Scripts that are named, at most.
+const MOST_NAMED: usize = 20;
 
 /// `--bucket`, for every subcommand that talks to one.
 #[derive(Clone, Debug, clap::Args)]
@@ -86,6 +91,56 @@ fn explain(error: anyhow::Error, bucket: &str) -> anyhow::Error {
     })
 }
 
+/// Shows `names`, or as many as people read, and what else there is to say; then asks whether to go on. `None` when there
+/// is nobody to ask.
+///
+/// # Errors
+/// When the system refuses a thread.
+async fn agree(names: &[String], question: &str, console: &Console) -> anyhow::Result<Option<bool>> {
+    if !console.can_ask() {
+        return Ok(None);
+    }
+    for name in names.iter().take(MOST_NAMED) {
+        console.say(format_args!("  {}", visible(name)));
+    }
+    if names.len() > MOST_NAMED {
+        console.say(format_args!("  and {} more", names.len() - MOST_NAMED));
+    }
+    console.ask(&format!("{} [y/N]", visible(question)));
+    // On a thread that is left alone when the run is told to stop: nothing ends the reading of a terminal.
+    let (sender, receiver) = mpsc::channel();
+    std::thread::Builder::new().name("answer".into()).spawn(move || {
+        let mut answer = String::new();
+        let _ = std::io::stdin().read_line(&mut answer);
+        let _ = sender.send(answer);
+    })?;
+    loop {
+        match receiver.try_recv() {
+            Ok(answer) => return Ok(Some(is_yes(&answer))),
+            Err(mpsc::TryRecvError::Empty) => tokio::time::sleep(LOOK).await,
+            Err(mpsc::TryRecvError::Disconnected) => return Ok(Some(false)),
+        }
+    }
+}
+
+fn is_yes(answer: &str) -> bool {
+    matches!(answer.trim().to_ascii_lowercase().as_str(), "y" | "yes")
+}
+
+/// Names in a row, or as many as people read.
+fn named(names: &[String]) -> String {
+    let mut text = names.iter().take(MOST_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+    if names.len() > MOST_NAMED {
+        text += &format!(" and {} more", names.len() - MOST_NAMED);
+    }
+    text
+}
+
+/// What a key is called in its animation's folder.
+fn names_of(keys: &[String], folder: &str) -> Vec<String> {
+    keys.iter().map(|key| key.strip_prefix(folder).unwrap_or(key).to_owned()).collect()
+}
+
 async fn interrupted() {
     while !interrupt::stopping() {
         tokio::time::sleep(LOOK).await;
@@ -103,4 +158,27 @@ pub(crate) fn parse_animation(name: &str) -> Result<Animation, String> {
 /// Where an object lies, for people.
 pub(crate) fn address(bucket: &str, key: &str) -> String {
     format!("s3://{bucket}/{key}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_yes_is_a_yes() {
+        for (answer, agreed) in
+            [("y\n", true), ("YES\r\n", true), ("\n", false), ("", false), ("n", false), ("yeah", false)]
+        {
+            assert_eq!(is_yes(answer), agreed, "{answer:?}");
+        }
+    }
+
+    #[test]
+    fn long_lists_are_cut() {
+        let names: Vec<String> = (1..=23).map(|n| n.to_string()).collect();
+        assert!(named(&names).ends_with("19, 20 and 3 more"));
+        assert_eq!(named(&names[..2]), "1, 2");
+        let keys = ["scripts/film/a.txt".to_owned(), "elsewhere".to_owned()];
+        assert_eq!(names_of(&keys, "scripts/film/"), ["a.txt", "elsewhere"]);
+    }
 }

@@ -15,8 +15,10 @@ use crate::wording::number;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  rayfold retry hello --bucket my-bucket          what failed or is missing
-  rayfold retry hello --bucket my-bucket --all    every frame, also those that are there")]
+  rayfold retry hello --bucket my-bucket
+      what failed or is missing
+  rayfold retry hello --bucket my-bucket --all
+      every frame, also those that are there")]
 pub(crate) struct Args {
     /// The animation
     #[arg(value_parser = parse_animation)]

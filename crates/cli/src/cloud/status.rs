@@ -1,16 +1,20 @@
 //! `rayfold status`: where the animations of a bucket stand.
 
 use std::fmt::Write;
+use std::time::Duration;
 
 use rayfold_client::{Obstacle, obstacles};
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Head, Reason};
 use serde::Serialize;
 
-use super::{BucketArgs, Watch, parse_animation, report, with_bucket};
+use super::{BucketArgs, Client, Watch, parse_animation, report, with_bucket};
 use crate::console::{Console, Format, visible};
 use crate::outcome::Outcome;
-use crate::wording::Size;
+use crate::wording::{Age, Size};
+
+/// Between two looks at a whole bucket.
+const APART: Duration = Duration::from_secs(2);
 
 /// Show where the animations of a bucket stand
 ///
@@ -18,17 +22,21 @@ use crate::wording::Size;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  rayfold status --bucket my-bucket                       all animations
-  rayfold status hello --bucket my-bucket                 one, with what failed and why
-  rayfold status hello --bucket my-bucket --watch         until it is done; exit code 1 if it failed
-  rayfold status hello --bucket my-bucket --format json   for programs, on standard output")]
+  rayfold status --bucket my-bucket
+      all animations
+  rayfold status hello --bucket my-bucket
+      one, with what failed and why
+  rayfold status hello --bucket my-bucket --watch
+      until it is done; exit code 1 if it failed
+  rayfold status hello --bucket my-bucket --format json
+      for programs, on standard output")]
 pub(crate) struct Args {
     /// The animation
     #[arg(value_parser = parse_animation)]
     animation: Option<Animation>,
     #[command(flatten)]
     bucket: BucketArgs,
-    /// Show each change, until nothing more will happen
+    /// Show each change: of an animation until nothing more will happen, of a whole bucket until Ctrl-C
     #[arg(long)]
     watch: bool,
     /// How to show it
@@ -66,6 +74,8 @@ struct Gif<'a> {
     key: String,
     size: u64,
     version: &'a str,
+    /// When it was written, in milliseconds since 1970.
+    modified_ms: u64,
     /// It shows what the manifest says.
     current: bool,
 }
@@ -77,47 +87,90 @@ struct FaultEntry<'a> {
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
-    with_bucket(&args.bucket, async |client| {
-        let mut last = String::new();
-        loop {
-            let names = match &args.animation {
-                Some(animation) => vec![animation.clone()],
-                None => client.animations().await?,
-            };
-            let watches = client.look(&names).await?;
-            if let (Some(animation), [watch]) = (&args.animation, watches.as_slice())
-                && watch.manifest().is_none()
-                && !args.watch
-            {
+    with_bucket(&args.bucket, async |client| match (&args.animation, args.watch) {
+        (Some(animation), true) => follow(client, animation, args.format, console).await,
+        (Some(animation), false) => {
+            let watches = client.look(std::slice::from_ref(animation)).await?;
+            if watches.iter().all(|watch| watch.manifest().is_none()) {
                 client.must_exist(animation).await?;
             }
-            let shown = match args.format {
-                Format::Text => table(&watches),
-                Format::Json => document(&watches, args.watch)?,
-            };
-            if shown != last {
-                console.print(&shown)?;
-                last = shown;
-            }
-            let settled = watches.iter().all(Watch::is_settled);
-            if !args.watch || (settled && args.animation.is_some()) {
-                let failed = watches.iter().any(|watch| watch.is_settled() && !watch.is_current());
-                if args.animation.is_some() && args.format == Format::Text {
-                    for manifest in watches.iter().filter_map(Watch::manifest) {
-                        report::show_faults(manifest, console);
-                    }
-                }
-                return Ok(if args.watch && failed { Outcome::Failed } else { Outcome::Done });
-            }
-            match watches.first() {
-                Some(watch) => watch.pause().await,
-                None => tokio::time::sleep(std::time::Duration::from_secs(1)).await,
+            show(&watches, args.format, console)?;
+            show_faults(&watches, args.format, console);
+            Ok(Outcome::Done)
+        }
+        (None, false) => {
+            let watches = client.look(&client.animations().await?).await?;
+            show(&watches, args.format, console)?;
+            Ok(Outcome::Done)
+        }
+        (None, true) => {
+            let mut last = String::new();
+            loop {
+                let watches = client.look(&client.animations().await?).await?;
+                show_if_new(&watches, args.format, &mut last, console)?;
+                tokio::time::sleep(APART).await;
             }
         }
     })
 }
 
-fn table(watches: &[Watch<'_>]) -> String {
+/// Shows each change of an animation until nothing more will happen.
+async fn follow(
+    client: Client<'_>,
+    animation: &Animation,
+    format: Format,
+    console: &Console,
+) -> anyhow::Result<Outcome> {
+    let mut watches = [Watch::new(client, animation.clone())];
+    let mut last = String::new();
+    loop {
+        watches[0].look_for().await?;
+        show_if_new(&watches, format, &mut last, console)?;
+        if watches[0].is_settled() {
+            show_faults(&watches, format, console);
+            return Ok(if watches[0].is_current() { Outcome::Done } else { Outcome::Failed });
+        }
+        watches[0].pause().await;
+    }
+}
+
+fn show(watches: &[Watch<'_>], format: Format, console: &Console) -> anyhow::Result<()> {
+    match format {
+        Format::Text => console.print(table(watches, true)),
+        Format::Json => console.print(document(watches, false)?),
+    }
+}
+
+/// Shows what is not what was shown last, which time alone does not make it.
+fn show_if_new(
+    watches: &[Watch<'_>],
+    format: Format,
+    last: &mut String,
+    console: &Console,
+) -> anyhow::Result<()> {
+    let now = match format {
+        Format::Text => table(watches, false),
+        Format::Json => document(watches, true)?,
+    };
+    if now != *last {
+        match format {
+            Format::Text => console.print(table(watches, true))?,
+            Format::Json => console.print(&now)?,
+        }
+        *last = now;
+    }
+    Ok(())
+}
+
+fn show_faults(watches: &[Watch<'_>], format: Format, console: &Console) {
+    if format == Format::Text {
+        for manifest in watches.iter().filter_map(Watch::manifest) {
+            report::show_faults(manifest, console);
+        }
+    }
+}
+
+fn table(watches: &[Watch<'_>], with_age: bool) -> String {
     let names: Vec<String> =
         watches.iter().map(|watch| visible(watch.animation().as_str()).replace('\n', "\\u{a}")).collect();
     let width = names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
@@ -129,9 +182,10 @@ fn table(watches: &[Watch<'_>]) -> String {
             continue;
         };
         let status = report::word(manifest.head.status);
+        let age = watch.gif_age().filter(|_| with_age).map(|age| format!(", {} old", Age(age)));
         let gif = match watch.gif() {
             Some(gif) if watch.is_current() => format!("GIF of {}", Size(gif.size)),
-            Some(_) => "an older GIF".to_owned(),
+            Some(gif) => format!("last GIF of {}{}", Size(gif.size), age.unwrap_or_default()),
             None => "no GIF".to_owned(),
         };
         let _ = writeln!(text, "{name:width$}  {status:9}  {}, {gif}", report::count(manifest));
@@ -158,6 +212,7 @@ fn document(watches: &[Watch<'_>], one_line: bool) -> anyhow::Result<String> {
             key: watch.animation().gif(),
             size: gif.size,
             version: gif.etag.as_str(),
+            modified_ms: gif.modified.0,
             current: watch.is_current(),
         }),
         faults: watch.manifest().map_or_else(Vec::new, |manifest| {

@@ -5,19 +5,24 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use rayfold_client::{Content, Ended, File, Sending, Submission, Submitted, Waiting, settings_with_frames};
+use rayfold_client::{
+    Content, Ended, Error, File, Preview, Sending, Submission, Submitted, Waiting, settings_with_frames,
+};
 use rayfold_pipeline::keys::{Animation, ScriptName};
 use rayfold_scene::Limits;
 use rayon::prelude::*;
 
-use super::{BucketArgs, Client, address, fetch, parse_animation, report, with_bucket};
-use crate::console::Console;
+use super::{
+    BucketArgs, Client, address, agree, fetch, named, names_of, parse_animation, report, with_bucket,
+};
+use crate::console::{Console, visible};
 use crate::input::Input;
 use crate::outcome::{Outcome, Usage};
 use crate::output::probe;
 use crate::plan::{Plan, Wishes};
 use crate::progress::Progress;
-use crate::render::target::Target;
+use crate::render::target::must_be_gif;
+use crate::values;
 use crate::wording::number;
 
 /// Bytes of a script's name that MinIO can draw: it keeps objects as files, whose names have at most 255 bytes, and a
@@ -26,16 +31,23 @@ const LONGEST_NAME_ON_MINIO: usize = 200;
 
 /// Render a folder of scripts in the cloud and download the animation
 ///
-/// Checks all scripts, makes scripts/ANIMATION/ in the bucket equal to the folder (uploading only what changed, deleting
-/// scripts that are no longer there), waits, and downloads the GIF. Interrupting it loses nothing: the same command
-/// picks up where the bucket is.
+/// Checks all scripts, makes scripts/ANIMATION/ in the bucket equal to the folder (uploading only what changed), waits,
+/// and downloads the GIF. Scripts in the bucket that the folder does not have, somebody else's perhaps, are deleted only
+/// with --delete, or after a yes at a terminal. Interrupting it loses nothing: the same command picks up where the bucket
+/// is.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  rayfold submit scenes/hello --bucket my-bucket               writes hello.gif
-  rayfold submit scenes/hello --bucket my-bucket -o a.gif      writes a.gif
-  rayfold submit scenes/hello --bucket my-bucket --no-wait     only uploads
-  rayfold submit shots/7 --bucket my-bucket --name film/7      under a name of its own")]
+  rayfold submit scenes/hello --bucket my-bucket
+      writes hello.gif
+  rayfold submit scenes/hello --bucket my-bucket -o a.gif
+      writes a.gif
+  rayfold submit scenes/hello --bucket my-bucket --no-wait
+      only uploads
+  rayfold submit shots/7 --bucket my-bucket --name film/7
+      under a name of its own
+  rayfold submit scenes/hello --bucket my-bucket --dry-run
+      shows what would be done")]
 pub(crate) struct Args {
     /// The folder
     folder: PathBuf,
@@ -50,6 +62,15 @@ pub(crate) struct Args {
     /// The animation's name in the bucket, which may hold slashes [default: the folder's name]
     #[arg(long, value_name = "ANIMATION", value_parser = parse_animation)]
     name: Option<Animation>,
+    /// Delete scripts in the bucket that the folder does not have, without asking
+    #[arg(long)]
+    delete: bool,
+    /// Show what would be uploaded and deleted, and do nothing
+    #[arg(long, conflicts_with_all = ["output", "no_wait"])]
+    dry_run: bool,
+    /// The largest image that a script may ask for, in pixels; the functions have a limit of their own
+    #[arg(long, value_name = "N", value_parser = values::count::<u64>, default_value_t = Limits::PIXELS)]
+    max_pixels: u64,
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
@@ -63,23 +84,35 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     };
     let last = animation.as_str().rsplit('/').next().unwrap_or_default();
     let output = args.output.clone().unwrap_or_else(|| format!("{last}.gif").into());
-    if !args.no_wait {
-        if !matches!(Target::parse(&output)?, Target::Gif(_)) {
-            return Err(Usage(format!("{} does not end in .gif", output.display())).into());
-        }
+    if !args.no_wait && !args.dry_run {
+        must_be_gif(&output)?;
         probe(&output)?;
     }
-    let limits = Limits::default();
+    let limits = Limits { max_pixels: args.max_pixels, ..Limits::default() };
     let input = Input::animation(std::slice::from_ref(&args.folder), &limits)?;
     let plan = match Plan::new(&input, &limits, &Wishes::default(), console)? {
         Ok(plan) => plan,
         Err(faults) => anyhow::bail!("nothing was uploaded: {}", faults.count()),
     };
-    plan.one_size()?;
-    let submission = submission(&input, &plan, &animation, console)?;
+    plan.one_size().map_err(|error| anyhow::anyhow!("{error}: give their scripts the same Screen"))?;
+    let mut submission = submission(&input, &plan, &animation, console)?;
     with_bucket(&args.bucket, async |client| {
         let bucket = &args.bucket.bucket;
-        let submitted = send(client, &submission, bucket, console).await?;
+        if args.dry_run {
+            return preview(client, &submission, bucket, console).await;
+        }
+        if args.delete {
+            submission = submission.deleting_all_others();
+        }
+        let submitted = loop {
+            match send(client, &submission, bucket, console).await {
+                Err(Error::WouldDelete { keys }) => {
+                    may_delete(args, &submission, &keys, console).await?;
+                    submission = submission.deleting(keys);
+                }
+                submitted => break submitted?,
+            }
+        };
         if args.no_wait {
             console.note(format_args!(
                 "{animation} is under way; rayfold status {animation} --bucket {bucket} --watch follows it"
@@ -135,18 +168,68 @@ fn submission(
     Ok(Submission::new(animation.clone(), scripts, settings)?)
 }
 
+/// Says what would be done, a line a file.
+async fn preview(
+    client: Client<'_>,
+    submission: &Submission,
+    bucket: &str,
+    console: &Console,
+) -> anyhow::Result<Outcome> {
+    let Preview { upload, delete, unchanged } = client.preview(submission).await?;
+    let lines = |what: &'static str, keys: &[String]| {
+        keys.iter().map(|key| format!("{what} {}\n", visible(key))).collect::<String>()
+    };
+    console.print(lines("upload", &upload) + &lines("delete", &delete))?;
+    console.note(format_args!(
+        "{}: {} would be uploaded, {} deleted, {unchanged} unchanged",
+        address(bucket, &submission.animation().scripts()),
+        number(upload.len() as u64, "file"),
+        delete.len()
+    ));
+    Ok(Outcome::Done)
+}
+
+/// Asks whether scripts that the folder does not have may be deleted.
+///
+/// # Errors
+/// When they may not, or there is nobody to ask.
+async fn may_delete(
+    args: &Args,
+    submission: &Submission,
+    keys: &[String],
+    console: &Console,
+) -> anyhow::Result<()> {
+    let (animation, shown) = (submission.animation(), args.folder.display());
+    let names = names_of(keys, &animation.scripts());
+    let what = format!(
+        "{} in {} that {shown} does not have",
+        number(keys.len() as u64, "script"),
+        address(&args.bucket.bucket, &animation.scripts())
+    );
+    match agree(&names, &format!("Delete {what}?"), console).await? {
+        Some(true) => Ok(()),
+        Some(false) => anyhow::bail!("nothing was uploaded"),
+        None => anyhow::bail!(
+            "there are {what}: {}; nothing was uploaded: give --delete to delete them, or --name to submit another \
+             animation",
+            named(&names)
+        ),
+    }
+}
+
 /// Makes the bucket's folder as wanted, and tells how far that is.
 async fn send(
     client: Client<'_>,
     submission: &Submission,
     bucket: &str,
     console: &Console,
-) -> anyhow::Result<Submitted> {
+) -> rayfold_client::Result<Submitted> {
     let folder = address(bucket, &submission.animation().scripts());
     let mut progress: Option<Progress> = None;
     let told = |sending| match sending {
         Sending::Deleted { scripts } => {
-            console.note(format_args!("{} no longer in the folder, deleted", number(scripts, "script")));
+            console
+                .note(format_args!("{} that the folder does not have: deleted", number(scripts, "script")));
         }
         Sending::Uploading { done, total } => {
             let bar = progress.get_or_insert_with(|| Progress::start(console, "scripts uploaded", total));
@@ -163,7 +246,7 @@ async fn send(
             }
         },
     };
-    Ok(client.submit(submission, told).await?)
+    client.submit(submission, told).await
 }
 
 /// Waits until what was uploaded has become a GIF or cannot, and tells how far that is.

@@ -22,6 +22,9 @@ const PAGE: f64 = 1000.0;
 /// The part of a GIF that one request uploads.
 const UPLOAD_PART_MB: f64 = 8.0;
 
+/// The quiet before the assembler starts, or its rounds of listings.
+const ASSEMBLE_OVERHEAD_MS: f64 = 1000.0;
+
 /// Log lines of an invocation, the platform's own among them.
 const LOG_BYTES: f64 = 1500.0;
 
@@ -57,6 +60,13 @@ pub(super) struct Workload {
     pub(super) gif_mb: f64,
     pub(super) sweep_minutes: f64,
     pub(super) customer_managed_key: bool,
+}
+
+impl Workload {
+    /// How long the assemble function runs, in seconds.
+    pub(super) fn assembling_s(&self) -> f64 {
+        (self.frames as f64 * self.assemble_ms + ASSEMBLE_OVERHEAD_MS) / 1e3
+    }
 }
 
 /// Lines under one heading.
@@ -105,8 +115,6 @@ fn making(work: &Workload, prices: &Prices) -> Section {
     let frames = work.frames as f64;
     let compute = gb_second(work, prices);
     let uploads = (work.gif_mb / UPLOAD_PART_MB).ceil() + 2.0;
-    // The quiet before the assembler starts, or its rounds of listings.
-    let overhead_ms = 1000.0;
     let invocations = frames + 1.0;
     Section::new(
         "Making it, once",
@@ -115,7 +123,7 @@ fn making(work: &Workload, prices: &Prices) -> Section {
             line("Lambda: rendering", frames * gb_seconds(work.memory_mb, work.ms), "GB-s", compute),
             line(
                 "Lambda: assembling",
-                gb_seconds(work.assemble_memory_mb, frames * work.assemble_ms + overhead_ms),
+                gb_seconds(work.assemble_memory_mb, 1e3 * work.assembling_s()),
                 "GB-s",
                 compute,
             ),

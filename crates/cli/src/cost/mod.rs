@@ -1,8 +1,9 @@
 //! `rayfold cost`: what an animation costs on AWS, before it is made.
 //!
-//! Asks nobody: the prices are a data file, the rest is arithmetic.
+//! Asks nobody: the prices are a data file, the rest is arithmetic, and what drawing takes is measured here.
 
 mod estimate;
+mod measure;
 mod prices;
 
 use std::fmt::Write as _;
@@ -15,8 +16,9 @@ use serde::Serialize;
 
 use crate::console::{Console, Format};
 use crate::outcome::Outcome;
-use crate::render::parse_size;
+use crate::values;
 use estimate::{Section, Workload, estimate};
+use measure::measure;
 use prices::{BUILT_IN, Prices};
 
 /// Bytes of a frame's PNG, a pixel: about twice what `scenes/hello` gives.
@@ -25,49 +27,61 @@ const FRAME_BYTES_A_PIXEL: f64 = 0.15;
 /// Bytes of the GIF, a pixel of a frame: about twice what `scenes/hello` gives.
 const GIF_BYTES_A_PIXEL: f64 = 0.06;
 
-/// Time that the assemble function takes for a pixel: reading the frame, decoding, quantising, encoding. Measured: 30 to
-/// 50 ns of a processor (`docs/decisions/gif-in-one-piece.md`).
-const ASSEMBLE_NS_A_PIXEL: f64 = 60.0;
+/// Time that the assemble function takes for a pixel: decoding, quantising, encoding. Measured: 14 to 23 ns of a
+/// processor, more for small frames (`docs/decisions/gif-in-one-piece.md`); Lambda's may be slower.
+const ASSEMBLE_NS_A_PIXEL: f64 = 30.0;
+
+/// The longest that the assemble function can run, in seconds: the stack's default, and the most that Lambda allows.
+const ASSEMBLE_TIMEOUT_S: f64 = 900.0;
+
+/// US dollars that are shown as 0.0001; what costs less is summed up.
+const LEAST_SHOWN: f64 = 0.000_05;
 
 /// Estimate what an animation costs on AWS
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  rayfold cost --frames 50 --ms 180                             50 frames of 512x512
+  rayfold cost scenes/hello
+      draws some frames to see how long that takes
+  rayfold cost --frames 50 --ms 180
+      50 frames of 512x512
   rayfold cost --frames 1000 --ms 1500 --size 1920x1080
   rayfold cost --frames 1000 --ms 750 --memory 3538 --architecture arm64
 
 Free allowances are left out. What it counts, and how: docs/cost.md.")]
 pub(crate) struct Args {
+    /// A folder, or script files, of which some frames are drawn to measure what a frame takes
+    #[arg(required_unless_present = "frames")]
+    input: Vec<PathBuf>,
     /// How many frames
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    frames: u64,
-    /// Milliseconds that the render function takes for one, as its log says, with this --memory
-    #[arg(long, value_name = "MS", value_parser = positive)]
-    ms: f64,
-    /// The frames' size in pixels
-    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = parse_size)]
-    size: Screen,
+    #[arg(long, value_name = "N", value_parser = values::count::<u64>, conflicts_with = "input", requires = "ms")]
+    frames: Option<u64>,
+    /// Milliseconds that the render function takes for one, as its log says, with this --memory [default: measured]
+    #[arg(long, value_name = "MS", value_parser = values::positive, allow_negative_numbers = true)]
+    ms: Option<f64>,
+    /// The frames' size in pixels [default: 512x512, or that of the scripts]
+    #[arg(long, value_name = "WxH", value_parser = values::size, conflicts_with = "input")]
+    size: Option<Screen>,
     /// Memory of the render function, in MB
-    #[arg(long, value_name = "MB", default_value = "1769", value_parser = positive)]
+    #[arg(long, value_name = "MB", default_value = "1769", value_parser = values::positive)]
     memory: f64,
     /// Memory of the assemble function, in MB
-    #[arg(long, value_name = "MB", default_value = "3008", value_parser = positive)]
+    #[arg(long, value_name = "MB", default_value = "3008", value_parser = values::positive)]
     assemble_memory: f64,
     /// What the functions run on
     #[arg(long, value_enum, default_value_t)]
     architecture: Architecture,
     /// Milliseconds that the assemble function takes for a frame, if you know better than from the size
-    #[arg(long, value_name = "MS", value_parser = positive)]
+    #[arg(long, value_name = "MS", value_parser = values::positive)]
     assemble_ms: Option<f64>,
-    /// Size of a frame's PNG in kB, if you know better
-    #[arg(long, value_name = "KB", value_parser = positive)]
+    /// Size of a frame's PNG in kB, if you know better than what is measured, or from the size
+    #[arg(long, value_name = "KB", value_parser = values::positive)]
     frame_kb: Option<f64>,
     /// Size of the GIF in MB, if you know better
-    #[arg(long, value_name = "MB", value_parser = positive)]
+    #[arg(long, value_name = "MB", value_parser = values::positive)]
     gif_mb: Option<f64>,
     /// Minutes between two sweeps
-    #[arg(long, value_name = "MIN", default_value = "15", value_parser = positive)]
+    #[arg(long, value_name = "MIN", default_value = "15", value_parser = values::positive)]
     sweep_minutes: f64,
     /// With a key of the stack's own
     #[arg(long)]
@@ -94,14 +108,26 @@ struct Report<'a> {
     region: &'a str,
     currency: &'a str,
     sources: &'a [String],
+    /// Everything, while it is made and in the first month.
+    first_month_usd: f64,
+    /// Everything, in each month after.
+    later_month_usd: f64,
     workload: &'a Workload,
     sections: &'a [Section],
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let prices = read(args.prices.as_ref())?;
-    let work = workload(args);
+    let work = workload(args, console)?;
     let sections = estimate(&work, &prices);
+    let assembling_s = work.assembling_s();
+    if assembling_s > ASSEMBLE_TIMEOUT_S {
+        console.warn(format_args!(
+            "assembling takes about {} s, and the function that does it is stopped after {ASSEMBLE_TIMEOUT_S} s: expected \
+             fewer or smaller frames; or fetch the frames, and assemble them by rayfold encode",
+            amount(assembling_s)
+        ));
+    }
     match args.format {
         Format::Text => console.print(table(&work, &prices, &sections))?,
         Format::Json => {
@@ -110,6 +136,8 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
                 region: &prices.region,
                 currency: &prices.currency,
                 sources: &prices.sources,
+                first_month_usd: sections.iter().map(|section| section.usd).sum(),
+                later_month_usd: later_month(&sections),
                 workload: &work,
                 sections: &sections,
             };
@@ -125,22 +153,39 @@ fn read(file: Option<&PathBuf>) -> anyhow::Result<Prices> {
     serde_json::from_str(&text).with_context(|| format!("{} holds no prices", path.display()))
 }
 
-fn workload(args: &Args) -> Workload {
-    let pixels = args.size.pixels() as f64;
-    Workload {
-        frames: args.frames,
-        ms: args.ms,
-        width: args.size.width() as usize,
-        height: args.size.height() as usize,
+fn workload(args: &Args, console: &Console) -> anyhow::Result<Workload> {
+    let measured = match args.frames {
+        Some(_) => None,
+        None => Some(measure(&args.input, args.memory, console)?),
+    };
+    let measured = measured.as_ref();
+    let frames = measured.map(|measured| measured.frames).or(args.frames).context("how many frames?")?;
+    let ms = args.ms.or(measured.map(|measured| measured.ms)).context("how long does a frame take?")?;
+    let size = match measured.map(|measured| measured.size).or(args.size) {
+        Some(size) => size,
+        None => Screen::new(512, 512)?,
+    };
+    let frame_kb = args.frame_kb.or(measured.map(|measured| measured.frame_kb));
+    let pixels = size.pixels() as f64;
+    Ok(Workload {
+        frames,
+        ms,
+        width: size.width() as usize,
+        height: size.height() as usize,
         memory_mb: args.memory,
         assemble_memory_mb: args.assemble_memory,
         arm64: args.architecture == Architecture::Arm64,
         assemble_ms: args.assemble_ms.unwrap_or(pixels * ASSEMBLE_NS_A_PIXEL / 1e6),
-        frame_kb: args.frame_kb.unwrap_or(pixels * FRAME_BYTES_A_PIXEL / 1e3),
-        gif_mb: args.gif_mb.unwrap_or(args.frames as f64 * pixels * GIF_BYTES_A_PIXEL / 1e6),
+        frame_kb: frame_kb.unwrap_or(pixels * FRAME_BYTES_A_PIXEL / 1e3),
+        gif_mb: args.gif_mb.unwrap_or(frames as f64 * pixels * GIF_BYTES_A_PIXEL / 1e6),
         sweep_minutes: args.sweep_minutes,
         customer_managed_key: args.customer_managed_key,
-    }
+    })
+}
+
+/// All but what is paid once, which is the first section.
+fn later_month(sections: &[Section]) -> f64 {
+    sections.iter().skip(1).map(|section| section.usd).sum()
 }
 
 /// The estimate for people.
@@ -164,12 +209,23 @@ fn table(work: &Workload, prices: &Prices, sections: &[Section]) -> String {
     for section in sections {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "\n{}", section.title);
-        for line in &section.lines {
-            let amount = format!("{} {}", amount(line.amount), line.unit);
-            let _ = writeln!(text, "  {:<28} {:>16} {:>12.4}", line.item, amount.trim_end(), line.usd);
+        let mut row = |item: &str, amount: &str, usd: f64| {
+            let _ = writeln!(text, "  {item:<28} {amount:>16} {usd:>12.4}");
+        };
+        let (shown, rest): (Vec<_>, Vec<_>) = section.lines.iter().partition(|line| line.usd >= LEAST_SHOWN);
+        for line in shown {
+            row(line.item, format!("{} {}", amount(line.amount), line.unit).trim_end(), line.usd);
         }
-        let _ = writeln!(text, "  {:<28} {:>16} {:>12.4}", "Together", "", section.usd);
+        let rest: f64 = rest.iter().map(|line| line.usd).sum();
+        if rest >= LEAST_SHOWN {
+            row("What costs less than 0.0001", "", rest);
+        }
+        row("Together", "", section.usd);
     }
+    let all: f64 = sections.iter().map(|section| section.usd).sum();
+    let later = later_month(sections);
+    let _ = writeln!(text, "\nTotal\n  {:<45} {all:>12.4}", "The first month");
+    let _ = writeln!(text, "  {:<45} {later:>12.4}", "Each month after");
     text
 }
 
@@ -187,13 +243,6 @@ fn amount(value: f64) -> String {
         text.push(digit);
     }
     text
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err("expected a number greater than 0".to_owned()),
-    }
 }
 
 #[cfg(test)]

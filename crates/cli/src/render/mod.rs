@@ -3,31 +3,37 @@
 //! Everything is checked before the first frame is drawn, and nothing is written when a script has an error. Frames
 //! are drawn ahead of the encoder within a bound ([`crate::ahead`]), so that memory does not grow with their number.
 
-use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
 
 use anyhow::Context;
+use clap::ValueEnum;
 use image::RgbImage;
-use rayfold_gif::{Encoder, Settings, Summary};
-use rayfold_scene::{AnimationSettings, Limits, Screen};
+use rayfold_gif::Plays;
+use rayfold_scene::{AnimationSettings, Limits, Scene, Screen};
 use rayfold_tracer::{Precision, RenderOptions};
 
 use crate::ahead;
 use crate::console::Console;
-use crate::input::Input;
+use crate::input::{Input, is_stdin};
 use crate::interrupt;
 use crate::outcome::{Outcome, Usage};
-use crate::output::{OutputError, OutputFile, probe};
+use crate::output::{OutputFile, probe};
 use crate::plan::{Job, Plan, Wishes};
+use crate::playback::Playback;
 use crate::progress::Progress;
 use crate::threads::Threads;
+use crate::values;
 use crate::wording::{Size, number};
 
+mod apng;
+pub(crate) mod movie;
 pub(crate) mod target;
+mod watch;
+mod y4m;
 
-use target::{Format, Pattern, Target};
+use movie::MovieError;
+use target::{Container, Format, Movie, Pattern, Place, Target};
 
 /// Render scripts to an animation, to one image, or to many
 ///
@@ -36,38 +42,73 @@ use target::{Format, Pattern, Target};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  rayfold render scenes/hello -o hello.gif             a folder, as an animation
-  rayfold render a.txt b.txt -o ab.gif --fps 25        scripts in the given order
-  rayfold render scenes/hello -o hello.png --frame 7   one frame
-  rayfold render scenes/hello -o 'frames/%04d.png'     each frame: frames/0001.png and on
-  generate | rayfold render - -o out.gif               a script from another program")]
+  rayfold render scenes/hello -o hello.gif
+      a folder, as an animation
+  rayfold render a.txt b.txt -o ab.gif --fps 25
+      scripts in the given order
+  rayfold render scenes/hello -o hello.png --frame 7
+      one frame
+  rayfold render scenes/hello -o 'frames/%04d.png'
+      each frame: frames/0001.png and on
+  rayfold render my-scene -o my.gif --watch
+      again whenever a script is saved
+  rayfold render scenes/hello -o - | ffplay -
+      to another program; see docs/video.md
+  generate | rayfold render - -o out.gif
+      a script from another program")]
 pub(crate) struct Args {
     /// A folder (its *.txt in natural order), script files (in the given order), or - for standard input
     #[arg(required = true)]
     input: Vec<PathBuf>,
-    /// What to write: .gif for an animation; .png, .tif or .tiff for one frame, with %04d in the name for many
+    /// What to write: .gif, .apng or .y4m for an animation (- is .y4m to standard output); .png, .tif or .tiff for one
+    /// frame, with %04d in the name for many, whose folder is made
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
     /// Frames a second [default: what animation.json says, or 10]
-    #[arg(long, value_name = "RATE")]
+    #[arg(long, value_name = "RATE", value_parser = values::rate, allow_negative_numbers = true)]
     fps: Option<f64>,
-    /// How often to repeat the animation, 0 for ever [default: what animation.json says, or 0]
-    #[arg(long = "loop", value_name = "TIMES")]
-    loops: Option<u16>,
+    #[command(flatten)]
+    playback: Playback,
     /// Draw every frame in this size, such as 640x480, instead of that of its Screen
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = values::size)]
     size: Option<Screen>,
     /// Draw frame N, or frames A to B, counted from 1
     #[arg(long, value_name = "N|A..B", value_parser = parse_frames)]
     frame: Option<Frames>,
+    /// Leave frames that are there already, whole and of the right size: goes on where Ctrl-C stopped. Files of scripts
+    /// that have changed since are left, too
+    #[arg(long, conflicts_with = "watch")]
+    skip_existing: bool,
+    /// Draw again whenever a script changes, until Ctrl-C
+    #[arg(long)]
+    watch: bool,
     /// The numbers to compute with; auto takes f32 where its errors cannot be seen
-    #[arg(long, value_name = "WHICH", value_parser = parse_precision, default_value = "auto")]
-    precision: Precision,
+    #[arg(long, value_name = "WHICH", value_enum, default_value_t)]
+    precision: Numbers,
     #[command(flatten)]
     threads: Threads,
     /// The largest image that a script may ask for, in pixels
-    #[arg(long, value_name = "N", default_value_t = Limits::PIXELS)]
+    #[arg(long, value_name = "N", value_parser = values::count::<u64>, default_value_t = Limits::PIXELS)]
     max_pixels: u64,
+}
+
+/// `--precision`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Numbers {
+    #[default]
+    Auto,
+    F32,
+    F64,
+}
+
+impl From<Numbers> for Precision {
+    fn from(numbers: Numbers) -> Self {
+        match numbers {
+            Numbers::Auto => Self::Auto,
+            Numbers::F32 => Self::F32,
+            Numbers::F64 => Self::F64,
+        }
+    }
 }
 
 /// First and last frame, where they are given.
@@ -75,28 +116,62 @@ type Frames = (Option<u64>, Option<u64>);
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let target = Target::parse(&args.output)?;
-    if !matches!(target, Target::Gif(_)) && (args.fps.is_some() || args.loops.is_some()) {
-        return Err(Usage(
-            "--fps and --loop are for animations: expected an output that ends in .gif".into(),
-        )
-        .into());
+    check(args, &target)?;
+    args.threads.start()?;
+    if args.watch {
+        watch::draw_again(&args.input, console, || draw_all(args, &target, console))
+    } else {
+        draw_all(args, &target, console)?;
+        Ok(Outcome::Done)
     }
-    if let Some(size) = args.size
-        && size.pixels() > args.max_pixels
-    {
-        return Err(Usage(format!(
+}
+
+/// What clap cannot rule out by itself.
+fn check(args: &Args, target: &Target) -> Result<(), Usage> {
+    let usage = |message: &str| Err(Usage(message.into()));
+    match target {
+        Target::Animation(Container::Gif | Container::Apng, _) => {}
+        Target::Animation(Container::Y4m, _) if args.playback.is_given() => {
+            return usage(
+                "--loop, --once and --final-delay are for .gif and .apng: a .y4m holds frames and their rate alone",
+            );
+        }
+        Target::Animation(Container::Y4m, _) => {}
+        Target::Image(..) | Target::Images(..) if args.fps.is_some() || args.playback.is_given() => {
+            return usage(
+                "--fps, --loop, --once and --final-delay are for animations: expected an output that ends in .gif or .apng",
+            );
+        }
+        Target::Image(..) | Target::Images(..) => {}
+    }
+    if args.skip_existing && !matches!(target, Target::Images(..)) {
+        return usage("--skip-existing is for a file a frame: expected a pattern such as frames/%04d.png");
+    }
+    if args.watch {
+        if args.input.iter().any(|input| is_stdin(input)) {
+            return usage("--watch looks at files: standard input (-) does not change");
+        }
+        if matches!(target, Target::Animation(_, Place::StandardOutput)) {
+            return usage("--watch writes the same file again: expected one instead of standard output (-)");
+        }
+    }
+    match args.size {
+        Some(size) if size.pixels() > args.max_pixels => Err(Usage(format!(
             "--size asks for {} pixels, more than the limit of {} (--max-pixels)",
             size.pixels(),
             args.max_pixels
-        ))
-        .into());
+        ))),
+        _ => Ok(()),
     }
-    args.threads.start()?;
+}
+
+fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<()> {
     let wishes =
-        Wishes { size: args.size, frames: args.frame.unwrap_or_default(), precision: args.precision };
-    match &target {
-        Target::Gif(path) | Target::Image(path, _) => probe(path)?,
-        Target::Images(pattern, _) => probe(&pattern.path(wishes.frames.0.unwrap_or(1)))?,
+        Wishes { size: args.size, frames: args.frame.unwrap_or_default(), precision: args.precision.into() };
+    match target {
+        Target::Animation(_, Place::File(path)) | Target::Image(path, _) => probe(path)?,
+        Target::Animation(_, Place::StandardOutput) => {}
+        Target::Images(pattern, _) => pattern.probe(wishes.frames.0.unwrap_or(1))?,
     }
     let limits = Limits { max_pixels: args.max_pixels, ..Limits::default() };
     let input = Input::animation(&args.input, &limits)?;
@@ -104,85 +179,66 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         Ok(plan) => plan,
         Err(faults) => anyhow::bail!("nothing was written: {}", faults.count()),
     };
-    match &target {
-        Target::Gif(path) => animation(path, &plan, &settings(args, &plan)?, console)?,
-        Target::Image(path, format) => image(path, *format, &plan, console)?,
-        Target::Images(pattern, format) => images(pattern, *format, &plan, console)?,
+    match target {
+        Target::Animation(container, place) => animation(args, *container, place, &plan, console),
+        Target::Image(path, format) => image(path, *format, &plan, console),
+        Target::Images(pattern, format) => images(pattern, *format, args.skip_existing, &plan, console),
     }
-    Ok(Outcome::Done)
-}
-
-fn settings(args: &Args, plan: &Plan) -> anyhow::Result<AnimationSettings> {
-    let of_folder = plan.settings;
-    let fps = args.fps.unwrap_or(of_folder.fps());
-    AnimationSettings::new(of_folder.frames(), fps, args.loops.unwrap_or(of_folder.loops()))
-        .map_err(|e| Usage(format!("--fps {fps}: {e}")).into())
 }
 
 fn animation(
-    path: &Path,
+    args: &Args,
+    container: Container,
+    place: &Place,
     plan: &Plan,
-    settings: &AnimationSettings,
     console: &Console,
 ) -> anyhow::Result<()> {
-    plan.one_size()?;
-    let mut out = BufWriter::with_capacity(1 << 20, OutputFile::create(path)?);
-    let failed = |error| match error {
-        rayfold_gif::Error::Write { source, .. } => {
-            OutputError::Io { path: path.to_path_buf(), source }.into()
-        }
-        other => anyhow::Error::new(other),
+    let size = match (plan.one_size(), args.size) {
+        (Err(error), None) => anyhow::bail!("{error}: give them one with --size"),
+        (size, _) => size?,
     };
-    let gif_settings = Settings { fps: settings.fps(), loops: settings.loops() };
-    let mut encoder = Encoder::new(&mut out, gif_settings).map_err(failed)?;
+    let fps = args.fps.unwrap_or(plan.settings.fps());
+    // The bounds are the language's.
+    AnimationSettings::new(None, fps, 0).map_err(|error| Usage(format!("--fps {fps}: {error}")))?;
+    let movie = Movie {
+        size: (size.width(), size.height()),
+        frames: plan.len(),
+        fps,
+        plays: args.playback.plays(Plays::repeated(plan.settings.loops())),
+        last_delay_cs: args.playback.last_delay_cs(),
+    };
     let mut progress = Progress::start(console, "frames", plan.len());
     let mut done = 0;
-    ahead::in_order(
-        plan.jobs(),
-        plan.window(),
-        |job| draw(plan, &job),
-        |frame| {
-            anyhow::ensure!(!interrupt::stopping(), "interrupted");
-            encoder.push(frame).map_err(failed)?;
-            done += 1;
-            progress.set(console, done);
-            Ok(())
-        },
-    )?;
-    let summary = encoder.finish().map_err(failed)?;
+    let written = movie::write(place, container, movie, |push| {
+        ahead::in_order(
+            plan.jobs(),
+            plan.window(),
+            |job| draw(plan, &job),
+            |frame| {
+                anyhow::ensure!(!interrupt::stopping(), "interrupted");
+                push(frame)?;
+                done += 1;
+                progress.set(console, done);
+                Ok(())
+            },
+        )
+    });
     let took = progress.finish();
-    let out =
-        out.into_inner().map_err(|e| OutputError::Io { path: path.to_path_buf(), source: e.into_error() })?;
-    out.finish(true)?;
-    tell(path, &summary, settings.fps(), took, console);
-    Ok(())
-}
-
-/// Says what was written.
-pub(crate) fn tell(path: &Path, summary: &Summary, fps: f64, took: Duration, console: &Console) {
-    console.note(format_args!(
-        "{}: {} of {} x {}, {}, in {:.2} s",
-        path.display(),
-        number(summary.frames, "frame"),
-        summary.size.0,
-        summary.size.1,
-        Size(summary.bytes),
-        took.as_secs_f64()
-    ));
-    if summary.dropped > 0 {
-        console.note(format_args!(
-            "{} left out: a GIF shows at most 50 frames a second, not {}",
-            number(summary.dropped, "frame"),
-            fps
-        ));
+    match written {
+        Ok(written) => movie::tell(place, &written, fps, took, console),
+        Err(error) if matches!(error.downcast_ref(), Some(MovieError::Closed)) => {
+            console.note(format_args!("{error} after {}", number(done, "frame")));
+        }
+        Err(error) => return Err(error),
     }
+    Ok(())
 }
 
 fn image(path: &Path, format: Format, plan: &Plan, console: &Console) -> anyhow::Result<()> {
     let mut jobs = plan.jobs();
     let (Some(job), None) = (jobs.next(), jobs.next()) else {
         anyhow::bail!(
-            "{} frames do not fit into {}: expected --frame N, a pattern such as %04d.png, or .gif",
+            "{} frames do not fit into {}: expected --frame N, a pattern such as frames/%04d.png, or .gif",
             plan.len(),
             path.display()
         );
@@ -196,62 +252,80 @@ fn image(path: &Path, format: Format, plan: &Plan, console: &Console) -> anyhow:
     Ok(())
 }
 
-fn images(pattern: &Pattern, format: Format, plan: &Plan, console: &Console) -> anyhow::Result<()> {
+/// What has become of a frame that is to be a file.
+enum Drawn {
+    Written(u64),
+    /// It was there already.
+    Skipped,
+}
+
+fn images(
+    pattern: &Pattern,
+    format: Format,
+    skip_existing: bool,
+    plan: &Plan,
+    console: &Console,
+) -> anyhow::Result<()> {
+    pattern.make_folder()?;
     let mut progress = Progress::start(console, "frames", plan.len());
-    let (mut done, mut bytes) = (0, 0);
+    let (mut done, mut bytes, mut skipped) = (0, 0, 0);
     let files = AtomicU64::new(0);
     let written = ahead::in_order(
         plan.jobs(),
         plan.window(),
         |job| {
+            let path = pattern.path(job.number);
+            if skip_existing && is_drawn(&path, format, plan.scene(&job)?.screen) {
+                return Ok(Drawn::Skipped);
+            }
             let file = format.encode(&draw(plan, &job)?)?;
-            OutputFile::write(pattern.path(job.number), &file, false)?;
+            OutputFile::write(path, &file, false)?;
             files.fetch_add(1, Ordering::Relaxed);
-            Ok(file.len() as u64)
+            Ok(Drawn::Written(file.len() as u64))
         },
-        |size| {
+        |drawn| {
+            match drawn {
+                Drawn::Written(size) => bytes += size,
+                Drawn::Skipped => skipped += 1,
+            }
             done += 1;
-            bytes += size;
             progress.set(console, done);
             Ok(())
         },
     );
     let took = progress.finish().as_secs_f64();
     written.with_context(|| format!("{} of {} written", files.into_inner(), number(plan.len(), "frame")))?;
-    let path = |job: Option<Job>| pattern.path(job.map_or(1, |job| job.number));
+    let number_of = |job: Option<Job>| job.map_or(1, |job| job.number);
+    let there = if skipped > 0 { format!(" ({skipped} were there)") } else { String::new() };
     console.note(format_args!(
-        "{} to {}: {}, {}, in {took:.2} s",
-        path(plan.jobs().next()).display(),
-        path(plan.jobs().last()).display(),
+        "{}: {}{there}, {}, in {took:.2} s",
+        pattern.range(number_of(plan.jobs().next()), number_of(plan.jobs().last())),
         number(plan.len(), "frame"),
         Size(bytes)
     ));
     Ok(())
 }
 
-fn parse_precision(text: &str) -> Result<Precision, String> {
-    match text {
-        "auto" => Ok(Precision::Auto),
-        "f32" => Ok(Precision::F32),
-        "f64" => Ok(Precision::F64),
-        _ => Err("expected auto, f32 or f64".into()),
-    }
+/// There is a whole image of this size.
+fn is_drawn(path: &Path, format: Format, screen: Screen) -> bool {
+    let file = std::fs::read(path).ok();
+    let image = file.and_then(|file| format.decode(&file));
+    image.is_some_and(|image| image.dimensions() == (screen.width(), screen.height()))
 }
 
 fn draw(plan: &Plan, job: &Job) -> anyhow::Result<RgbImage> {
-    anyhow::ensure!(!interrupt::stopping(), "interrupted");
-    let scene = plan.scene(job)?;
-    let options =
-        RenderOptions { cancel: Some(interrupt::flag()), precision: plan.precision, ..Default::default() };
-    rayfold_tracer::render(&scene, &options)
+    draw_scene(&plan.scene(job)?, plan.precision)
         .with_context(|| format!("cannot render frame {} ({})", job.number, plan.name(job)))
 }
 
-/// Width and height, as `640x480`.
-pub(crate) fn parse_size(text: &str) -> Result<Screen, String> {
-    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-    let (width, height) = sides.ok_or("expected width and height in pixels, such as 640x480")?;
-    Screen::new(width, height).map_err(|e| e.to_string())
+/// Draws a scene, unless the run was told to stop.
+///
+/// # Errors
+/// When it was, and those of the renderer.
+pub(crate) fn draw_scene(scene: &Scene, precision: Precision) -> anyhow::Result<RgbImage> {
+    anyhow::ensure!(!interrupt::stopping(), "interrupted");
+    let options = RenderOptions { cancel: Some(interrupt::flag()), precision, ..Default::default() };
+    Ok(rayfold_tracer::render(scene, &options)?)
 }
 
 fn parse_frames(text: &str) -> Result<Frames, String> {
@@ -282,14 +356,6 @@ mod tests {
         assert_eq!(parse_frames("3.."), Ok((Some(3), None)));
         for wrong in ["", "0", "-1", "1.5", "9..3", "0..3", "a..b", "1...3", "1..=3"] {
             assert!(parse_frames(wrong).is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
-    fn sizes_are_two_whole_numbers() {
-        assert_eq!(parse_size("640x480"), Ok(Screen::new(640, 480).unwrap()));
-        for wrong in ["", "640", "640x", "0x480", "640x480x3", "-1x2", "6.4x3"] {
-            assert!(parse_size(wrong).is_err(), "{wrong}");
         }
     }
 }

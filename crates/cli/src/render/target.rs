@@ -3,19 +3,50 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use image::{ExtendedColorType, ImageEncoder, RgbImage};
+use image::{ExtendedColorType, ImageEncoder, ImageFormat, RgbImage};
+use rayfold_gif::Plays;
 
 use crate::outcome::Usage;
+use crate::output::probe;
 
 /// What OUT asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Target {
     /// All frames as one animation.
-    Gif(PathBuf),
+    Animation(Container, Place),
     /// One frame.
     Image(PathBuf, Format),
     /// Each frame as a file.
     Images(Pattern, Format),
+}
+
+/// How an animation is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Container {
+    Gif,
+    Apng,
+    Y4m,
+}
+
+/// Where an animation goes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Place {
+    File(PathBuf),
+    StandardOutput,
+}
+
+/// What is known of an animation before its first frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Movie {
+    /// Columns and rows.
+    pub(crate) size: (u32, u32),
+    /// How many frames there will be.
+    pub(crate) frames: u64,
+    /// Frames a second.
+    pub(crate) fps: f64,
+    pub(crate) plays: Plays,
+    /// How long the last frame is shown, if not as long as the others.
+    pub(crate) last_delay_cs: Option<u16>,
 }
 
 /// How a single image is written.
@@ -39,27 +70,52 @@ impl Target {
     /// When the ending is none of ours or the pattern is not one.
     pub(crate) fn parse(out: &Path) -> Result<Self, Usage> {
         let shown = out.display();
-        let ending = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-        let format = match ending.as_deref() {
-            Some("gif") => None,
-            Some("png") => Some(Format::Png),
-            Some("tif" | "tiff") => Some(Format::Tiff),
+        if out.as_os_str() == "-" {
+            return Ok(Self::Animation(Container::Y4m, Place::StandardOutput));
+        }
+        let container = match ending(out).as_deref() {
+            Some("gif") => Container::Gif,
+            Some("apng") => Container::Apng,
+            Some("y4m") => Container::Y4m,
+            Some("png") => return Self::image(out, Format::Png),
+            Some("tif" | "tiff") => return Self::image(out, Format::Tiff),
             _ => {
                 return Err(Usage(format!(
-                    "cannot tell from its ending what {shown} should be: expected .gif for an animation, .png, .tif or \
-                     .tiff for one frame, or a pattern such as frames/%04d.png for many"
+                    "cannot tell from its ending what {shown} should be: expected .gif, .apng or .y4m for an animation, \
+                     .png, .tif or .tiff for one frame, or a pattern such as frames/%04d.png for many"
                 )));
             }
         };
-        match (format, Pattern::parse(out)?) {
-            (None, None) => Ok(Self::Gif(out.to_path_buf())),
-            (None, Some(_)) => Err(Usage(format!(
-                "{shown} names a file a frame, but a GIF holds all frames: leave the % part out"
-            ))),
-            (Some(format), None) => Ok(Self::Image(out.to_path_buf(), format)),
-            (Some(format), Some(pattern)) => Ok(Self::Images(pattern, format)),
+        if Pattern::parse(out)?.is_some() {
+            return Err(Usage(format!(
+                "{shown} names a file a frame, but an animation holds all frames: leave the % part out"
+            )));
         }
+        Ok(Self::Animation(container, Place::File(out.to_path_buf())))
     }
+
+    fn image(out: &Path, format: Format) -> Result<Self, Usage> {
+        Ok(match Pattern::parse(out)? {
+            None => Self::Image(out.to_path_buf(), format),
+            Some(pattern) => Self::Images(pattern, format),
+        })
+    }
+}
+
+/// For those who write a GIF and nothing else.
+///
+/// # Errors
+/// When the name does not end so, or stands for many files.
+pub(crate) fn must_be_gif(out: &Path) -> Result<(), Usage> {
+    let shown = out.display();
+    if ending(out).as_deref() != Some("gif") {
+        return Err(Usage(format!("cannot write {shown}: expected a name that ends in .gif")));
+    }
+    Target::parse(out).map(drop)
+}
+
+fn ending(out: &Path) -> Option<String> {
+    out.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase())
 }
 
 impl Pattern {
@@ -76,6 +132,46 @@ impl Pattern {
         };
         let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
         Ok(Some(Self { folder, before: before.into(), digits, after: after.into() }))
+    }
+
+    /// Says now what [`make_folder`](Self::make_folder) and writing a file would say later; makes nothing.
+    ///
+    /// # Errors
+    /// When no file can be written there.
+    pub(crate) fn probe(&self, number: u64) -> anyhow::Result<()> {
+        let is_there = |folder: &&Path| folder.as_os_str().is_empty() || folder.symlink_metadata().is_ok();
+        match self.folder.ancestors().find(is_there) {
+            // The folders in between are made, so that only the nearest one must take something.
+            Some(nearest) if nearest != self.folder => {
+                let name = self.path(number);
+                let name = name.file_name().unwrap_or_default();
+                Ok(probe(&nearest.join(name))?)
+            }
+            _ => Ok(probe(&self.path(number))?),
+        }
+    }
+
+    /// Makes the folder of the files if it is not there.
+    ///
+    /// # Errors
+    /// The system's.
+    pub(crate) fn make_folder(&self) -> anyhow::Result<()> {
+        let folder = &self.folder;
+        if folder.as_os_str().is_empty() {
+            return Ok(());
+        }
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make the folder {}", folder.display()))
+    }
+
+    /// The files of frames `first` to `last`, for people.
+    pub(crate) fn range(&self, first: u64, last: u64) -> String {
+        let (from, to) = (self.path(first), self.path(last));
+        if first == last {
+            from.display().to_string()
+        } else {
+            format!("{} to {}", from.display(), to.display())
+        }
     }
 
     /// The file of frame `number`, counted from 1.
@@ -95,6 +191,15 @@ fn split(name: &str) -> Option<(&str, &str, &str)> {
 }
 
 impl Format {
+    /// The image in a file of this format; `None` when it is not whole.
+    pub(crate) fn decode(self, file: &[u8]) -> Option<RgbImage> {
+        let format = match self {
+            Self::Png => ImageFormat::Png,
+            Self::Tiff => ImageFormat::Tiff,
+        };
+        Some(image::load_from_memory_with_format(file, format).ok()?.into_rgb8())
+    }
+
     /// The image's file.
     ///
     /// # Errors
@@ -132,7 +237,14 @@ mod tests {
 
     #[test]
     fn the_ending_decides() {
-        assert_eq!(Target::parse(Path::new("a.GIF")).unwrap(), Target::Gif("a.GIF".into()));
+        let animation = |name: &str, container| Target::Animation(container, Place::File(name.into()));
+        for (name, container) in
+            [("a.GIF", Container::Gif), ("a.apng", Container::Apng), ("a.y4m", Container::Y4m)]
+        {
+            assert_eq!(Target::parse(Path::new(name)).unwrap(), animation(name, container));
+        }
+        let piped = Target::Animation(Container::Y4m, Place::StandardOutput);
+        assert_eq!(Target::parse(Path::new("-")).unwrap(), piped);
         assert_eq!(Target::parse(Path::new("a.png")).unwrap(), Target::Image("a.png".into(), Format::Png));
         assert_eq!(Target::parse(Path::new("a.tif")).unwrap(), Target::Image("a.tif".into(), Format::Tiff));
         assert_eq!(Target::parse(Path::new("a.tiff")).unwrap(), Target::Image("a.tiff".into(), Format::Tiff));
@@ -148,6 +260,10 @@ mod tests {
         assert_eq!(pattern.path(1), Path::new("frames/a0001.png"));
         assert_eq!(pattern.path(12345), Path::new("frames/a12345.png"));
         assert_eq!(images("%d.tiff").path(10), Path::new("10.tiff"));
+        assert_eq!(
+            (pattern.range(9, 9), images("%d.png").range(1, 3)),
+            ("frames/a0009.png".into(), "1.png to 3.png".into())
+        );
         assert_eq!(images("%3d.tiff").path(10), Path::new("010.tiff"));
     }
 
@@ -167,11 +283,33 @@ mod tests {
     }
 
     #[test]
+    fn only_a_gif_is_a_gif() {
+        assert!(must_be_gif(Path::new("a/b.gif")).is_ok());
+        for name in ["a.mp4", "a.png", "a", "%d.gif", "-"] {
+            assert!(must_be_gif(Path::new(name)).is_err(), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_folder_of_frames_is_made_but_not_by_asking_whether_it_can_be() {
+        let folder = tempfile::tempdir().unwrap();
+        let pattern = images(folder.path().join("new/frames/%d.png").to_str().unwrap());
+        pattern.probe(1).unwrap();
+        assert!(!folder.path().join("new").exists());
+        pattern.make_folder().unwrap();
+        assert!(folder.path().join("new/frames").is_dir());
+        std::fs::write(folder.path().join("file"), "").unwrap();
+        let below_a_file = images(folder.path().join("file/%d.png").to_str().unwrap());
+        assert!(below_a_file.probe(1).is_err() && below_a_file.make_folder().is_err());
+    }
+
+    #[test]
     fn images_decode_to_what_they_were() {
         let image = RgbImage::from_fn(7, 5, |x, y| image::Rgb([x as u8, y as u8, 200]));
         for format in [Format::Png, Format::Tiff] {
             let file = format.encode(&image).unwrap();
-            assert_eq!(image::load_from_memory(&file).unwrap().into_rgb8(), image, "{format:?}");
+            assert_eq!(format.decode(&file), Some(image.clone()), "{format:?}");
+            assert_eq!(format.decode(&file[..file.len() / 2]), None, "half a {format:?}");
         }
     }
 }

@@ -79,13 +79,12 @@ impl S3Store {
     /// The bucket as the standard AWS environment reaches it.
     ///
     /// # Errors
-    /// [`Error::Refused`] when the environment names no region. Missing or wrong credentials show at the first request.
+    /// [`Error::NoRegion`]. Missing or wrong credentials show at the first request.
     pub async fn from_environment(bucket: &str) -> Result<Self> {
         let http = https_client();
         let sdk = aws_config::defaults(BehaviorVersion::latest()).http_client(http).load().await;
         if sdk.region().is_none() {
-            let source = "no region: set AWS_REGION, or a region in the AWS profile".into();
-            return Err(Error::Refused { key: bucket.to_owned(), source });
+            return Err(Error::NoRegion);
         }
         let of_s3 = ServiceConfigKey::builder()
             .service_id("S3")

@@ -1,0 +1,98 @@
+//! How long the render function would take for the frames of a folder: some of them are drawn here.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::Context;
+use rayfold_scene::{Limits, Screen};
+
+use crate::console::Console;
+use crate::input::Input;
+use crate::plan::{Plan, Wishes};
+use crate::render::draw_scene;
+use crate::render::target::Format;
+use crate::wording::{Size, number};
+
+/// Frames that are drawn, spread evenly over the animation.
+const SAMPLES: u64 = 8;
+
+/// How often each of them is drawn.
+const TRIES: usize = 2;
+
+/// Memory with which a function has one processor, in MB.
+const PROCESSOR_MB: f64 = 1769.0;
+
+/// What an invocation waits for requests and pauses, in milliseconds, which Lambda bills: measured at these numbers of
+/// frames (`docs/reports/simulation.md`), and in between taken to grow evenly.
+const WAITING_MS: [(f64, f64); 2] = [(50.0, 258.0), (1_000.0, 427.0)];
+
+/// What is known of an animation once some of its frames have been drawn.
+#[derive(Debug)]
+pub(super) struct Measured {
+    pub(super) frames: u64,
+    pub(super) size: Screen,
+    /// Of the render function, a frame.
+    pub(super) ms: f64,
+    /// A frame's PNG, in the mean.
+    pub(super) frame_kb: f64,
+}
+
+/// Draws some frames of `input`, for functions of so many MB.
+///
+/// # Errors
+/// When a script has an error, or the scripts are no animation.
+pub(super) fn measure(input: &[PathBuf], memory_mb: f64, console: &Console) -> anyhow::Result<Measured> {
+    let limits = Limits::default();
+    let input = Input::animation(input, &limits)?;
+    let plan = match Plan::new(&input, &limits, &Wishes::default(), console)? {
+        Ok(plan) => plan,
+        Err(faults) => anyhow::bail!("nothing was measured: {}", faults.count()),
+    };
+    let (frames, size) = (plan.len(), plan.one_size()?);
+    let step = frames.div_ceil(SAMPLES).max(1);
+    let scenes = plan.jobs().step_by(usize::try_from(step)?).map(|job| plan.scene(&job));
+    let scenes = scenes.collect::<anyhow::Result<Vec<_>>>()?;
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let one_thread = one_thread.context("cannot start a thread")?;
+    let (seconds, bytes) = one_thread.install(|| {
+        let (mut seconds, mut bytes) = (0.0, 0);
+        for scene in &scenes {
+            // The shorter of two tries: whatever else the machine does makes it longer, never shorter.
+            let mut shortest = f64::INFINITY;
+            for _ in 0..TRIES {
+                let start = Instant::now();
+                let file = Format::Png.encode(&draw_scene(scene, plan.precision)?)?;
+                shortest = shortest.min(start.elapsed().as_secs_f64());
+                bytes += file.len();
+            }
+            seconds += shortest;
+        }
+        anyhow::Ok((seconds, bytes / TRIES))
+    })?;
+    let drawing_ms = 1e3 * seconds / scenes.len() as f64;
+    let bytes = bytes as f64 / scenes.len() as f64;
+    let waiting_ms = waiting_ms(frames as f64);
+    console.note(format_args!(
+        "drawn here on one thread: {} of {frames}, {drawing_ms:.1} ms each, a PNG of {} each; requests and pauses add \
+         {waiting_ms:.0} ms",
+        number(scenes.len() as u64, "frame"),
+        Size(bytes as u64)
+    ));
+    let ms = drawing_ms * PROCESSOR_MB / memory_mb + waiting_ms;
+    Ok(Measured { frames, size, ms, frame_kb: bytes / 1e3 })
+}
+
+fn waiting_ms(frames: f64) -> f64 {
+    let [(few, short), (many, long)] = WAITING_MS;
+    short + (long - short) * ((frames - few) / (many - few)).clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn waiting_is_what_was_measured_and_between() {
+        assert_eq!([1.0, 50.0, 525.0, 1_000.0, 1e6].map(waiting_ms), [258.0, 258.0, 342.5, 427.0, 427.0]);
+    }
+}

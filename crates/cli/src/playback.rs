@@ -1,0 +1,37 @@
+//! How an animation is shown when it has been written, for every subcommand that writes one.
+
+use rayfold_gif::Plays;
+
+use crate::values;
+
+/// `--loop`, `--once` and `--final-delay`.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub(crate) struct Playback {
+    /// How often to repeat the animation after it was shown once; 0, the default unless an animation.json says otherwise,
+    /// is for ever
+    #[arg(long = "loop", value_name = "TIMES", value_parser = values::repetitions, allow_negative_numbers = true)]
+    loops: Option<u16>,
+    /// Show the animation once: do not repeat it
+    #[arg(long, conflicts_with = "loops")]
+    once: bool,
+    /// How long to show the last frame, before the animation starts again
+    #[arg(long, value_name = "SECONDS", value_parser = values::hundredths, allow_negative_numbers = true)]
+    final_delay: Option<u16>,
+}
+
+impl Playback {
+    /// Something was said.
+    pub(crate) fn is_given(&self) -> bool {
+        self.once || self.loops.is_some() || self.final_delay.is_some()
+    }
+
+    /// How often to show it; `usual` where no flag says so.
+    pub(crate) fn plays(&self, usual: Plays) -> Plays {
+        if self.once { Plays::Once } else { self.loops.map_or(usual, Plays::repeated) }
+    }
+
+    /// In hundredths of a second.
+    pub(crate) fn last_delay_cs(&self) -> Option<u16> {
+        self.final_delay
+    }
+}

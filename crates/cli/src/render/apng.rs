@@ -1,0 +1,135 @@
+//! APNG: an animation without loss, as browsers show it. Of each frame only the rectangle is written that has changed.
+
+use std::io::{self, Write};
+
+use image::{GenericImageView, RgbImage};
+use png::{BitDepth, ColorType, Compression, EncodingError};
+use rayfold_gif::Plays;
+
+use super::target::Movie;
+
+/// Parts of a second in which a frame's time is counted where a whole number of frames does not fill it: milliseconds, or
+/// hundredths where those have no room in the format's 16 bits.
+const PARTS: [u16; 2] = [1_000, 100];
+
+/// Frames on their way.
+pub(super) struct Apng<W: Write> {
+    file: png::Writer<W>,
+    movie: Movie,
+    pushed: u64,
+    last: Option<RgbImage>,
+}
+
+impl<W: Write> Apng<W> {
+    /// # Errors
+    /// The writer's, and when the animation is beyond what the format can hold.
+    pub(super) fn new(out: W, movie: Movie) -> io::Result<Self> {
+        let (width, height) = movie.size;
+        let mut file = png::Encoder::new(out, width, height);
+        file.set_color(ColorType::Rgb);
+        file.set_depth(BitDepth::Eight);
+        file.set_compression(Compression::Balanced);
+        let frames = u32::try_from(movie.frames).map_err(io::Error::other)?;
+        file.set_animated(frames, plays(movie.plays)).map_err(into_io)?;
+        Ok(Self { file: file.write_header().map_err(into_io)?, movie, pushed: 0, last: None })
+    }
+
+    /// Writes the next frame, which is as large as the others.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub(super) fn push(&mut self, frame: RgbImage) -> io::Result<()> {
+        let (number, whole) = (self.pushed, (0, 0, frame.width(), frame.height()));
+        self.pushed += 1;
+        let (left, top, width, height) = self.last.as_ref().map_or(whole, |last| changed(last, &frame));
+        let (time, parts) = match self.movie.last_delay_cs {
+            Some(hundredths) if self.pushed == self.movie.frames => (hundredths, 100),
+            _ => delay(self.movie.fps, number),
+        };
+        self.file.set_frame_delay(time, parts).map_err(into_io)?;
+        if self.last.is_some() {
+            self.file.reset_frame_position().map_err(into_io)?;
+            self.file.set_frame_dimension(width, height).map_err(into_io)?;
+            self.file.set_frame_position(left, top).map_err(into_io)?;
+        }
+        let part = frame.view(left, top, width, height).to_image();
+        self.file.write_image_data(&part).map_err(into_io)?;
+        self.last = Some(frame);
+        Ok(())
+    }
+
+    /// # Errors
+    /// The writer's.
+    pub(super) fn finish(self) -> io::Result<()> {
+        self.file.finish().map_err(into_io)
+    }
+}
+
+/// As the format counts: how often it is shown, 0 for ever.
+fn plays(plays: Plays) -> u32 {
+    match plays {
+        Plays::Endless => 0,
+        Plays::Once => 1,
+        Plays::Repeated(times) => u32::from(times.get()) + 1,
+    }
+}
+
+/// How long the frame of this number, from 0, is shown: so many parts of so many that a second has. Rounding does not
+/// add up.
+fn delay(fps: f64, number: u64) -> (u16, u16) {
+    if fps.fract() == 0.0 && (1.0..=65_535.0).contains(&fps) {
+        return (1, fps as u16);
+    }
+    let fits = |parts: &&u16| f64::from(**parts) / fps < f64::from(u16::MAX);
+    let parts = *PARTS.iter().find(fits).unwrap_or(&PARTS[1]);
+    let start = |number: u64| (number as f64 * f64::from(parts) / fps).round();
+    ((start(number + 1) - start(number)) as u16, parts)
+}
+
+/// Column, row, width and height of what differs; a pixel if nothing does, because a frame must have one.
+fn changed(last: &RgbImage, frame: &RgbImage) -> (u32, u32, u32, u32) {
+    let differs = |x: u32, y: u32| last.get_pixel(x, y) != frame.get_pixel(x, y);
+    let (width, height) = frame.dimensions();
+    let rows: Vec<u32> = (0..height).filter(|&y| (0..width).any(|x| differs(x, y))).collect();
+    let (Some(&top), Some(&bottom)) = (rows.first(), rows.last()) else { return (0, 0, 1, 1) };
+    let is_in = |x: &u32| rows.iter().any(|&y| differs(*x, y));
+    let left = (0..width).find(is_in).unwrap_or(0);
+    let right = (0..width).rfind(is_in).unwrap_or(left);
+    (left, top, right + 1 - left, bottom + 1 - top)
+}
+
+fn into_io(error: EncodingError) -> io::Error {
+    match error {
+        EncodingError::IoError(source) => source,
+        other => io::Error::other(other),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Rgb;
+
+    #[test]
+    fn what_has_changed_is_a_rectangle() {
+        let blank = RgbImage::new(9, 7);
+        assert_eq!(changed(&blank, &blank), (0, 0, 1, 1));
+        let mut frame = blank.clone();
+        frame.put_pixel(2, 6, Rgb([0, 0, 1]));
+        assert_eq!(changed(&blank, &frame), (2, 6, 1, 1));
+        frame.put_pixel(8, 3, Rgb([9, 0, 0]));
+        assert_eq!(changed(&blank, &frame), (2, 3, 7, 4));
+    }
+
+    #[test]
+    fn times_never_drift() {
+        for fps in [0.01, 0.7, 12.5, 23.976, 25.0, 29.97, 999.5] {
+            let mut at = 0.0;
+            for number in 0..1_000 {
+                assert!((at - number as f64 / fps).abs() <= 0.0051, "{fps} fps, frame {number}: {at}");
+                let (time, parts) = delay(fps, number);
+                at += f64::from(time) / f64::from(parts);
+            }
+        }
+    }
+}

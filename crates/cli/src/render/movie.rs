@@ -1,0 +1,217 @@
+//! An animation as a whole: frames in order, into the container that was asked for, to a file or to standard output.
+
+use std::io::{self, BufWriter, IsTerminal, Stdout, Write};
+use std::time::Duration;
+
+use image::RgbImage;
+use rayfold_gif::{Encoder, Settings};
+
+use super::apng::Apng;
+use super::target::{Container, Movie, Place};
+use super::y4m::Y4m;
+use crate::console::Console;
+use crate::outcome::Usage;
+use crate::output::{OutputError, OutputFile};
+use crate::wording::{Size, number};
+
+/// Bytes that are collected before they are written.
+const BUFFER: usize = 1 << 20;
+
+/// Why an animation could not be written.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum MovieError {
+    /// Whoever reads standard output has had enough.
+    #[error("the reader of standard output has closed it")]
+    Closed,
+    #[error("cannot write to standard output")]
+    StandardOutput(#[source] io::Error),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    #[error(transparent)]
+    Gif(rayfold_gif::Error),
+}
+
+/// What was written.
+#[derive(Debug)]
+pub(crate) struct Written {
+    pub(crate) frames: u64,
+    /// Left out because a GIF has no time for them.
+    pub(crate) dropped: u64,
+    pub(crate) size: (u32, u32),
+    pub(crate) bytes: u64,
+}
+
+/// Takes the next frame.
+pub(crate) type Push<'a> = &'a mut (dyn FnMut(RgbImage) -> Result<(), MovieError> + Send);
+
+/// Writes an animation of the frames that `fill` pushes, in their order. A file appears once it is whole.
+///
+/// # Errors
+/// Those of `fill`, and [`MovieError`].
+pub(crate) fn write(
+    place: &Place,
+    container: Container,
+    movie: Movie,
+    fill: impl FnOnce(Push<'_>) -> anyhow::Result<()>,
+) -> anyhow::Result<Written> {
+    let failed = |source| error_at(place, source);
+    let mut out = BufWriter::with_capacity(BUFFER, Sink::open(place)?);
+    let mut frames = 0;
+    let dropped = {
+        let mut encoding = Encoding::begin(&mut out, container, movie).map_err(|error| error.at(place))?;
+        fill(&mut |frame| {
+            frames += 1;
+            encoding.push(frame).map_err(|error| error.at(place))
+        })?;
+        encoding.finish().map_err(|error| error.at(place))?
+    };
+    let sink = out.into_inner().map_err(|error| failed(error.into_error()))?;
+    let bytes = sink.bytes;
+    sink.finish()?;
+    Ok(Written { frames: frames - dropped, dropped, size: movie.size, bytes })
+}
+
+/// Says what was written.
+pub(crate) fn tell(place: &Place, written: &Written, fps: f64, took: Duration, console: &Console) {
+    let name = match place {
+        Place::File(path) => path.display().to_string(),
+        Place::StandardOutput => "standard output".into(),
+    };
+    console.note(format_args!(
+        "{name}: {} of {} x {}, {}, in {:.2} s",
+        number(written.frames, "frame"),
+        written.size.0,
+        written.size.1,
+        Size(written.bytes),
+        took.as_secs_f64()
+    ));
+    if written.dropped > 0 {
+        console.note(format_args!(
+            "{} left out: a GIF shows at most 50 frames a second, not {}",
+            number(written.dropped, "frame"),
+            fps
+        ));
+    }
+}
+
+enum Encoding<W: Write> {
+    Gif(Box<Encoder<W>>),
+    Apng(Box<Apng<W>>),
+    Y4m(Y4m<W>),
+}
+
+/// What a container says went wrong, wherever it was to go.
+enum Failure {
+    Write(io::Error),
+    Gif(rayfold_gif::Error),
+}
+
+impl<W: Write> Encoding<W> {
+    fn begin(out: W, container: Container, movie: Movie) -> Result<Self, Failure> {
+        let Movie { size, fps, plays, last_delay_cs, .. } = movie;
+        Ok(match container {
+            Container::Gif => Self::Gif(Box::new(Encoder::new(out, Settings { fps, plays, last_delay_cs })?)),
+            Container::Apng => Self::Apng(Box::new(Apng::new(out, movie)?)),
+            Container::Y4m => Self::Y4m(Y4m::new(out, size, fps)?),
+        })
+    }
+
+    fn push(&mut self, frame: RgbImage) -> Result<(), Failure> {
+        match self {
+            Self::Gif(encoder) => Ok(encoder.push(frame)?),
+            Self::Apng(encoder) => Ok(encoder.push(frame)?),
+            Self::Y4m(encoder) => Ok(encoder.push(&frame)?),
+        }
+    }
+
+    /// Returns how many frames were left out.
+    fn finish(self) -> Result<u64, Failure> {
+        match self {
+            Self::Gif(encoder) => Ok(encoder.finish()?.dropped),
+            Self::Apng(encoder) => Ok(encoder.finish().map(|()| 0)?),
+            Self::Y4m(encoder) => Ok(encoder.finish().map(|()| 0)?),
+        }
+    }
+}
+
+impl From<io::Error> for Failure {
+    fn from(source: io::Error) -> Self {
+        Self::Write(source)
+    }
+}
+
+impl From<rayfold_gif::Error> for Failure {
+    fn from(error: rayfold_gif::Error) -> Self {
+        match error {
+            rayfold_gif::Error::Write { source, .. } => Self::Write(source),
+            other => Self::Gif(other),
+        }
+    }
+}
+
+impl Failure {
+    fn at(self, place: &Place) -> MovieError {
+        match self {
+            Self::Write(source) => error_at(place, source),
+            Self::Gif(error) => MovieError::Gif(error),
+        }
+    }
+}
+
+fn error_at(place: &Place, source: io::Error) -> MovieError {
+    match place {
+        Place::File(path) => OutputError::Io { path: path.clone(), source }.into(),
+        Place::StandardOutput if source.kind() == io::ErrorKind::BrokenPipe => MovieError::Closed,
+        Place::StandardOutput => MovieError::StandardOutput(source),
+    }
+}
+
+/// Counts what goes to a file or to standard output.
+struct Sink {
+    to: To,
+    bytes: u64,
+}
+
+enum To {
+    File(OutputFile),
+    StandardOutput(Stdout),
+}
+
+impl Sink {
+    fn open(place: &Place) -> anyhow::Result<Self> {
+        let to = match place {
+            Place::File(path) => To::File(OutputFile::create(path)?),
+            Place::StandardOutput if io::stdout().is_terminal() => {
+                let message = "an animation is nothing for a terminal: pipe it to a program, or write a file";
+                return Err(Usage(message.into()).into());
+            }
+            Place::StandardOutput => To::StandardOutput(io::stdout()),
+        };
+        Ok(Self { to, bytes: 0 })
+    }
+
+    fn finish(self) -> Result<(), OutputError> {
+        match self.to {
+            To::File(file) => file.finish(true),
+            To::StandardOutput(_) => Ok(()),
+        }
+    }
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = match &mut self.to {
+            To::File(file) => file.write(bytes)?,
+            To::StandardOutput(out) => out.write(bytes)?,
+        };
+        self.bytes += written as u64;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match &mut self.to {
+            To::File(file) => file.flush(),
+            To::StandardOutput(out) => out.flush(),
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! YUV4MPEG2: raw frames with a line of text before each, which every video encoder reads from a pipe.
+//!
+//! Colours are Y'CbCr by ITU-R BT.601 in the limited range (luma 16 to 235, chroma 16 to 240), with a sample of each a
+//! pixel (4:4:4): what programs take the format for that look at nothing but its size.
+//! `XCOLORRANGE` tells it to those that look further. Nothing in the header can name the matrix.
+
+use std::io::{self, Write};
+
+use image::RgbImage;
+
+/// Parts that a fixed-point number has of 1.
+const ONE: i32 = 1 << 16;
+
+/// Y', Cb and Cr of R', G' and B' levels, in parts of a level, and what they are at black: BT.601, of weights .299, .587
+/// and .114, scaled to 219 and 224 levels.
+const MATRIX: [([i32; 3], i32); 3] =
+    [([16_829, 33_039, 6_416], 16), ([-9_714, -19_071, 28_785], 128), ([28_784, -24_103, -4_681], 128)];
+
+/// The most parts of a second that a frame's time is counted in.
+const PARTS: f64 = 1e6;
+
+/// Frames on their way.
+#[derive(Debug)]
+pub(super) struct Y4m<W> {
+    out: W,
+    planes: Vec<u8>,
+}
+
+impl<W: Write> Y4m<W> {
+    /// Of so many columns, rows, and frames a second.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub(super) fn new(mut out: W, size: (u32, u32), fps: f64) -> io::Result<Self> {
+        let ((width, height), (frames, seconds)) = (size, fraction(fps));
+        writeln!(out, "YUV4MPEG2 W{width} H{height} F{frames}:{seconds} Ip A1:1 C444 XCOLORRANGE=LIMITED")?;
+        Ok(Self { out, planes: Vec::new() })
+    }
+
+    /// Writes the next frame, which is as large as the others.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub(super) fn push(&mut self, frame: &RgbImage) -> io::Result<()> {
+        self.planes.clear();
+        for row in &MATRIX {
+            self.planes.extend(frame.pixels().map(|pixel| level(row, pixel.0)));
+        }
+        self.out.write_all(b"FRAME\n")?;
+        self.out.write_all(&self.planes)
+    }
+
+    /// # Errors
+    /// The writer's.
+    pub(super) fn finish(mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+fn level((weights, black): &([i32; 3], i32), rgb: [u8; 3]) -> u8 {
+    let sum: i32 = weights.iter().zip(rgb).map(|(weight, level)| weight * i32::from(level)).sum();
+    (black + ((sum + ONE / 2) >> 16)).clamp(0, 255) as u8
+}
+
+/// A rate as frames in so many seconds, both whole.
+fn fraction(fps: f64) -> (u64, u64) {
+    let (frames, seconds) = ((fps * PARTS).round() as u64, PARTS as u64);
+    let (mut a, mut b) = (frames, seconds);
+    while b != 0 {
+        (a, b) = (b, a % b);
+    }
+    (frames / a, seconds / a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_fractions() {
+        let rates = [25.0, 12.5, 29.97, 0.01].map(fraction);
+        assert_eq!(rates, [(25, 1), (25, 2), (2_997, 100), (1, 100)]);
+    }
+
+    /// ITU-R BT.601 gives black, white, and the primary colours at full saturation so.
+    #[test]
+    fn colours_are_those_of_the_recommendation() {
+        let known = [
+            ([0, 0, 0], [16, 128, 128]),
+            ([255, 255, 255], [235, 128, 128]),
+            ([255, 0, 0], [81, 90, 240]),
+            ([0, 255, 0], [145, 54, 34]),
+            ([0, 0, 255], [41, 240, 110]),
+        ];
+        for (rgb, ycc) in known {
+            assert_eq!(MATRIX.each_ref().map(|row| level(row, rgb)), ycc, "{rgb:?}");
+        }
+        for grey in 0..=255 {
+            assert_eq!(
+                MATRIX.each_ref().map(|row| level(row, [grey; 3]))[1..],
+                [128, 128],
+                "grey has no colour"
+            );
+        }
+    }
+}

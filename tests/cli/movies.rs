@@ -1,0 +1,122 @@
+//! `rayfold render` for other programs: YUV4MPEG2 and APNG, decoded here by other code than wrote them.
+
+use std::io::Cursor;
+use std::process::{Command, Stdio};
+
+use image::AnimationDecoder;
+use image::codecs::png::PngDecoder;
+
+use crate::{Folder, RAYFOLD, ball_at};
+
+fn balls(count: usize) -> Folder {
+    let folder = Folder::new();
+    for step in 1..=count {
+        folder.write(&format!("balls/f{step}.txt"), ball_at(step));
+    }
+    folder.rayfold("render balls -o %d.png").assert().code(0);
+    folder
+}
+
+/// The pixels of a Y4M's frames, by BT.601's own formulas.
+fn decode_y4m(bytes: &[u8], size: (usize, usize)) -> Vec<Vec<[f64; 3]>> {
+    let mut rest = bytes;
+    let mut frames = Vec::new();
+    while !rest.is_empty() {
+        let (mark, planes) = rest.split_at(6);
+        assert_eq!(mark, b"FRAME\n");
+        let count = size.0 * size.1;
+        let at = |plane: usize, pixel: usize| f64::from(planes[plane * count + pixel]);
+        let pixels = (0..count).map(|k| {
+            let y = (at(0, k) - 16.0) / 219.0;
+            let (pb, pr) = ((at(1, k) - 128.0) / 224.0, (at(2, k) - 128.0) / 224.0);
+            let (r, b) = (y + 1.402 * pr, y + 1.772 * pb);
+            [r, (y - 0.299 * r - 0.114 * b) / 0.587, b].map(|c| 255.0 * c)
+        });
+        frames.push(pixels.collect());
+        rest = &planes[3 * count..];
+    }
+    frames
+}
+
+#[test]
+fn a_video_encoder_gets_every_frame_in_full_colour() {
+    let folder = balls(4);
+    folder.rayfold("render balls -o balls.y4m --fps 12.5").assert().code(0);
+    let file = folder.read("balls.y4m");
+    let end = file.iter().position(|byte| *byte == b'\n').unwrap();
+    let header = std::str::from_utf8(&file[..end]).unwrap();
+    assert_eq!(header, "YUV4MPEG2 W24 H16 F25:2 Ip A1:1 C444 XCOLORRANGE=LIMITED");
+    let frames = decode_y4m(&file[end + 1..], (24, 16));
+    assert_eq!(frames.len(), 4);
+    for (number, frame) in (1..).zip(&frames) {
+        let image = folder.image(&format!("{number}.png"));
+        for (pixel, seen) in image.pixels().zip(frame) {
+            let near = (0..3).all(|c| (f64::from(pixel[c]) - seen[c]).abs() < 2.0);
+            assert!(near, "frame {number}: {pixel:?} is {seen:?}");
+        }
+    }
+}
+
+#[test]
+fn standard_output_is_the_same_video_and_nothing_else() {
+    let folder = balls(3);
+    folder.rayfold("render balls -o file.y4m").assert().code(0);
+    let out = folder.rayfold("render balls -o -").assert().code(0).get_output().clone();
+    assert!(out.stdout == folder.read("file.y4m"));
+    let said = String::from_utf8(out.stderr).unwrap();
+    assert!(said.starts_with("standard output: 3 frames of 24 x 16, "), "{said}");
+    // A script with an error gives a program nothing at all.
+    folder.write("balls/f2.txt", "Trce");
+    folder.rayfold("render balls -o -").assert().code(1).stdout_eq("");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_player_that_is_closed_is_no_error() {
+    let folder = balls(1);
+    folder.write("long.txt", ball_at(1).replace("24, 16", "600, 400") + &"Trace\n".repeat(40));
+    let mut rayfold = Command::new(RAYFOLD)
+        .args(["render", "long.txt", "-o", "-"])
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(rayfold.stdout.take());
+    let output = rayfold.wait_with_output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.starts_with("the reader of standard output has closed it after "), "{said}");
+}
+
+#[test]
+fn a_browser_gets_every_frame_without_loss() {
+    let folder = balls(5);
+    folder.rayfold("render balls -o balls.apng --fps 12.5 --loop 2 --final-delay 1.5").assert().code(0);
+    let file = folder.read("balls.apng");
+    let decoder = PngDecoder::new(Cursor::new(&file)).unwrap();
+    assert!(decoder.is_apng().unwrap());
+    let frames = decoder.apng().unwrap().into_frames().collect_frames().unwrap();
+    assert_eq!(frames.len(), 5);
+    for (number, frame) in (1..).zip(&frames) {
+        let shown = image::DynamicImage::ImageRgba8(frame.buffer().clone()).into_rgb8();
+        assert_eq!(shown, folder.image(&format!("{number}.png")), "frame {number}");
+        let (parts, whole) = frame.delay().numer_denom_ms();
+        assert_eq!(parts / whole, if number == 5 { 1_500 } else { 80 }, "frame {number}");
+    }
+    // acTL: how many frames, and how often they are shown.
+    let at = file.windows(4).position(|word| word == b"acTL").unwrap() + 4;
+    let number = |at: usize| u32::from_be_bytes(file[at..at + 4].try_into().unwrap());
+    assert_eq!((number(at), number(at + 4)), (5, 3));
+}
+
+#[test]
+fn flags_that_a_video_has_no_room_for_are_refused() {
+    let folder = balls(1);
+    for flag in ["--loop 2", "--once", "--final-delay 2"] {
+        let out = folder.rayfold(&format!("render balls -o a.y4m {flag}")).assert().code(2);
+        let said = String::from_utf8(out.get_output().stderr.clone()).unwrap();
+        assert!(said.contains("are for .gif and .apng"), "{said}");
+    }
+    folder.rayfold("render balls -o %d.apng").assert().code(2);
+}
