@@ -24,6 +24,7 @@ mod plan;
 mod progress;
 mod render;
 mod split;
+mod studio;
 mod survey;
 mod threads;
 mod wording;
