@@ -21,6 +21,7 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-client", &["rayfold-scene", "rayfold-pipeline"]),
     ("rayfold-lambda", &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline"]),
     ("rayfold-local", &["rayfold-bucket", "rayfold-pipeline"]),
+    ("rayfold-studio", &["rayfold-scene", "rayfold-tracer", "rayfold-gif"]),
     (
         "rayfold",
         &[
@@ -30,6 +31,7 @@ const KNOWS: &[(&str, &[&str])] = &[
             "rayfold-pipeline",
             "rayfold-client",
             "rayfold-local",
+            "rayfold-studio",
         ],
     ),
     ("rayfold-xtask", &[]),

@@ -10,7 +10,7 @@ use crate::console::{Color, Console};
 #[cfg(unix)]
 use crate::dev;
 use crate::outcome::{Outcome, exit_code};
-use crate::{check, completions, cost, encode, interrupt, render, split};
+use crate::{check, completions, cost, encode, interrupt, render, split, studio};
 
 /// Ray-traced animations from a folder of scene scripts.
 #[derive(Debug, Parser)]
@@ -53,6 +53,7 @@ enum Command {
     Render(render::Args),
     Check(check::Args),
     Split(split::Args),
+    Studio(studio::Args),
     Encode(encode::Args),
     Cost(cost::Args),
     Submit(submit::Args),
@@ -71,6 +72,7 @@ impl Command {
             Self::Render(args) => render::run(&args, console),
             Self::Check(args) => check::run(&args, console),
             Self::Split(args) => split::run(&args, console),
+            Self::Studio(args) => studio::run(&args, console),
             Self::Encode(args) => encode::run(&args, console),
             Self::Cost(args) => cost::run(&args, console),
             Self::Submit(args) => submit::run(&args, console),

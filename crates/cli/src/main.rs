@@ -25,6 +25,7 @@ mod playback;
 mod progress;
 mod render;
 mod split;
+mod studio;
 mod survey;
 mod threads;
 mod values;

@@ -1,0 +1,283 @@
+//! A script as lines, and its history: every change is a splice of lines and has an inverse.
+//!
+//! Knows no file and no scene. Invariant: undoing all that was done gives the bytes that were there before.
+
+use std::collections::VecDeque;
+
+use crate::line::Line;
+
+/// Bytes of lines that the history holds; beyond it the oldest steps are forgotten.
+const HISTORY_BYTES: usize = 64 << 20;
+
+/// Some lines in place of others.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Splice {
+    /// The first line that changes, from 0.
+    pub at: usize,
+    /// How many lines go.
+    pub removed: usize,
+    /// The lines that come in their place.
+    pub inserted: Vec<Line>,
+}
+
+/// A script that is being edited.
+#[derive(Clone, Debug, Default)]
+pub struct Document {
+    lines: Vec<Line>,
+    done: VecDeque<Step>,
+    undone: Vec<Step>,
+    held: usize,
+}
+
+/// What one undo takes back: the inverses of some splices, in the order in which these were made.
+#[derive(Clone, Debug)]
+struct Step {
+    gesture: Option<u64>,
+    inverses: Vec<Splice>,
+}
+
+impl Splice {
+    fn size(&self) -> usize {
+        self.inserted.iter().map(|line| line.bytes().len() + size_of::<Line>()).sum::<usize>()
+            + size_of::<Self>()
+    }
+}
+
+impl Step {
+    fn size(&self) -> usize {
+        self.inverses.iter().map(Splice::size).sum()
+    }
+}
+
+impl Document {
+    /// Of a text, without a history.
+    pub fn new(text: &[u8]) -> Self {
+        Self { lines: Line::split(text), ..Self::default() }
+    }
+
+    /// Its lines.
+    pub fn lines(&self) -> &[Line] {
+        &self.lines
+    }
+
+    /// Its text.
+    pub fn bytes(&self) -> Vec<u8> {
+        self.lines.iter().flat_map(Line::bytes).copied().collect()
+    }
+
+    /// Makes a change, as a step of its own or as part of the step before, if that is of the same gesture (a drag, a
+    /// slider). Returns what was done: the splice is cut to the lines that there are, and a last line without an end
+    /// gets one before others follow it.
+    pub fn apply(&mut self, splice: Splice, gesture: Option<u64>) -> Splice {
+        let splice = self.fitted(splice);
+        let inverse = self.splice(&splice);
+        self.held -= self.undone.drain(..).map(|step| step.size()).sum::<usize>();
+        match self.done.back_mut() {
+            Some(step) if gesture.is_some() && step.gesture == gesture => {
+                // The lines that a drag sets again and again are kept once, as they were at its start.
+                let in_place = |splice: &Splice| splice.inserted.len() == splice.removed;
+                let again = in_place(&inverse)
+                    && step.inverses.iter().all(in_place)
+                    && step.inverses.iter().any(|old| (old.at, old.removed) == (inverse.at, inverse.removed));
+                if !again {
+                    self.held += inverse.size();
+                    step.inverses.push(inverse);
+                }
+            }
+            _ => {
+                self.held += inverse.size();
+                self.done.push_back(Step { gesture, inverses: vec![inverse] });
+            }
+        }
+        while self.held > HISTORY_BYTES && self.done.len() > 1 {
+            self.held -= self.done.pop_front().map_or(0, |step| step.size());
+        }
+        splice
+    }
+
+    /// Makes a change exactly as it is given, line ends and all, as a step of its own: what a file holds.
+    pub fn replace(&mut self, splice: Splice) -> Vec<Splice> {
+        if splice.removed == 0 && splice.inserted.is_empty() {
+            return Vec::new();
+        }
+        let inverse = self.splice(&splice);
+        self.held = self.held + inverse.size() - self.undone.drain(..).map(|step| step.size()).sum::<usize>();
+        self.done.push_back(Step { gesture: None, inverses: vec![inverse] });
+        vec![splice]
+    }
+
+    /// Takes the last step back; the splices that this took, in their order.
+    pub fn undo(&mut self) -> Vec<Splice> {
+        let Some(step) = self.done.pop_back() else { return Vec::new() };
+        let (splices, inverse) = self.take_back(step);
+        self.undone.push(inverse);
+        splices
+    }
+
+    /// Makes again what was taken back last; the splices that this took, in their order.
+    pub fn redo(&mut self) -> Vec<Splice> {
+        let Some(step) = self.undone.pop() else { return Vec::new() };
+        let (splices, inverse) = self.take_back(step);
+        self.done.push_back(inverse);
+        splices
+    }
+
+    /// Whether there is something to undo.
+    pub fn can_undo(&self) -> bool {
+        !self.done.is_empty()
+    }
+
+    /// Whether there is something to redo.
+    pub fn can_redo(&self) -> bool {
+        !self.undone.is_empty()
+    }
+
+    fn take_back(&mut self, step: Step) -> (Vec<Splice>, Step) {
+        self.held -= step.size();
+        let splices: Vec<_> = step.inverses.into_iter().rev().collect();
+        let inverses = splices.iter().map(|splice| self.splice(splice)).collect();
+        let inverse = Step { gesture: None, inverses };
+        self.held += inverse.size();
+        (splices, inverse)
+    }
+
+    fn fitted(&self, splice: Splice) -> Splice {
+        let Splice { at, removed, mut inserted } = splice;
+        let mut at = at.min(self.lines.len());
+        let mut removed = removed.min(self.lines.len() - at);
+        let end: &[u8] =
+            if self.lines.first().is_some_and(|line| line.end() == b"\r\n") { b"\r\n" } else { b"\n" };
+        // The end of a text stays as it is.
+        let endless = removed > 0
+            && at + removed == self.lines.len()
+            && self.lines.last().is_some_and(|line| line.end().is_empty());
+        let count = inserted.len();
+        for (i, line) in inserted.iter_mut().enumerate() {
+            if line.end().is_empty() && !(endless && i + 1 == count) {
+                *line = line.with_end(end);
+            }
+        }
+        if at == self.lines.len() && !inserted.is_empty() && at > 0 && self.lines[at - 1].end().is_empty() {
+            at -= 1;
+            removed += 1;
+            inserted.insert(0, self.lines[at].with_end(end));
+        }
+        Splice { at, removed, inserted }
+    }
+
+    /// Makes a change; its inverse.
+    fn splice(&mut self, splice: &Splice) -> Splice {
+        let range = splice.at..splice.at + splice.removed;
+        let removed = self.lines.splice(range, splice.inserted.iter().cloned()).collect();
+        Splice { at: splice.at, removed: splice.inserted.len(), inserted: removed }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use proptest::test_runner::{Config, TestRunner};
+
+    use super::*;
+
+    fn set(at: usize, text: &str) -> Splice {
+        Splice { at, removed: 1, inserted: vec![Line::new(text)] }
+    }
+
+    #[test]
+    fn a_drag_is_one_step() {
+        let mut document = Document::new(b"a\nb\n");
+        for text in ["c", "d", "e"] {
+            document.apply(set(1, text), Some(7));
+        }
+        document.apply(set(1, "f"), Some(8));
+        assert_eq!(document.bytes(), b"a\nf\n");
+        document.undo();
+        assert_eq!(document.bytes(), b"a\ne\n");
+        document.undo();
+        assert_eq!(document.bytes(), b"a\nb\n");
+        assert!(!document.can_undo());
+        document.redo();
+        assert_eq!(document.bytes(), b"a\ne\n");
+    }
+
+    #[test]
+    fn a_last_line_without_an_end_gets_one_only_when_lines_follow() {
+        let mut document = Document::new(b"a\r\nb");
+        document.apply(Splice { at: 9, removed: 0, inserted: vec![Line::new("c")] }, None);
+        assert_eq!(document.bytes(), b"a\r\nb\r\nc\r\n");
+        document.undo();
+        assert_eq!(document.bytes(), b"a\r\nb");
+    }
+
+    #[test]
+    fn lines_keep_their_own_ends() {
+        let mut document = Document::new(b"a\r\nb\nc");
+        let changed = document.lines()[1].with_text("d");
+        document.apply(Splice { at: 1, removed: 1, inserted: vec![changed] }, None);
+        document.apply(Splice { at: 2, removed: 1, inserted: vec![Line::new("e"), Line::new("f")] }, None);
+        assert_eq!(document.bytes(), b"a\r\nd\ne\r\nf");
+    }
+
+    #[test]
+    fn the_history_forgets_before_it_fills_the_memory() {
+        let mut document = Document::new(b"a\n");
+        let long = "x".repeat(HISTORY_BYTES / 4);
+        for _ in 0..10 {
+            document.apply(set(0, &long), None);
+        }
+        assert!(document.done.len() < 8 && document.held <= HISTORY_BYTES);
+    }
+
+    /// A text with all kinds of lines and ends, and 10,000 random edits, undos and redos of it.
+    #[test]
+    fn ten_thousand_edits_and_undos_end_in_the_same_bytes() {
+        let line = "[ -~\\t\u{e4}\u{20ac}]{0,12}(\n|\r\n)";
+        let text = (prop::collection::vec(line, 0..20), "[a-z#]{0,5}")
+            .prop_map(|(lines, last)| lines.concat() + &last);
+        let edit = (
+            0..30usize,
+            0..4usize,
+            prop::collection::vec("[a-z 0-9]{0,6}", 0..3),
+            prop::option::of(0..3u64),
+            0..5u8,
+        );
+        let mut runner = TestRunner::new(Config { cases: 20, ..Config::default() });
+        let edits = prop::collection::vec(edit, 500);
+        runner
+            .run(&(text, edits), |(text, edits)| {
+                let mut document = Document::new(text.as_bytes());
+                let mut mirror: Vec<Line> = document.lines().to_vec();
+                let mut follow = |splices: &[Splice]| {
+                    for s in splices {
+                        mirror.splice(s.at..s.at + s.removed, s.inserted.iter().cloned());
+                    }
+                    mirror.clone()
+                };
+                for (at, removed, inserted, gesture, what) in edits {
+                    let told = match what {
+                        0 => document.undo(),
+                        1 => document.redo(),
+                        _ => {
+                            let inserted = inserted.iter().map(|text| Line::new(text)).collect();
+                            vec![document.apply(Splice { at, removed, inserted }, gesture)]
+                        }
+                    };
+                    prop_assert_eq!(&follow(&told)[..], document.lines(), "what is told is what was done");
+                }
+                let edited = document.bytes();
+                let mut steps = 0;
+                while document.can_undo() {
+                    document.undo();
+                    steps += 1;
+                }
+                prop_assert_eq!(document.bytes(), text.as_bytes());
+                for _ in 0..steps {
+                    document.redo();
+                }
+                prop_assert_eq!(document.bytes(), edited);
+                Ok(())
+            })
+            .unwrap();
+    }
+}

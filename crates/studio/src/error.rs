@@ -1,0 +1,49 @@
+//! Why the studio could not do what it was asked.
+
+use std::io;
+use std::path::PathBuf;
+
+/// Why the studio could not do what it was asked.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file or folder cannot be read.
+    #[error("cannot read {}", path.display())]
+    Read {
+        /// Which.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// A file cannot be written.
+    #[error("cannot write {}", path.display())]
+    Write {
+        /// Which.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// A folder without a script.
+    #[error("the folder {} holds no scene scripts (*.txt)", path.display())]
+    NoScripts {
+        /// Which.
+        path: PathBuf,
+    },
+    /// More text than is held in memory.
+    #[error("{} and what is opened with it are larger than {limit} bytes, which is more than the studio holds", path.display())]
+    TooLarge {
+        /// The file with which it became too much.
+        path: PathBuf,
+        /// How much is held.
+        limit: u64,
+    },
+    /// No socket, no randomness.
+    #[error("cannot start the server of the page")]
+    Server(#[source] io::Error),
+    /// There is no page to show.
+    #[error("the page has not been built: {0}")]
+    NoPage(String),
+    /// The animation cannot be rendered.
+    #[error("{0}")]
+    Output(String),
+}

@@ -1,0 +1,482 @@
+//! What can be dragged: an object by its body, along an axis, by its corners, its radius, a light by its direction; and
+//! which numbers of its line become what.
+//!
+//! It knows commands only by the kinds of their parameters: a position is a handle, a length is one at its distance
+//! from the first position, a direction is the tip of an arrow. Invariant: a drag is computed from what stood when it
+//! began, so that going back to its start changes nothing.
+
+use glam::{DVec2, DVec3};
+use rayfold_scene::{Command, Kind};
+use serde::{Deserialize, Serialize};
+
+use crate::line::Line;
+use crate::tables::{Role, fields, of_kind, role};
+use crate::view::Projection;
+
+/// How long arrows are, in pixels of the picture.
+const ARROW: f64 = 72.0;
+
+/// A surface that is seen more slanted than this sine is not dragged along: a pixel would be miles.
+const SLANTED: f64 = 0.12;
+
+/// A grid's width that dragging snaps to, in pixels, at least.
+const SNAP: f64 = 12.0;
+
+/// What is taken hold of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", tag = "what")]
+pub(crate) enum Grip {
+    /// All of the selected lines, along the ground.
+    Body,
+    /// All of them, along an axis: 0 is x.
+    Axis {
+        /// Which.
+        axis: usize,
+    },
+    /// The position whose numbers begin here.
+    Point {
+        /// Of the line's numbers, from 0.
+        first: usize,
+    },
+    /// The length that is this number.
+    Length {
+        /// Of the line's numbers, from 0.
+        first: usize,
+    },
+    /// The direction whose numbers begin here.
+    Direction {
+        /// Of the line's numbers, from 0.
+        first: usize,
+    },
+}
+
+/// Something to take hold of, in the picture.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Handle {
+    /// What it does.
+    pub(crate) grip: Grip,
+    /// Its line in the script, from 0.
+    pub(crate) line: usize,
+    /// For those who cannot see it.
+    pub(crate) label: String,
+    /// Where it is, in pixels.
+    pub(crate) at: [f64; 2],
+    /// Where the line to it starts, in pixels.
+    pub(crate) from: [f64; 2],
+}
+
+/// A line as numbers of its command; those that are not plain numbers are `None`.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Values {
+    /// Its command.
+    pub(crate) command: Command,
+    numbers: Vec<Option<f64>>,
+}
+
+impl Values {
+    /// `None` for a line without a command.
+    pub(crate) fn of(line: &Line) -> Option<Self> {
+        let (command, words) = (line.command()?, line.words()?);
+        Some(Self { command, numbers: words.parameters.iter().map(|word| line.number(word)).collect() })
+    }
+
+    /// A number of the line.
+    pub(crate) fn number(&self, at: usize) -> Option<f64> {
+        self.numbers.get(at).copied().flatten()
+    }
+
+    /// Three numbers of the line.
+    pub(crate) fn vector(&self, first: usize) -> Option<DVec3> {
+        Some(DVec3::new(self.number(first)?, self.number(first + 1)?, self.number(first + 2)?))
+    }
+
+    /// Its positions, each with where its numbers begin.
+    pub(crate) fn positions(&self) -> impl Iterator<Item = (usize, DVec3)> {
+        of_kind(self.command, Kind::Position).filter_map(|first| Some((first, self.vector(first)?)))
+    }
+
+    /// The greatest of its lengths.
+    pub(crate) fn reach(&self) -> f64 {
+        of_kind(self.command, Kind::Length).filter_map(|first| self.number(first)).fold(0.0, f64::max)
+    }
+}
+
+/// The handles of a line; `around` is where lights without a place are shown.
+pub(crate) fn handles(number: usize, line: &Line, projection: &Projection, around: DVec3) -> Vec<Handle> {
+    let Some(values) = Values::of(line) else { return Vec::new() };
+    let mut handles = Vec::new();
+    let mut add = |grip, from: DVec3, to: DVec3, label: &str| {
+        if let (Some(from), Some(at)) = (projection.point(from), projection.point(to)) {
+            let label = format!("{} of {}", label, values.command.name());
+            handles.push(Handle { grip, line: number, label, at: at.into(), from: from.into() });
+        }
+    };
+    let anchor = values.positions().next().map_or(around, |(_, position)| position);
+    let arrow = ARROW * projection.pixel_at(anchor);
+    let positions: Vec<_> = values.positions().collect();
+    if !positions.is_empty() && role(values.command) != Role::Camera {
+        let middle = middle(&positions);
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            add(
+                Grip::Axis { axis },
+                middle,
+                middle + arrow * DVec3::AXES[axis],
+                &format!("along {name}: place"),
+            );
+        }
+    }
+    let mut lengths = 0;
+    for (first, field) in fields(values.command) {
+        let label = field.parameter.to_string();
+        match field.kind {
+            Kind::Position => {
+                if let (Some(position), true) = (values.vector(first), positions.len() > 1) {
+                    add(Grip::Point { first }, position, position, &label);
+                }
+            }
+            Kind::Length if !positions.is_empty() => {
+                if let Some(length) = values.number(first) {
+                    let at = anchor + length * toward(lengths, projection);
+                    lengths += 1;
+                    add(Grip::Length { first }, anchor, at, &label);
+                }
+            }
+            Kind::Direction => {
+                if let Some(direction) = values.vector(first).and_then(DVec3::try_normalize) {
+                    let tip = anchor + arrow * facing(values.command) * direction;
+                    add(Grip::Direction { first }, anchor, tip, &label);
+                }
+            }
+            _ => {}
+        }
+    }
+    handles
+}
+
+/// The middle of some positions.
+fn middle(positions: &[(usize, DVec3)]) -> DVec3 {
+    positions.iter().map(|(_, position)| position).sum::<DVec3>() / positions.len().max(1) as f64
+}
+
+/// Where the handle of a line's length number `index` lies.
+fn toward(index: usize, projection: &Projection) -> DVec3 {
+    let (right, up, _) = projection.axes();
+    if index == 0 { right } else { up }
+}
+
+/// A light is shown where it comes from.
+fn facing(command: Command) -> f64 {
+    if role(command) == Role::Light { -1.0 } else { 1.0 }
+}
+
+/// A drag: what it began with.
+#[derive(Clone, Debug)]
+pub(crate) struct Drag {
+    grip: Grip,
+    /// The lines, as they were.
+    lines: Vec<(usize, Line, Values)>,
+    /// Where it was taken hold of, in the world.
+    grabbed: DVec3,
+}
+
+/// How a drag is to be taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub(crate) struct Manner {
+    /// Up and down instead of along the ground.
+    #[serde(default)]
+    pub(crate) upright: bool,
+    /// In steps of a grid.
+    #[serde(default)]
+    pub(crate) snap: bool,
+}
+
+impl Drag {
+    /// Takes hold of some lines; `grabbed` is the point of an object that was hit, if one was.
+    pub(crate) fn new(
+        grip: Grip,
+        lines: Vec<(usize, Line)>,
+        grabbed: Option<DVec3>,
+        around: DVec3,
+    ) -> Option<Self> {
+        let lines: Vec<_> = lines
+            .into_iter()
+            .filter_map(|(number, line)| Values::of(&line).map(|values| (number, line, values)))
+            .collect();
+        let (_, _, values) = lines.first()?;
+        let anchor = values.positions().next().map_or(around, |(_, position)| position);
+        let positions: Vec<_> = values.positions().collect();
+        let grabbed = match grip {
+            Grip::Body => grabbed.unwrap_or(anchor),
+            Grip::Axis { .. } => middle(&positions),
+            Grip::Point { first } => values.vector(first)?,
+            Grip::Length { .. } | Grip::Direction { .. } => anchor,
+        };
+        Some(Self { grip, lines, grabbed })
+    }
+
+    /// The lines as they become when the pointer goes from one point of the picture to another.
+    pub(crate) fn to(
+        &self,
+        projection: &Projection,
+        from: DVec2,
+        to: DVec2,
+        manner: Manner,
+    ) -> Vec<(usize, Line)> {
+        let step = step(projection.pixel_at(self.grabbed), manner.snap);
+        let moved = |axes: [bool; 3], by: DVec3| {
+            self.lines.iter().filter_map(move |(number, line, values)| {
+                let mut line = line.clone();
+                for (first, position) in values.positions() {
+                    line = line.with_numbers(first, &shifted(position, by, axes, step))?;
+                }
+                Some((*number, line))
+            })
+        };
+        match self.grip {
+            Grip::Body => {
+                let (normal, axes) = self.plane(projection, manner);
+                let Some(by) = between(projection, self.grabbed, normal, from, to) else {
+                    return self.start();
+                };
+                moved(axes, by).collect()
+            }
+            Grip::Axis { axis } => {
+                let along = DVec3::AXES[axis];
+                let (_, _, w) = projection.axes();
+                // The plane through the axis that faces the eye.
+                let normal = along.cross(w).cross(along);
+                let Some(normal) = normal.try_normalize() else { return self.start() };
+                let Some(by) = between(projection, self.grabbed, normal, from, to) else {
+                    return self.start();
+                };
+                moved([0, 1, 2].map(|other| other == axis), by).collect()
+            }
+            Grip::Point { first } => {
+                let (normal, axes) = self.plane(projection, manner);
+                let Some(by) = between(projection, self.grabbed, normal, from, to) else {
+                    return self.start();
+                };
+                self.first(|line, values| {
+                    let position = values.vector(first)?;
+                    line.with_numbers(first, &shifted(position, by, axes, step))
+                })
+            }
+            Grip::Length { first } => {
+                let (_, _, w) = projection.axes();
+                let at = |seen| meet(projection.ray(seen), self.grabbed, w).map(|p| p.distance(self.grabbed));
+                let (Some(before), Some(now)) = (at(from), at(to)) else { return self.start() };
+                if from == to {
+                    return self.start();
+                }
+                self.first(|line, values| {
+                    let length = values.number(first)?;
+                    line.with_numbers(first, &[rounded((length + now - before).max(step), step)])
+                })
+            }
+            Grip::Direction { first } => {
+                let radius = ARROW * projection.pixel_at(self.grabbed);
+                if from == to {
+                    return self.start();
+                }
+                self.first(|line, values| {
+                    let old = values.vector(first)?;
+                    let tip = on_sphere(projection.ray(to), self.grabbed, radius) - self.grabbed;
+                    let length = old.length();
+                    let new = facing(values.command) * tip.normalize_or(DVec3::NEG_Y) * length;
+                    let step = self::step(length * 1e-2, manner.snap);
+                    let new = new.to_array().map(|x| rounded(x, step));
+                    if new == [0.0; 3] { None } else { line.with_numbers(first, &new) }
+                })
+            }
+        }
+    }
+
+    fn start(&self) -> Vec<(usize, Line)> {
+        self.lines.iter().map(|(number, line, _)| (*number, line.clone())).collect()
+    }
+
+    fn first(&self, change: impl Fn(&Line, &Values) -> Option<Line>) -> Vec<(usize, Line)> {
+        let Some((number, line, values)) = self.lines.first() else { return Vec::new() };
+        vec![(*number, change(line, values).unwrap_or_else(|| line.clone()))]
+    }
+
+    /// The plane that a free drag goes along, and which coordinates it changes: the ground, or upright, or the picture's
+    /// own plane where the ground is seen edge on.
+    fn plane(&self, projection: &Projection, manner: Manner) -> (DVec3, [bool; 3]) {
+        let (_, _, w) = projection.axes();
+        if manner.upright {
+            let facing = DVec3::new(w.x, 0.0, w.z);
+            return (facing.try_normalize().unwrap_or(DVec3::Z), [false, true, false]);
+        }
+        if w.y.abs() > SLANTED {
+            return (DVec3::Y, [true, false, true]);
+        }
+        if w.z.abs() > w.x.abs() { (DVec3::Z, [true, true, false]) } else { (DVec3::X, [false, true, true]) }
+    }
+}
+
+/// How far the pointer goes along a plane.
+fn between(projection: &Projection, through: DVec3, normal: DVec3, from: DVec2, to: DVec2) -> Option<DVec3> {
+    let start = meet(projection.ray(from), through, normal)?;
+    let end = meet(projection.ray(to), through, normal)?;
+    Some(end - start)
+}
+
+/// Where a ray meets a plane.
+fn meet((origin, direction): (DVec3, DVec3), through: DVec3, normal: DVec3) -> Option<DVec3> {
+    let distance = (through - origin).dot(normal) / direction.dot(normal);
+    let point = origin + distance * direction;
+    (distance > 0.0 && point.is_finite()).then_some(point)
+}
+
+/// Where a ray meets a sphere, or comes nearest to it.
+fn on_sphere((origin, direction): (DVec3, DVec3), center: DVec3, radius: f64) -> DVec3 {
+    let along = (center - origin).dot(direction);
+    let nearest = origin + along * direction;
+    let room = radius * radius - nearest.distance_squared(center);
+    if room > 0.0 { nearest - room.sqrt() * direction } else { nearest }
+}
+
+/// What numbers are rounded to where a pixel is so much: a tenth of it at least, in powers of ten.
+fn step(pixel: f64, snap: bool) -> f64 {
+    let least = if snap { SNAP * pixel } else { 0.5 * pixel };
+    let power = if snap { least.log10().ceil() } else { least.log10().floor() };
+    if power.is_finite() { 10f64.powi(power.clamp(-12.0, 12.0) as i32) } else { 1e-3 }
+}
+
+/// A multiple of a power of ten, as its shortest decimal.
+fn rounded(x: f64, step: f64) -> f64 {
+    let decimals = -step.log10().round();
+    let x = (x / step).round() * step;
+    if decimals > 0.0 { format!("{x:.*}", decimals as usize).parse().unwrap_or(x) } else { x.round() }
+}
+
+/// A position moved along some of the axes; those along which it does not move keep their numbers.
+fn shifted(position: DVec3, by: DVec3, axes: [bool; 3], step: f64) -> [f64; 3] {
+    let mut to = position.to_array();
+    for axis in (0..3).filter(|&axis| axes[axis]) {
+        let way = rounded(by[axis], step);
+        if way != 0.0 {
+            to[axis] = exactly(to[axis], way, step);
+        }
+    }
+    to
+}
+
+/// The sum, without the noise of the last bits: as many decimals as the longer of the two has.
+fn exactly(x: f64, way: f64, step: f64) -> f64 {
+    let sum = x + way;
+    let of = |x: f64| x.to_string().split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    let decimals = of(x).max((-step.log10().round()).max(0.0) as usize);
+    if decimals <= 12 { format!("{sum:.decimals$}").parse().unwrap_or(sum) } else { sum }
+}
+
+#[cfg(test)]
+mod tests {
+    use rayfold_scene::{Camera, Scene, Screen};
+
+    use super::*;
+    use crate::view::{Bounds, Orbit};
+
+    fn scene() -> Scene {
+        let bounds = Bounds { low: DVec3::splat(-2.0), high: DVec3::splat(2.0) };
+        let camera = Orbit::at(bounds, 0.0, 0.6).camera(1.5).unwrap();
+        Scene::new(Screen::new(300, 200).unwrap(), Camera::Pinhole(camera))
+    }
+
+    fn drag(grip: Grip, text: &str, from: DVec2, by: DVec2, manner: Manner) -> String {
+        let scene = scene();
+        let drag = Drag::new(grip, vec![(0, Line::new(text))], None, DVec3::ZERO).unwrap();
+        drag.to(&Projection::new(&scene), from, from + by, manner)[0].1.text()
+    }
+
+    const BALL: &str = "Sphere 1  0 1 0  .1 .1 .1  1 1 1 # ball";
+
+    #[test]
+    fn going_back_to_the_start_changes_nothing() {
+        let text = "Box -1.005 0 1e0  2 .50 -0 .1 .1 .1 1 1 1";
+        let grips = [Grip::Body, Grip::Axis { axis: 1 }, Grip::Point { first: 3 }];
+        for grip in grips {
+            assert_eq!(drag(grip, text, DVec2::new(120.0, 90.0), DVec2::ZERO, Manner::default()), text);
+        }
+        for grip in [Grip::Length { first: 0 }, Grip::Body] {
+            assert_eq!(drag(grip, BALL, DVec2::new(120.0, 90.0), DVec2::ZERO, Manner::default()), BALL);
+        }
+        let sun = "Ilight 1 1 1  .3 -1 -.123456789";
+        let grip = Grip::Direction { first: 3 };
+        assert_eq!(drag(grip, sun, DVec2::new(120.0, 90.0), DVec2::ZERO, Manner::default()), sun);
+    }
+
+    #[test]
+    fn a_body_goes_along_the_ground_under_the_pointer() {
+        let scene = scene();
+        let projection = Projection::new(&scene);
+        let grabbed = DVec3::new(0.0, 1.0, 0.0);
+        let to = DVec3::new(0.5, 1.0, -0.25);
+        let (from, by) = (projection.point(grabbed).unwrap(), projection.point(to).unwrap());
+        let text = drag(Grip::Body, BALL, from, by - from, Manner::default());
+        assert_eq!(text, "Sphere 1  0.5 1 -0.25  .1 .1 .1  1 1 1 # ball");
+    }
+
+    #[test]
+    fn upright_and_axes_change_one_number() {
+        let up = DVec2::new(13.0, -31.0);
+        let upright =
+            drag(Grip::Body, BALL, DVec2::new(150.0, 80.0), up, Manner { upright: true, snap: false });
+        let axis = drag(Grip::Axis { axis: 1 }, BALL, DVec2::new(150.0, 80.0), up, Manner::default());
+        for text in [upright, axis] {
+            let y: f64 = text.split_whitespace().nth(3).unwrap().parse().unwrap();
+            assert!(
+                y > 1.2 && text.starts_with("Sphere 1  0 ") && text.ends_with(" 0  .1 .1 .1  1 1 1 # ball"),
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_radius_follows_its_handle_and_stays_positive() {
+        let scene = scene();
+        let projection = Projection::new(&scene);
+        let of_radius = |text: &str| {
+            let all = handles(0, &Line::new(text), &projection, DVec3::ZERO);
+            DVec2::from(all.iter().find(|h| h.grip == Grip::Length { first: 0 }).unwrap().at)
+        };
+        let (one, two) = (of_radius(BALL), of_radius(&BALL.replacen('1', "2", 1)));
+        let text = drag(Grip::Length { first: 0 }, BALL, one, two - one, Manner::default());
+        assert!(
+            text.starts_with("Sphere 2 ")
+                || text.starts_with("Sphere 2.00")
+                || text.starts_with("Sphere 1.99"),
+            "{text}"
+        );
+        let text = drag(Grip::Length { first: 0 }, BALL, one, DVec2::new(-38.0, 0.0), Manner::default());
+        let radius: f64 = text.split_whitespace().nth(1).unwrap().parse().unwrap();
+        assert!(radius > 0.0 && radius < 1.0, "{text}");
+    }
+
+    #[test]
+    fn a_lights_handle_leads_to_its_direction() {
+        let scene = scene();
+        let projection = Projection::new(&scene);
+        let handle = |text: &str| {
+            let all = handles(0, &Line::new(text), &projection, DVec3::ZERO);
+            assert_eq!(all.len(), 1, "a sun has no place");
+            DVec2::from(all[0].at)
+        };
+        let (old, new) = (handle("Ilight 1 1 1  0 -2 0"), handle("Ilight 1 1 1  1.2 -1.6 0"));
+        let text =
+            drag(Grip::Direction { first: 3 }, "Ilight 1 1 1  0 -2 0", old, new - old, Manner::default());
+        let numbers: Vec<f64> = text.split_whitespace().skip(4).map(|n| n.parse().unwrap()).collect();
+        let off = DVec3::from_slice(&numbers).distance(DVec3::new(1.2, -1.6, 0.0));
+        assert!(off < 0.1, "{text}");
+    }
+
+    #[test]
+    fn steps_are_powers_of_ten() {
+        assert_eq!(step(0.013, false), 1e-3);
+        assert_eq!(step(0.013, true), 1.0);
+        assert_eq!(rounded(1.23456, 1e-2), 1.23);
+        assert_eq!(rounded(1234.0, 100.0), 1200.0);
+        assert_eq!(exactly(-3.515, 0.1, 0.01), -3.415);
+    }
+}

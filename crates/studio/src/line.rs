@@ -1,0 +1,249 @@
+//! A line of a script as words and what stands between them, so that one word can be exchanged and every other byte
+//! stays.
+//!
+//! Says nothing about what is right: that does the parser. Invariants: the spans of a line lie in it, in order, and do
+//! not overlap; [`Line::with`] changes nothing outside the spans that it is given.
+
+use std::ops::Range;
+
+use rayfold_scene::Command;
+
+/// A line with its end: a line feed, with a carriage return or without, or nothing at the end of a text.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Line(Vec<u8>);
+
+/// Where the words of a line are, in bytes of it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Words {
+    /// The first word.
+    pub command: Range<usize>,
+    /// The others; a curve in brackets is one.
+    pub parameters: Vec<Range<usize>>,
+    /// From the sign that begins the comment to the end of the text.
+    pub comment: Option<Range<usize>>,
+}
+
+impl Line {
+    /// The lines of a text; put together they are the text again.
+    pub fn split(text: &[u8]) -> Vec<Self> {
+        text.split_inclusive(|&byte| byte == b'\n').map(|line| Self(line.to_vec())).collect()
+    }
+
+    /// Without an end: its document gives it one.
+    pub fn new(text: &str) -> Self {
+        Self(text.into())
+    }
+
+    /// All of it.
+    pub fn bytes(&self) -> &[u8] {
+        &self.0
+    }
+
+    /// What stands before the end, with U+FFFD for what is not UTF-8.
+    pub fn text(&self) -> String {
+        String::from_utf8_lossy(self.body()).into_owned()
+    }
+
+    /// `\n`, `\r\n` or nothing.
+    pub fn end(&self) -> &[u8] {
+        &self.0[self.body().len()..]
+    }
+
+    /// What stands before the end.
+    fn body(&self) -> &[u8] {
+        let line = self.0.strip_suffix(b"\n").unwrap_or(&self.0);
+        line.strip_suffix(b"\r").unwrap_or(line)
+    }
+
+    /// Another text with the end of this line.
+    #[must_use]
+    pub fn with_text(&self, text: &str) -> Self {
+        Self([text.as_bytes(), self.end()].concat())
+    }
+
+    /// The same text with another end.
+    #[must_use]
+    pub fn with_end(&self, end: &[u8]) -> Self {
+        Self([self.body(), end].concat())
+    }
+
+    /// The command, if its first word is one.
+    pub fn command(&self) -> Option<Command> {
+        let words = self.words()?;
+        Command::from_name(std::str::from_utf8(&self.0[words.command]).ok()?)
+    }
+
+    /// `None` for a line without a command.
+    pub fn words(&self) -> Option<Words> {
+        let body = self.body();
+        let start = if body.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+        let comment = body.iter().position(|&byte| byte == b'#');
+        let code = comment.unwrap_or(body.len());
+        let mut words = Vec::new();
+        let mut at = start;
+        while at < code {
+            if is_separator(body[at]) {
+                at += 1;
+                continue;
+            }
+            let from = at;
+            if body[at] == b'(' {
+                at = body[at..code].iter().position(|&byte| byte == b')').map_or(code, |end| at + end + 1);
+            } else {
+                while at < code && !is_separator(body[at]) && body[at] != b'(' {
+                    at += 1;
+                }
+            }
+            words.push(from..at);
+        }
+        let mut words = words.into_iter();
+        Some(Words {
+            command: words.next()?,
+            parameters: words.collect(),
+            comment: comment.map(|at| at..body.len()),
+        })
+    }
+
+    /// The number that a word is; `None` for a curve, a name, and what is none.
+    pub fn number(&self, word: &Range<usize>) -> Option<f64> {
+        let word = std::str::from_utf8(&self.0[word.clone()]).ok()?;
+        word.parse().ok().filter(|number: &f64| number.is_finite())
+    }
+
+    /// The name: what the comment at the end of a command's line says.
+    pub fn name(&self) -> Option<String> {
+        let comment = self.words()?.comment?;
+        let name = String::from_utf8_lossy(&self.0[comment]).trim_start_matches('#').trim().to_owned();
+        (!name.is_empty()).then_some(name)
+    }
+
+    /// The same with another name; an empty one is none. The rest of the line stays as it is.
+    #[must_use]
+    pub fn named(&self, name: &str) -> Option<Self> {
+        let words = self.words()?;
+        let name: String = name.chars().filter(|c| !c.is_control()).collect();
+        let name = name.trim().trim_start_matches('#').trim();
+        let last = words.parameters.last().unwrap_or(&words.command).end;
+        let body = self.body().len();
+        Some(match (&words.comment, name) {
+            (Some(_), "") => self.with(&[(last..body, String::new())]),
+            (None, "") => self.clone(),
+            (Some(comment), name) => self.with(&[(comment.clone(), format!("# {name}"))]),
+            (None, name) => self.with(&[(body..body, format!("   # {name}"))]),
+        })
+    }
+
+    /// The same with numbers from parameter `first` on. Where the line has fewer they are added behind its last word.
+    #[must_use]
+    pub fn with_numbers(&self, first: usize, numbers: &[f64]) -> Option<Self> {
+        let words = self.words()?;
+        if numbers.is_empty() {
+            return Some(self.clone());
+        }
+        let last = words.parameters.last().unwrap_or(&words.command).end;
+        let mut changes = Vec::new();
+        // What lies between the last word and the first new one may be left out only from the end: it is 0.
+        for at in words.parameters.len().min(first)..first + numbers.len() {
+            let value = at.checked_sub(first).and_then(|i| numbers.get(i)).copied().unwrap_or(0.0);
+            match words.parameters.get(at) {
+                Some(word) if self.number(word) == Some(value) => {}
+                Some(word) => changes.push((word.clone(), written(value))),
+                None => changes.push((last..last, format!(" {}", written(value)))),
+            }
+        }
+        Some(self.with(&changes))
+    }
+
+    /// The same with other bytes for some spans, which are in order.
+    fn with(&self, changes: &[(Range<usize>, String)]) -> Self {
+        let mut bytes = Vec::with_capacity(self.0.len() + 16);
+        let mut at = 0;
+        for (span, text) in changes {
+            bytes.extend_from_slice(&self.0[at..span.start]);
+            bytes.extend_from_slice(text.as_bytes());
+            at = span.end;
+        }
+        bytes.extend_from_slice(&self.0[at..]);
+        Self(bytes)
+    }
+}
+
+/// The shortest decimal that reads back as this number.
+pub(crate) fn written(number: f64) -> String {
+    let number = number + 0.0;
+    if number == 0.0 || (1e-5..1e16).contains(&number.abs()) {
+        number.to_string()
+    } else {
+        format!("{number:e}")
+    }
+}
+
+fn is_separator(byte: u8) -> bool {
+    matches!(byte, b' ' | b'\t' | b',')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(text: &str) -> Line {
+        Line::split(text.as_bytes()).remove(0)
+    }
+
+    #[test]
+    fn lines_put_together_are_the_text() {
+        for text in ["", "\n", "a", "a\nb", "a\r\n\r\nb\r\n", "\u{feff}Trace\n", "\n\n\n"] {
+            let lines = Line::split(text.as_bytes());
+            assert_eq!(lines.iter().flat_map(|l| l.bytes()).copied().collect::<Vec<_>>(), text.as_bytes());
+        }
+        assert_eq!(Line::split(b"\xff\xfe\n")[0].bytes(), b"\xff\xfe\n");
+    }
+
+    #[test]
+    fn a_number_is_exchanged_and_all_else_stays() {
+        let sphere = line("  sphere\t1.50 , 0 1e0 0   .1 .1 .1 1 1 1  # a ball\r\n");
+        let moved = sphere.with_numbers(1, &[2.0, 1.0, -0.25]).unwrap();
+        assert_eq!(moved.bytes(), b"  sphere\t1.50 , 2 1e0 -0.25   .1 .1 .1 1 1 1  # a ball\r\n");
+        assert_eq!(
+            sphere.with_numbers(1, &[0.0, 1.0, 0.0]).unwrap(),
+            sphere,
+            "what is equal is not rewritten"
+        );
+    }
+
+    #[test]
+    fn what_was_left_out_is_added_behind_the_last_word() {
+        let sphere = line("Sphere 1 0 0 0 0 0 0 1 1 1   # ball\n");
+        let shiny = sphere.with_numbers(10, &[0.5, 0.5, 0.5]).unwrap();
+        assert_eq!(shiny.text(), "Sphere 1 0 0 0 0 0 0 1 1 1 0.5 0.5 0.5   # ball");
+        let last = sphere.with_numbers(12, &[0.5]).unwrap();
+        assert_eq!(last.text(), "Sphere 1 0 0 0 0 0 0 1 1 1 0 0 0.5   # ball");
+    }
+
+    #[test]
+    fn the_name_is_the_comment_at_the_end() {
+        assert_eq!(line("Trace#x").name().as_deref(), Some("x"));
+        assert_eq!(line("# no command").name(), None);
+        let named = line("Trace\n").named(" a # b\n").unwrap();
+        assert_eq!((named.text().as_str(), named.name().as_deref()), ("Trace   # a # b", Some("a # b")));
+        assert_eq!(named.named("c").unwrap().text(), "Trace   # c");
+        assert_eq!(named.named("").unwrap().text(), "Trace");
+    }
+
+    #[test]
+    fn a_curve_is_one_word() {
+        let sphere = line("Sphere (1:1 9:2)0 1 2 red # (");
+        let words = sphere.words().unwrap();
+        assert_eq!(words.parameters.len(), 5);
+        assert_eq!(sphere.number(&words.parameters[0]), None);
+        assert_eq!(sphere.with_numbers(1, &[7.0]).unwrap().text(), "Sphere (1:1 9:2)7 1 2 red # (");
+    }
+
+    #[test]
+    fn numbers_are_written_as_they_read_back() {
+        for number in [0.0, -0.0, 1.0, -2.5, 1e-7, 1e300, 0.1 + 0.2] {
+            assert_eq!(written(number).parse::<f64>().unwrap(), number);
+        }
+        assert_eq!(written(-0.0), "0");
+    }
+}

@@ -1,0 +1,156 @@
+//! The GIF of what is open, made on a thread of its own; the same bytes as `rayfold render` makes of the files.
+
+use std::io::{self, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+
+use rayfold_gif::{Encoder, Settings};
+use rayfold_scene::{AnimationSettings, Script};
+use rayfold_tracer::{RenderOptions, render};
+use zip::ZipWriter;
+use zip::write::SimpleFileOptions;
+
+use crate::error::Error;
+use crate::project::Project;
+use crate::protocol::OutputState;
+
+/// Bytes of a GIF that are kept in memory, at most.
+const GIF: usize = 512 << 20;
+
+/// The GIF that was made last, and the one that is being made.
+#[derive(Debug, Default)]
+pub(crate) struct Outputs {
+    gif: Mutex<Option<Arc<Vec<u8>>>>,
+    running: Mutex<Option<Arc<AtomicBool>>>,
+}
+
+/// What is rendered: scripts in order, and their pace.
+#[derive(Debug)]
+struct Job {
+    scripts: Vec<Script>,
+    settings: AnimationSettings,
+}
+
+impl Job {
+    fn of(project: &Project) -> Result<Self, Error> {
+        if let Some(file) = project.files.iter().find(|file| !file.is_sound()) {
+            return Err(Error::Output(format!("{} has errors; mend them first", file.name)));
+        }
+        let scripts: Vec<_> = project.files.iter().filter_map(|file| file.script.clone()).collect();
+        let frames: usize = scripts.iter().map(Script::frame_count).sum();
+        match project.settings.frames() {
+            Some(expected) if (frames as u64) < expected => Err(Error::Output(format!(
+                "animation.json says {expected} frames, but the scripts give {frames}"
+            ))),
+            _ => Ok(Self { scripts, settings: project.settings }),
+        }
+    }
+
+    fn run(&self, cancel: &AtomicBool, told: &impl Fn(OutputState)) -> Result<Vec<u8>, Error> {
+        let of = self.scripts.iter().map(Script::frame_count).sum();
+        let failed = |error: &dyn std::error::Error| Error::Output(format!("cannot make the GIF: {error}"));
+        let settings = Settings { fps: self.settings.fps(), loops: self.settings.loops() };
+        let mut gif = Bounded(Vec::new());
+        let mut encoder = Encoder::new(&mut gif, settings).map_err(|error| failed(&error))?;
+        let options = RenderOptions { cancel: Some(cancel), ..RenderOptions::default() };
+        told(OutputState::Running { done: 0, of });
+        for (done, scene) in self.scripts.iter().flat_map(Script::frames).enumerate() {
+            let frame = render(&scene, &options).map_err(|error| failed(&error))?;
+            encoder.push(frame).map_err(|error| failed(&error))?;
+            told(OutputState::Running { done: done + 1, of });
+        }
+        encoder.finish().map_err(|error| failed(&error))?;
+        Ok(gif.0)
+    }
+}
+
+impl Outputs {
+    /// Begins to make the GIF, unless one is being made; `told` hears how it stands.
+    pub(crate) fn start(self: &Arc<Self>, project: &Project, told: impl Fn(OutputState) + Send + 'static) {
+        let job = Job::of(project);
+        let cancel = Arc::new(AtomicBool::new(false));
+        {
+            let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
+            if running.is_some() {
+                return;
+            }
+            *running = Some(Arc::clone(&cancel));
+        }
+        let own = Arc::clone(self);
+        let spawned = thread::Builder::new().name("output".into()).spawn(move || {
+            let made = job.and_then(|job| job.run(&cancel, &told));
+            *own.running.lock().unwrap_or_else(PoisonError::into_inner) = None;
+            told(match made {
+                _ if cancel.load(Ordering::Relaxed) => OutputState::Cancelled,
+                Err(error) => OutputState::Failed { why: error.to_string() },
+                Ok(gif) => {
+                    let bytes = gif.len();
+                    *own.gif.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(gif));
+                    OutputState::Done { bytes }
+                }
+            });
+        });
+        if spawned.is_err() {
+            *self.running.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        }
+    }
+
+    /// Stops what is being made.
+    pub(crate) fn cancel(&self) {
+        if let Some(cancel) = &*self.running.lock().unwrap_or_else(PoisonError::into_inner) {
+            cancel.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// The GIF that was made last.
+    pub(crate) fn gif(&self) -> Option<Arc<Vec<u8>>> {
+        self.gif.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// A frame at the script's own size, as PNG; `None` where there is nothing to draw.
+///
+/// # Errors
+/// When it cannot be drawn.
+pub(crate) fn frame_png(script: &Script, frame: usize) -> Result<Option<Vec<u8>>, Error> {
+    let Some(scene) = script.frame(frame) else { return Ok(None) };
+    let failed = |error: &dyn std::error::Error| Error::Output(format!("cannot make the picture: {error}"));
+    let image = render(&scene, &RenderOptions::default()).map_err(|error| failed(&error))?;
+    let mut file = io::Cursor::new(Vec::new());
+    image.write_to(&mut file, image::ImageFormat::Png).map_err(|error| failed(&error))?;
+    Ok(Some(file.into_inner()))
+}
+
+/// All scripts, as they stand on the page, as a zip file.
+///
+/// # Errors
+/// When the file is beyond what the format can hold.
+pub(crate) fn scripts_zip(project: &Project) -> Result<Vec<u8>, Error> {
+    let mut zip = ZipWriter::new(io::Cursor::new(Vec::new()));
+    let failed = |error: &dyn std::error::Error| Error::Output(format!("cannot make the zip file: {error}"));
+    for file in &project.files {
+        zip.start_file(&file.name, SimpleFileOptions::default()).map_err(|error| failed(&error))?;
+        zip.write_all(&file.document.bytes()).map_err(|error| failed(&error))?;
+    }
+    Ok(zip.finish().map_err(|error| failed(&error))?.into_inner())
+}
+
+/// Bytes up to a limit.
+struct Bounded(Vec<u8>);
+
+impl Write for Bounded {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.0.len() + bytes.len() > GIF {
+            return Err(io::Error::other(format!(
+                "it is larger than {GIF} bytes; `rayfold render` writes it to a file"
+            )));
+        }
+        self.0.extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}

@@ -1,0 +1,438 @@
+//! The scripts that are open, and their files.
+//!
+//! Reads and writes what it was opened with and nothing else. A file is written whole or not at all, and never over
+//! what somebody else wrote meanwhile: then it is in [`Saved::Conflict`] until it is said whose text stays.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use rayfold_scene::{
+    AnimationSettings, Diagnostic, Limits, SETTINGS_FILE, Script, natural_cmp, parse, parse_settings,
+    script_name,
+};
+use serde::Serialize;
+
+use crate::document::{Document, Splice};
+use crate::error::Error;
+use crate::line::Line;
+
+/// Bytes of all scripts together.
+const TEXT: u64 = 256 << 20;
+
+/// Faults of a script that are told one by one.
+const DESCRIBED: usize = 200;
+
+/// A file is written when nothing was changed for so long.
+const REST: Duration = Duration::from_millis(400);
+
+/// What a script begins with that is not there yet.
+const STARTER: &str = include_str!("starter.txt");
+
+/// Whether a file holds what is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Saved {
+    /// It does.
+    Yes,
+    /// It soon will.
+    Soon,
+    /// Somebody else changed it, and so did the page.
+    Conflict,
+    /// It cannot be written.
+    Failed,
+}
+
+/// A script and its file.
+#[derive(Debug)]
+pub struct Opened {
+    /// How it is called: its file name.
+    pub name: String,
+    path: PathBuf,
+    /// Its lines.
+    pub document: Document,
+    /// What the lines mean; what they meant last, where they have an error now.
+    pub script: Option<Script>,
+    /// What is wrong with them.
+    pub diagnostics: Vec<Diagnostic>,
+    /// What the file held when it was last read or written; `None` if it was not there.
+    on_disk: Option<Vec<u8>>,
+    changed: Option<Instant>,
+    saved: Saved,
+}
+
+/// All that is open.
+#[derive(Debug)]
+pub struct Project {
+    /// How it is called: the folder's or the file's name.
+    pub name: String,
+    /// In their order in the animation; never empty.
+    pub files: Vec<Opened>,
+    /// What the folder says about the animation.
+    pub settings: AnimationSettings,
+}
+
+/// A frame of the animation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Index of its file.
+    pub file: usize,
+    /// Index of its `Trace` in the file.
+    pub frame: usize,
+}
+
+impl Project {
+    /// Opens a folder of scripts, or one script; a script that is not there yet begins with an example.
+    ///
+    /// # Errors
+    /// When a file cannot be read, or the folder has no script.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let name = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+        let name = name.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        let read = |source| Error::Read { path: path.to_path_buf(), source };
+        let mut settings = AnimationSettings::default();
+        let mut paths = Vec::new();
+        if path.is_dir() {
+            for entry in fs::read_dir(path).map_err(read)? {
+                let entry = entry.map_err(read)?;
+                let name = entry.file_name().to_string_lossy().into_owned();
+                if name == SETTINGS_FILE {
+                    let text = fs::read(entry.path())
+                        .map_err(|source| Error::Read { path: entry.path(), source })?;
+                    settings = parse_settings(&name, &text).settings.unwrap_or_default();
+                } else if name.ends_with(".txt") && entry.path().is_file() {
+                    paths.push((name, entry.path()));
+                }
+            }
+            paths.sort_by(|(a, _), (b, _)| {
+                natural_cmp(script_name(a).unwrap_or(a), script_name(b).unwrap_or(b))
+            });
+            if paths.is_empty() {
+                return Err(Error::NoScripts { path: path.to_path_buf() });
+            }
+        } else {
+            paths.push((name.clone(), path.to_path_buf()));
+        }
+        let mut room = TEXT;
+        let files = paths
+            .into_iter()
+            .map(|(name, path)| {
+                let file = Opened::open(name, path)?;
+                room = room
+                    .checked_sub(file.on_disk.as_ref().map_or(0, |text| text.len() as u64))
+                    .ok_or_else(|| Error::TooLarge { path: file.path.clone(), limit: TEXT })?;
+                Ok(file)
+            })
+            .collect::<Result<_, Error>>()?;
+        Ok(Self { name, files, settings })
+    }
+
+    /// How many frames can be shown: those of all files, and one for a file that has none.
+    pub fn frame_count(&self) -> usize {
+        self.files.iter().map(Opened::frame_count).sum()
+    }
+
+    /// Where a frame is, counted from 0; the last one beyond the end.
+    pub fn place(&self, frame: usize) -> Place {
+        let mut left = frame;
+        for (file, opened) in self.files.iter().enumerate() {
+            if left < opened.frame_count() {
+                return Place { file, frame: left };
+            }
+            left -= opened.frame_count();
+        }
+        let file = self.files.len() - 1;
+        Place { file, frame: self.files[file].frame_count() - 1 }
+    }
+
+    /// The first frame of a file.
+    pub fn first_frame(&self, file: usize) -> usize {
+        self.files.iter().take(file).map(Opened::frame_count).sum()
+    }
+
+    /// Writes what has rested for a while, or at once if `now`; whether anything has changed that is shown.
+    pub fn save(&mut self, now: bool) -> bool {
+        let due = |changed: Instant| now || changed.elapsed() >= REST;
+        let mut told = false;
+        for file in &mut self.files {
+            if file.changed.is_some_and(due) {
+                told |= file.save();
+            }
+        }
+        told
+    }
+}
+
+impl Opened {
+    fn open(name: String, path: PathBuf) -> Result<Self, Error> {
+        // So that a link keeps pointing to what is written.
+        let path = path.canonicalize().unwrap_or(path);
+        let on_disk = read(&path)?;
+        let text = on_disk.clone().unwrap_or_else(|| STARTER.into());
+        let mut file = Self {
+            name,
+            path,
+            document: Document::new(&text),
+            script: None,
+            diagnostics: Vec::new(),
+            on_disk,
+            changed: None,
+            saved: Saved::Yes,
+        };
+        file.parse();
+        Ok(file)
+    }
+
+    /// How many frames can be shown.
+    pub fn frame_count(&self) -> usize {
+        self.script.as_ref().map_or(1, |script| script.frame_count())
+    }
+
+    /// Whether the file holds what is shown.
+    pub fn saved(&self) -> Saved {
+        match self.saved {
+            Saved::Yes if self.changed.is_some() => Saved::Soon,
+            saved => saved,
+        }
+    }
+
+    /// Whether its text can be rendered as it stands.
+    pub fn is_sound(&self) -> bool {
+        self.script.is_some() && !self.diagnostics.iter().any(Diagnostic::is_error)
+    }
+
+    /// Changes lines; what was done.
+    pub fn apply(&mut self, splices: Vec<Splice>, gesture: Option<u64>) -> Vec<Splice> {
+        let done = splices.into_iter().map(|splice| self.document.apply(splice, gesture)).collect();
+        self.touched();
+        done
+    }
+
+    /// Takes the last step back.
+    pub fn undo(&mut self) -> Vec<Splice> {
+        let done = self.document.undo();
+        self.touched();
+        done
+    }
+
+    /// Makes it again.
+    pub fn redo(&mut self) -> Vec<Splice> {
+        let done = self.document.redo();
+        self.touched();
+        done
+    }
+
+    fn touched(&mut self) {
+        self.parse();
+        self.changed = Some(Instant::now());
+    }
+
+    fn parse(&mut self) {
+        let limits = Limits { max_described: DESCRIBED, ..Limits::default() };
+        let parsed = parse(&self.name, &self.document.bytes(), &limits);
+        self.diagnostics = parsed.diagnostics;
+        if parsed.script.is_some() {
+            self.script = parsed.script;
+        }
+    }
+
+    /// Looks whether somebody else has written the file: their text is taken over as a step that can be undone, unless
+    /// there are changes that are not written yet. What was done to the lines.
+    pub fn look(&mut self) -> Option<Vec<Splice>> {
+        let theirs = read(&self.path).ok()?;
+        if theirs == self.on_disk {
+            return None;
+        }
+        if self.changed.is_some() {
+            let news = self.saved != Saved::Conflict;
+            self.saved = Saved::Conflict;
+            return news.then(Vec::new);
+        }
+        let text = theirs.clone()?;
+        self.on_disk = theirs;
+        Some(self.take_over(&text))
+    }
+
+    /// Ends a conflict: with the text of the page, or with that of the file. What was done to the lines.
+    pub fn resolve(&mut self, keep_mine: bool) -> Vec<Splice> {
+        self.on_disk = read(&self.path).unwrap_or_default();
+        self.saved = Saved::Yes;
+        if keep_mine {
+            self.changed = Some(Instant::now());
+            return Vec::new();
+        }
+        let text = self.on_disk.clone().unwrap_or_default();
+        self.take_over(&text)
+    }
+
+    /// The lines become those of a text, by one splice of what differs.
+    fn take_over(&mut self, text: &[u8]) -> Vec<Splice> {
+        let new = Line::split(text);
+        let old = self.document.lines();
+        let most = old.len().min(new.len());
+        let same = old.iter().zip(&new).take_while(|(a, b)| a == b).count();
+        let rest =
+            old.iter().rev().zip(new.iter().rev()).take(most - same).take_while(|(a, b)| a == b).count();
+        let inserted = new[same..new.len() - rest].to_vec();
+        let splice = Splice { at: same, removed: old.len() - rest - same, inserted };
+        let done = self.document.replace(splice);
+        self.parse();
+        self.changed = None;
+        done
+    }
+
+    /// Writes the file, if nobody else has; whether it stands otherwise than before.
+    fn save(&mut self) -> bool {
+        let before = self.saved();
+        if self.saved == Saved::Conflict {
+            return false;
+        }
+        let text = self.document.bytes();
+        self.saved = match read(&self.path) {
+            Ok(theirs) if theirs != self.on_disk => Saved::Conflict,
+            Ok(theirs) if theirs.as_ref() == Some(&text) => {
+                self.changed = None;
+                Saved::Yes
+            }
+            Ok(_) => match write_whole(&self.path, &text) {
+                Ok(()) => {
+                    (self.on_disk, self.changed) = (Some(text), None);
+                    Saved::Yes
+                }
+                Err(_) => Saved::Failed,
+            },
+            Err(_) => Saved::Failed,
+        };
+        if self.saved == Saved::Failed {
+            // Tried again after a while.
+            self.changed = Some(Instant::now());
+        }
+        before != self.saved()
+    }
+}
+
+/// The bytes of a file; `None` if it is not there.
+fn read(path: &Path) -> Result<Option<Vec<u8>>, Error> {
+    let failed = |source| Error::Read { path: path.to_path_buf(), source };
+    let file = match File::open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(failed(error)),
+    };
+    let mut text = Vec::new();
+    file.take(TEXT + 1).read_to_end(&mut text).map_err(failed)?;
+    if text.len() as u64 > TEXT {
+        return Err(Error::TooLarge { path: path.to_path_buf(), limit: TEXT });
+    }
+    Ok(Some(text))
+}
+
+/// Writes a file under a hidden name beside its place, and then in its place.
+fn write_whole(path: &Path, text: &[u8]) -> Result<(), Error> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let temporary = path.with_file_name(format!(".{name}.{}.part", std::process::id()));
+    let written = (|| {
+        let mut file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
+        file.write_all(text)?;
+        if let Ok(metadata) = fs::metadata(path) {
+            file.set_permissions(metadata.permissions())?;
+        }
+        file.sync_all()?;
+        fs::rename(&temporary, path)
+    })();
+    written.map_err(|source| {
+        let _ = fs::remove_file(&temporary);
+        Error::Write { path: path.to_path_buf(), source }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(at: usize, text: &str) -> Vec<Splice> {
+        vec![Splice { at, removed: 1, inserted: vec![Line::new(text)] }]
+    }
+
+    fn one(text: &str) -> (tempfile::TempDir, PathBuf, Project) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        fs::write(&path, text).unwrap();
+        let project = Project::open(&path).unwrap();
+        (folder, path, project)
+    }
+
+    #[test]
+    fn what_is_not_there_yet_begins_with_a_scene_and_is_written_when_it_is_changed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new.txt");
+        let mut project = Project::open(&path).unwrap();
+        assert!(project.files[0].is_sound() && project.files[0].diagnostics.is_empty());
+        assert!(!project.save(true) && !path.exists(), "opening writes nothing");
+        project.files[0].apply(set(0, "# mine"), None);
+        assert_eq!(project.files[0].saved(), Saved::Soon);
+        assert!(project.save(true));
+        assert!(fs::read_to_string(&path).unwrap().starts_with("# mine\n"));
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no litter");
+    }
+
+    #[test]
+    fn what_others_wrote_meanwhile_is_never_overwritten() {
+        let (_folder, path, mut project) = one("a\nb\nc\n");
+        project.files[0].apply(set(1, "mine"), None);
+        fs::write(&path, "a\ntheirs\nc\n").unwrap();
+        project.save(true);
+        assert_eq!(project.files[0].saved(), Saved::Conflict);
+        project.files[0].apply(set(0, "more"), None);
+        assert!(!project.save(true));
+        assert_eq!(fs::read_to_string(&path).unwrap(), "a\ntheirs\nc\n");
+        project.files[0].resolve(true);
+        project.save(true);
+        assert_eq!(fs::read_to_string(&path).unwrap(), "more\nmine\nc\n");
+    }
+
+    #[test]
+    fn what_others_wrote_is_shown_and_can_be_undone() {
+        let (_folder, path, mut project) = one("a\nb\nc\n");
+        assert!(project.files[0].look().is_none());
+        fs::write(&path, "a\nx\ny\nc\n").unwrap();
+        let told = project.files[0].look().unwrap();
+        assert_eq!((told[0].at, told[0].removed, told[0].inserted.len()), (1, 1, 2));
+        assert_eq!(project.files[0].document.bytes(), b"a\nx\ny\nc\n");
+        assert_eq!(project.files[0].saved(), Saved::Yes);
+        project.files[0].undo();
+        assert_eq!(project.files[0].document.bytes(), b"a\nb\nc\n");
+        project.save(true);
+        assert_eq!(fs::read_to_string(&path).unwrap(), "a\nb\nc\n");
+    }
+
+    #[test]
+    fn theirs_can_be_taken() {
+        let (_folder, path, mut project) = one("a\nb");
+        project.files[0].apply(set(0, "mine"), None);
+        fs::write(&path, "theirs").unwrap();
+        assert_eq!(project.files[0].look(), Some(Vec::new()), "the page is told of the conflict");
+        project.files[0].resolve(false);
+        assert_eq!(project.files[0].document.bytes(), b"theirs");
+        assert!(!project.save(true));
+        assert_eq!(fs::read_to_string(&path).unwrap(), "theirs");
+    }
+
+    #[test]
+    fn frames_are_those_of_all_files_in_natural_order() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, text) in
+            [("f10.txt", "Screen 1 1\nTrace"), ("f2.txt", "Screen 1 1\nTrace\nTrace"), ("f3.txt", "")]
+        {
+            fs::write(folder.path().join(name), text).unwrap();
+        }
+        let project = Project::open(folder.path()).unwrap();
+        let names: Vec<_> = project.files.iter().map(|file| file.name.as_str()).collect();
+        assert_eq!((names, project.frame_count()), (vec!["f2.txt", "f3.txt", "f10.txt"], 4));
+        let places: Vec<_> =
+            [0, 1, 2, 3, 9].map(|frame| project.place(frame)).map(|p| (p.file, p.frame)).into();
+        assert_eq!(places, [(0, 0), (0, 1), (1, 0), (2, 0), (2, 0)]);
+        assert_eq!(project.first_frame(2), 3);
+    }
+}

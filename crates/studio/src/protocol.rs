@@ -1,0 +1,272 @@
+//! What page and server say to each other over the WebSocket: JSON both ways, and pictures (`pictures`) to the page.
+//!
+//! Points of the picture are in its pixels; lines count from 0.
+
+use serde::{Deserialize, Serialize};
+
+use crate::handles::{Grip, Handle, Manner};
+use crate::project::Saved;
+use crate::tables::{CommandTable, Role};
+
+/// What the page asks for.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case", rename_all_fields = "kebab-case", tag = "ask")]
+pub(crate) enum Ask {
+    /// The viewport has this size, in pixels of the screen.
+    Size { width: u32, height: u32 },
+    /// A picture has been shown.
+    Shown,
+    /// Show a frame, counted from 0; `moving` while it is played or scrubbed.
+    Frame { frame: usize, moving: bool },
+    /// Select lines.
+    Select { lines: Vec<usize> },
+    /// What is under the pointer?
+    Hover { x: f64, y: f64 },
+    /// The pointer goes down: on a handle, on an object, or on nothing, which turns the camera.
+    Press { x: f64, y: f64, extend: bool, grip: Option<Grip>, line: Option<usize> },
+    /// It moves.
+    Drag {
+        x: f64,
+        y: f64,
+        #[serde(flatten)]
+        manner: Manner,
+    },
+    /// It goes up.
+    Release,
+    /// Turn, move or approach; in heights of the picture.
+    Navigate { how: Navigation, x: f64, y: f64 },
+    /// Look through a camera.
+    Look { at: Standpoint },
+    /// What is looked through becomes the script's camera.
+    KeepCamera,
+    /// Numbers of a line, from number `first` on; those of one `gesture` are one step.
+    Set { line: usize, first: usize, values: Vec<f64>, gesture: Option<u64> },
+    /// The text of a line, or of several in its place.
+    Text { line: usize, text: String },
+    /// A new line in front of line `at`.
+    Insert { at: usize, text: String },
+    /// Lines go.
+    Remove { lines: Vec<usize> },
+    /// Lines again, behind themselves.
+    Duplicate { lines: Vec<usize> },
+    /// A line goes up or down by one object.
+    Reorder { line: usize, down: bool },
+    /// A name: the comment at the end of a line.
+    Rename { line: usize, name: String },
+    /// Lines become comments, or commands again.
+    Hide { lines: Vec<usize> },
+    /// Objects fall onto what is below them.
+    Drop { lines: Vec<usize> },
+    /// Objects move by so many steps along the axes.
+    Nudge { lines: Vec<usize>, by: [f64; 3] },
+    /// A new object or light; at a point of the picture, or in the middle.
+    Add { command: String, at: Option<[f64; 2]> },
+    /// Take back.
+    Undo,
+    /// Make again.
+    Redo,
+    /// End a conflict with what others wrote.
+    Resolve { keep_mine: bool },
+    /// Make the GIF.
+    Render,
+    /// Stop making it.
+    Cancel,
+}
+
+/// A way to move the free camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Navigation {
+    /// Around what is looked at.
+    Turn,
+    /// Sideways.
+    Pan,
+    /// Nearer (y below 0) or farther.
+    Zoom,
+}
+
+/// Where to look from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Standpoint {
+    /// The script's camera.
+    Script,
+    /// A free one, from where one looks now.
+    Free,
+    /// From the front (along -z).
+    Front,
+    /// From the right (along -x).
+    Side,
+    /// From above.
+    Top,
+    /// At what is selected.
+    Selection,
+}
+
+/// What the page is told; what is left out has not changed.
+#[derive(Clone, Debug, Default, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Tell {
+    /// Once, at the start.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) tables: Option<Vec<CommandTable>>,
+    /// All files.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) files: Option<Vec<FileState>>,
+    /// All lines of the file that is shown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) lines: Option<Vec<LineState>>,
+    /// Changes of these lines, in their order.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) splices: Vec<LinesChanged>,
+    /// How everything stands.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) state: Option<State>,
+    /// What is under the pointer: its line, if it is an object.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) hovered: Option<Option<usize>>,
+    /// The outline of what is selected, as the path of an SVG.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) outline: Option<String>,
+    /// How the GIF stands.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) output: Option<OutputState>,
+    /// For people.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) notice: Option<String>,
+}
+
+/// A file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct FileState {
+    /// Its name.
+    pub(crate) name: String,
+    /// Its frames.
+    pub(crate) frames: usize,
+    /// Whether it has an error.
+    pub(crate) faulty: bool,
+}
+
+/// A line.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct LineState {
+    /// Without its end.
+    pub(crate) text: String,
+    /// Its command's name; also of a command that is hidden in a comment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) command: Option<&'static str>,
+    /// What the command is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) role: Option<Role>,
+    /// The comment at its end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) name: Option<String>,
+    /// It is a comment now.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub(crate) hidden: bool,
+}
+
+/// Some lines in place of others.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct LinesChanged {
+    /// The first.
+    pub(crate) at: usize,
+    /// How many went.
+    pub(crate) removed: usize,
+    /// Those that came.
+    pub(crate) lines: Vec<LineState>,
+}
+
+/// How everything stands.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct State {
+    /// The animation's name.
+    pub(crate) title: String,
+    /// Frames a second.
+    pub(crate) fps: f64,
+    /// The frame that is shown, from 0.
+    pub(crate) frame: usize,
+    /// How many there are.
+    pub(crate) frames: usize,
+    /// Its file, an index of `files`.
+    pub(crate) file: usize,
+    /// Whether the file holds what is shown.
+    pub(crate) saved: Saved,
+    /// Whether there is something to undo.
+    pub(crate) can_undo: bool,
+    /// Whether there is something to redo.
+    pub(crate) can_redo: bool,
+    /// The selected lines, the main one last.
+    pub(crate) selection: Vec<usize>,
+    /// The main one's parameters.
+    pub(crate) inspected: Option<Inspected>,
+    /// Faults of the file.
+    pub(crate) faults: Vec<FaultState>,
+    /// What can be dragged.
+    pub(crate) handles: Vec<Handle>,
+    /// The ground's grid, as the path of an SVG.
+    pub(crate) grid: String,
+    /// Whether one looks through a free camera.
+    pub(crate) free: bool,
+    /// The picture that was ordered last: its number, width and height; none where there is nothing to draw.
+    pub(crate) picture: Option<(u32, u32, u32)>,
+}
+
+/// A line's parameters.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Inspected {
+    /// The line.
+    pub(crate) line: usize,
+    /// Its command.
+    pub(crate) command: &'static str,
+    /// Its words; those that are no numbers are `null` here.
+    pub(crate) values: Vec<Option<f64>>,
+}
+
+/// What is wrong with a line.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct FaultState {
+    /// The line.
+    pub(crate) line: usize,
+    /// Its first character, from 0.
+    pub(crate) column: usize,
+    /// How many characters.
+    pub(crate) length: usize,
+    /// Whether nothing is rendered for it.
+    pub(crate) error: bool,
+    /// What is wrong.
+    pub(crate) message: String,
+    /// What would be right.
+    pub(crate) help: String,
+}
+
+/// How the GIF stands.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case", tag = "is")]
+pub(crate) enum OutputState {
+    /// Being made.
+    Running {
+        /// Frames that are drawn.
+        done: usize,
+        /// Of so many.
+        of: usize,
+    },
+    /// It can be fetched.
+    Done {
+        /// Its size.
+        bytes: usize,
+    },
+    /// It was cancelled.
+    Cancelled,
+    /// It cannot be made.
+    Failed {
+        /// Why.
+        why: String,
+    },
+}

@@ -1,0 +1,375 @@
+//! The page's server: on loopback, for who knows the token in its address.
+//!
+//! Every request must name the host that it was made for and the token, and, where the browser says from which page it
+//! comes, be from this one: so neither another machine, another user's program without the address, nor another page
+//! of the same browser gets in. No path of a request reaches the file system. One page works at a time; a new one
+//! takes over.
+
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::{Body, Bytes};
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::extract::{Request, State};
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{any, get};
+use tokio::net::TcpListener;
+use tokio::sync::{mpsc, oneshot};
+use tokio::task::JoinHandle;
+use tokio::time::MissedTickBehavior;
+
+use crate::error::Error;
+use crate::output::{Outputs, frame_png, scripts_zip};
+use crate::page::Page;
+use crate::pictures::Painter;
+use crate::project::Project;
+use crate::protocol::{Ask, Tell};
+use crate::session::{Answer, Output, Session};
+
+/// Bytes of what the page says at once: more than a line that is pasted.
+const MESSAGE: usize = 2 << 20;
+
+/// What waits to be sent to the page, at most; pictures are bounded further by the painter.
+const WAITING: usize = 64;
+
+/// How often files are looked at and written.
+const TICK: Duration = Duration::from_millis(250);
+
+/// Bytes of the token, from the system's randomness.
+const TOKEN: usize = 16;
+
+/// Nothing but this server: no other script, no style, no frame around it.
+const POLICY: &str = "default-src 'self'; connect-src 'self'; img-src 'self' data: blob:; object-src 'none'; \
+                      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// A server that runs.
+#[derive(Debug)]
+pub struct Server {
+    address: String,
+    shared: Arc<Shared>,
+    stop: oneshot::Sender<()>,
+    task: JoinHandle<()>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    project: Mutex<Project>,
+    outputs: Arc<Outputs>,
+    page: Page,
+    token: String,
+    host: String,
+    /// Ends the page that works now.
+    working: Mutex<Option<oneshot::Sender<()>>>,
+}
+
+impl Server {
+    /// Serves a project, on this port or on any that is free if it is 0.
+    ///
+    /// # Errors
+    /// When the port is taken or the system has no randomness.
+    pub async fn start(project: Project, page: Page, port: u16) -> Result<Self, Error> {
+        let mut random = [0; TOKEN];
+        getrandom::fill(&mut random).map_err(|error| Error::Server(io::Error::other(error)))?;
+        let token: String = random.iter().map(|byte| format!("{byte:02x}")).collect();
+        let listener =
+            TcpListener::bind(SocketAddr::from((Ipv4Addr::LOCALHOST, port))).await.map_err(Error::Server)?;
+        let host = listener.local_addr().map_err(Error::Server)?.to_string();
+        let address = format!("http://{host}/{token}/");
+        let shared = Arc::new(Shared {
+            project: Mutex::new(project),
+            outputs: Arc::default(),
+            page,
+            token,
+            host,
+            working: Mutex::default(),
+        });
+        let router = Router::new()
+            .route("/{token}/", get(html))
+            .route("/{token}/studio.js", get(script))
+            .route("/{token}/studio.css", get(style))
+            .route("/{token}/socket", any(socket))
+            .route("/{token}/animation.gif", get(gif))
+            .route("/{token}/scripts.zip", get(scripts))
+            .route("/{token}/frame.png", get(frame))
+            .layer(from_fn_with_state(Arc::clone(&shared), guard))
+            .with_state(Arc::clone(&shared));
+        let (stop, stopped) = oneshot::channel();
+        let task = tokio::spawn(async move {
+            let serving = axum::serve(listener, router).into_future();
+            tokio::select! {
+                _ = serving => {}
+                _ = stopped => {}
+            }
+        });
+        Ok(Self { address, shared, stop, task })
+    }
+
+    /// Where the page is, with the token.
+    pub fn address(&self) -> &str {
+        &self.address
+    }
+
+    /// Writes what is not written yet and ends; the names of the files that could not be written.
+    pub async fn stop(self) -> Vec<String> {
+        let _ = self.stop.send(());
+        let _ = self.task.await;
+        self.shared.outputs.cancel();
+        let mut project = self.shared.project();
+        project.save(true);
+        let unsaved = project.files.iter().filter(|file| file.saved() != crate::project::Saved::Yes);
+        unsaved.map(|file| file.name.clone()).collect()
+    }
+}
+
+impl Shared {
+    fn project(&self) -> MutexGuard<'_, Project> {
+        self.project.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn is_allowed(&self, request: &Request) -> bool {
+        let header = |name| request.headers().get(name).map(HeaderValue::as_bytes);
+        let token = request.uri().path().split('/').nth(1).unwrap_or_default();
+        let origin = format!("http://{}", self.host);
+        let is_socket = header(header::UPGRADE).is_some();
+        let known_origin = match header(header::ORIGIN) {
+            Some(from) => from == origin.as_bytes(),
+            // Browsers always say from where a socket is opened.
+            None => !is_socket,
+        };
+        header(header::HOST) == Some(self.host.as_bytes()) && known_origin && same(token, &self.token)
+    }
+}
+
+/// Compares without telling by its time how much is right.
+fn same(given: &str, token: &str) -> bool {
+    given.len() == token.len() && given.bytes().zip(token.bytes()).fold(0, |off, (a, b)| off | (a ^ b)) == 0
+}
+
+async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
+    let mut response = if shared.is_allowed(&request) {
+        next.run(request).await
+    } else {
+        (StatusCode::FORBIDDEN, "open the address that `rayfold studio` has printed\n").into_response()
+    };
+    for (name, value) in [
+        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::REFERRER_POLICY, "no-referrer"),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::CACHE_CONTROL, "no-store"),
+    ] {
+        response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+async fn html(State(shared): State<Arc<Shared>>) -> Response {
+    file("text/html; charset=utf-8", shared.page.html.clone())
+}
+
+async fn script(State(shared): State<Arc<Shared>>) -> Response {
+    file("text/javascript; charset=utf-8", shared.page.script.clone())
+}
+
+async fn style(State(shared): State<Arc<Shared>>) -> Response {
+    file("text/css; charset=utf-8", shared.page.style.clone())
+}
+
+async fn gif(State(shared): State<Arc<Shared>>) -> Response {
+    match shared.outputs.gif() {
+        Some(gif) => file("image/gif", gif.to_vec()),
+        None => (StatusCode::NOT_FOUND, "no GIF has been made yet\n").into_response(),
+    }
+}
+
+async fn scripts(State(shared): State<Arc<Shared>>) -> Response {
+    let zip = tokio::task::block_in_place(|| scripts_zip(&shared.project()));
+    zip.map_or_else(|error| failed(&error), |zip| file("application/zip", zip))
+}
+
+/// The frame whose number, from 0, is the query.
+async fn frame(State(shared): State<Arc<Shared>>, request: Request) -> Response {
+    let number = request.uri().query().unwrap_or_default().parse().unwrap_or(0);
+    let (script, frame) = {
+        let project = shared.project();
+        let place = project.place(number);
+        (project.files[place.file].script.clone(), place.frame)
+    };
+    let png = tokio::task::block_in_place(|| script.map_or(Ok(None), |script| frame_png(&script, frame)));
+    match png {
+        Ok(Some(png)) => file("image/png", png),
+        Ok(None) => (StatusCode::NOT_FOUND, "this frame has nothing to draw\n").into_response(),
+        Err(error) => failed(&error),
+    }
+}
+
+fn file(kind: &'static str, bytes: Vec<u8>) -> Response {
+    ([(header::CONTENT_TYPE, kind)], Body::from(bytes)).into_response()
+}
+
+fn failed(error: &Error) -> Response {
+    (StatusCode::INTERNAL_SERVER_ERROR, format!("{error}\n")).into_response()
+}
+
+async fn socket(State(shared): State<Arc<Shared>>, upgrade: WebSocketUpgrade) -> Response {
+    let (leave, left) = oneshot::channel();
+    if let Some(old) = shared.working.lock().unwrap_or_else(PoisonError::into_inner).replace(leave) {
+        let _ = old.send(());
+    }
+    upgrade
+        .max_message_size(MESSAGE)
+        .max_frame_size(MESSAGE)
+        .on_upgrade(move |socket| work(shared, socket, left))
+}
+
+/// A page at work, until it closes or another takes over.
+async fn work(shared: Arc<Shared>, mut socket: WebSocket, mut left: oneshot::Receiver<()>) {
+    let (pictures, mut drawn) = mpsc::channel::<Vec<u8>>(WAITING);
+    let (tellings, mut told) = mpsc::channel::<Tell>(WAITING);
+    let Ok(painter) = Painter::start(move |picture| pictures.blocking_send(picture).is_ok()) else { return };
+    let (mut session, answer) = Session::open(&shared.project());
+    let mut tick = tokio::time::interval(TICK);
+    tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut next = Some(answer);
+    loop {
+        let message = match next.take() {
+            Some(answer) => {
+                if answer.shown {
+                    painter.shown();
+                    continue;
+                }
+                if let Some(picture) = answer.picture {
+                    painter.want(picture);
+                }
+                match answer.output {
+                    Some(Output::Cancel) => shared.outputs.cancel(),
+                    Some(Output::Render) => {
+                        let tellings = tellings.clone();
+                        shared.outputs.start(&shared.project(), move |output| {
+                            let tell = Tell { output: Some(output), ..Tell::default() };
+                            // A page that has left hears nothing any more.
+                            let _ = tellings.blocking_send(tell);
+                        });
+                    }
+                    None => {}
+                }
+                text(&answer.tell)
+            }
+            None => tokio::select! {
+                picture = drawn.recv() => match picture {
+                    Some(picture) => Message::Binary(Bytes::from(picture)),
+                    None => break,
+                },
+                tell = told.recv() => match tell {
+                    Some(tell) => text(&tell),
+                    None => break,
+                },
+                message = socket.recv() => {
+                    match message {
+                        Some(Ok(Message::Text(message))) => {
+                            next = Some(ask(&shared, &mut session, &message));
+                        }
+                        Some(Ok(Message::Binary(_) | Message::Ping(_) | Message::Pong(_))) => {}
+                        Some(Ok(Message::Close(_)) | Err(_)) | None => break,
+                    }
+                    continue;
+                },
+                _ = tick.tick() => {
+                    next = tokio::task::block_in_place(|| session.tick(&mut shared.project()));
+                    continue;
+                },
+                _ = &mut left => {
+                    let _ = socket.send(text(&notice("Another page has taken over; this one rests."))).await;
+                    break;
+                }
+            },
+        };
+        if socket.send(message).await.is_err() {
+            break;
+        }
+    }
+    painter.close();
+    tokio::task::block_in_place(|| shared.project().save(true));
+}
+
+fn ask(shared: &Shared, session: &mut Session, message: &str) -> Answer {
+    match serde_json::from_str::<Ask>(message) {
+        Ok(ask) => tokio::task::block_in_place(|| session.ask(&mut shared.project(), ask)),
+        Err(error) => Answer {
+            tell: notice(&format!("the page said what is not understood: {error}")),
+            ..Answer::default()
+        },
+    }
+}
+
+fn notice(text: &str) -> Tell {
+    Tell { notice: Some(text.into()), ..Tell::default() }
+}
+
+fn text(tell: &Tell) -> Message {
+    // Numbers, texts and lists of them always have a form in JSON.
+    Message::Text(serde_json::to_string(tell).unwrap_or_default().into())
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::io::{AsyncReadExt, AsyncWriteExt};
+    use tokio::net::TcpStream;
+
+    use super::*;
+
+    /// The status of a request, written out as it goes over the wire.
+    async fn status(host: &str, path: &str, headers: &[(&str, &str)]) -> u16 {
+        let mut stream = TcpStream::connect(host).await.unwrap();
+        let mut text = format!("GET {path} HTTP/1.1\r\n");
+        for (name, value) in headers {
+            text.push_str(&format!("{name}: {value}\r\n"));
+        }
+        stream.write_all(format!("{text}\r\n").as_bytes()).await.unwrap();
+        let mut answer = [0; 12];
+        stream.read_exact(&mut answer).await.unwrap();
+        std::str::from_utf8(&answer[9..]).unwrap().parse().unwrap()
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
+    async fn only_who_knows_the_address_gets_in() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.txt"), "Screen 4 3\nTrace").unwrap();
+        let project = Project::open(folder.path()).unwrap();
+        let page = Page { html: b"page".to_vec(), script: Vec::new(), style: Vec::new() };
+        let server = Server::start(project, page, 0).await.unwrap();
+        let rest = server.address().strip_prefix("http://").unwrap();
+        let (host, path) = rest.split_at(rest.find('/').unwrap());
+        assert!(host.starts_with("127.0.0.1:") && path.len() == 2 * TOKEN + 2);
+        let own = format!("http://{host}");
+        let check = async |path: &str, headers: &[(&str, &str)], expected: u16| {
+            assert_eq!(status(host, path, headers).await, expected, "{path} {headers:?}");
+        };
+        check(path, &[("Host", host)], 200).await;
+        check(path, &[("Host", host), ("Origin", &own)], 200).await;
+        check("/", &[("Host", host)], 403).await;
+        check(&format!("/{}/", "0".repeat(2 * TOKEN)), &[("Host", host)], 403).await;
+        check(&path[..path.len() - 1], &[("Host", "localhost")], 403).await;
+        check(path, &[("Host", "evil.example")], 403).await;
+        check(path, &[("Host", host), ("Origin", "http://evil.example")], 403).await;
+        check(path, &[("Host", host), ("Origin", "null")], 403).await;
+        check(&format!("{path}a.txt"), &[("Host", host)], 404).await;
+        check(&format!("{path}%2e%2e/a.txt"), &[("Host", host)], 404).await;
+        let socket = format!("{path}socket");
+        let upgrade = [
+            ("Host", host),
+            ("Connection", "Upgrade"),
+            ("Upgrade", "websocket"),
+            ("Sec-WebSocket-Version", "13"),
+            ("Sec-WebSocket-Key", "AAAAAAAAAAAAAAAAAAAAAA=="),
+        ];
+        check(&socket, &upgrade, 403).await;
+        check(&socket, &[&upgrade[..], &[("Origin", "http://evil.example")]].concat(), 403).await;
+        check(&socket, &[&upgrade[..], &[("Origin", own.as_str())]].concat(), 101).await;
+        assert!(server.stop().await.is_empty());
+    }
+}

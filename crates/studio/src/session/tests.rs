@@ -1,0 +1,241 @@
+//! A page's wishes, without a browser.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::*;
+use crate::handles::Handle;
+
+struct Desk {
+    _folder: tempfile::TempDir,
+    path: PathBuf,
+    project: Project,
+    session: Session,
+}
+
+impl Desk {
+    fn new(text: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        fs::write(&path, text).unwrap();
+        let project = Project::open(&path).unwrap();
+        let (session, answer) = Session::open(&project);
+        assert!(answer.tell.tables.is_some() && answer.tell.lines.is_some());
+        Self { _folder: folder, path, project, session }
+    }
+
+    fn ask(&mut self, ask: Ask) -> Answer {
+        self.session.ask(&mut self.project, ask)
+    }
+
+    fn text(&self) -> String {
+        String::from_utf8(self.project.files[0].document.bytes()).unwrap()
+    }
+
+    fn state(&mut self) -> State {
+        self.ask(Ask::Hover { x: -1.0, y: -1.0 }).tell.state.unwrap()
+    }
+
+    /// Where the object of a line is seen.
+    fn seen(&mut self, line: usize) -> DVec2 {
+        let scene = self.session.scene(&self.project).unwrap();
+        for y in (0..scene.screen.height()).step_by(4) {
+            for x in (0..scene.screen.width()).step_by(4) {
+                let (x, y) = (f64::from(x), f64::from(y));
+                if self.session.pick(&self.project, x, y).is_some_and(|(found, _)| found == line) {
+                    return DVec2::new(x, y);
+                }
+            }
+        }
+        panic!("line {line} is not seen");
+    }
+
+    fn drag(&mut self, from: DVec2, to: DVec2) {
+        self.ask(Ask::Press { x: from.x, y: from.y, extend: false, grip: None, line: None });
+        for share in [0.25, 0.5, 0.75, 1.0] {
+            let at = from.lerp(to, share);
+            self.ask(Ask::Drag { x: at.x, y: at.y, manner: Manner::default() });
+        }
+        self.ask(Ask::Release);
+    }
+}
+
+const TEXT: &str = "# a scene\r\nSCREEN 160,90\nCamera 0 2 8  0 -.2 -1  0 1 0  1  -.8 -.45  .8 .45\n\
+                    Ilight 1 1 1 .5 -1 -.3 # sun\n\tSphere  1.0 0 1 0  .1 .1 .1 .9 .2 .2   # ball\nBox -3 -1 -3 3 0 3 0 0 0 .5 .5 .5\nTrace";
+
+#[test]
+fn a_drag_changes_one_line_and_one_undo_takes_it_back() {
+    let mut desk = Desk::new(TEXT);
+    let at = desk.seen(4);
+    desk.drag(at, at + DVec2::new(40.0, 15.0));
+    let text = desk.text();
+    let changed: Vec<_> = text.split('\n').zip(TEXT.split('\n')).filter(|(new, old)| new != old).collect();
+    assert_eq!(changed.len(), 1, "{text}");
+    assert!(
+        changed[0].0.starts_with("\tSphere  1.0 ") && changed[0].0.ends_with(" .1 .1 .1 .9 .2 .2   # ball"),
+        "{text}"
+    );
+    assert_eq!(desk.state().selection, [4]);
+    desk.ask(Ask::Undo);
+    assert_eq!(desk.text(), TEXT);
+    assert!(!desk.state().can_undo);
+    desk.ask(Ask::Redo);
+    assert_eq!(desk.text(), text);
+}
+
+#[test]
+fn what_is_pressed_without_moving_changes_nothing() {
+    let mut desk = Desk::new(TEXT);
+    let at = desk.seen(4);
+    desk.drag(at, at);
+    assert_eq!(desk.text(), TEXT);
+    assert!(!desk.state().can_undo);
+}
+
+#[test]
+fn a_drag_beside_all_objects_turns_a_free_camera_and_leaves_the_script() {
+    let mut desk = Desk::new(TEXT);
+    desk.drag(DVec2::new(2.0, 2.0), DVec2::new(60.0, 20.0));
+    assert!(desk.state().free);
+    assert_eq!(desk.text(), TEXT);
+    desk.ask(Ask::KeepCamera);
+    let text = desk.text();
+    assert!(!desk.state().free && text.lines().nth(2) != TEXT.lines().nth(2));
+    assert_eq!(text.lines().count(), TEXT.lines().count());
+    assert!(desk.project.files[0].is_sound(), "{text}");
+}
+
+#[test]
+fn the_picture_through_the_scripts_camera_is_the_scene_of_the_script() {
+    let mut desk = Desk::new(TEXT);
+    let picture = desk.ask(Ask::Size { width: 160, height: 200 }).picture.unwrap();
+    let scene =
+        rayfold_scene::parse("a", TEXT.as_bytes(), &Default::default()).script.unwrap().frame(0).unwrap();
+    assert_eq!(picture.scene, scene, "as large as fits, in the script's proportions");
+    let picture = desk.ask(Ask::Size { width: 100_000, height: 100_000 }).picture.unwrap();
+    assert!(picture.scene.screen.pixels() <= PIXELS + 10_000);
+}
+
+#[test]
+fn five_objects_from_an_empty_page() {
+    let mut desk = Desk::new("");
+    assert!(desk.state().picture.is_none());
+    for command in ["Box", "Sphere", "Sphere", "Triangle", "Ilight"] {
+        desk.ask(Ask::Add { command: command.into(), at: None });
+        assert!(desk.project.files[0].is_sound(), "{}", desk.text());
+    }
+    let scene = desk.project.files[0].script.as_ref().unwrap().frame(0).unwrap();
+    assert_eq!((scene.objects.len(), scene.lights.len()), (4, 2));
+    while desk.state().can_undo {
+        desk.ask(Ask::Undo);
+    }
+    assert_eq!(desk.text(), "");
+}
+
+#[test]
+fn a_script_with_an_error_keeps_its_last_picture_and_tells_the_place() {
+    let mut desk = Desk::new(TEXT);
+    let answer = desk.ask(Ask::Text { line: 4, text: "Spere 1".into() });
+    assert!(answer.picture.is_some());
+    let state = answer.tell.state.unwrap();
+    assert_eq!((state.faults[0].line, state.faults[0].column, state.faults[0].length), (4, 0, 5));
+    assert_eq!(desk.session.pick(&desk.project, 80.0, 45.0), None, "lines and picture differ");
+    desk.ask(Ask::Undo);
+    assert!(desk.state().faults.is_empty());
+}
+
+#[test]
+fn what_is_typed_in_a_line_is_one_step() {
+    let mut desk = Desk::new(TEXT);
+    for text in ["T", "Tr", "# Trace"] {
+        desk.ask(Ask::Text { line: 6, text: text.into() });
+        desk.ask(Ask::Hover { x: 1.0, y: 1.0 });
+    }
+    desk.ask(Ask::Undo);
+    assert_eq!(desk.text(), TEXT);
+}
+
+#[test]
+fn a_parameter_that_was_left_out_comes_whole() {
+    let mut desk = Desk::new(TEXT);
+    desk.ask(Ask::Set { line: 4, first: 11, values: vec![0.5], gesture: None });
+    assert_eq!(desk.text(), TEXT.replace(".9 .2 .2   #", ".9 .2 .2 0 0.5 0   #"));
+    desk.ask(Ask::Set { line: 4, first: 12, values: vec![], gesture: None });
+    assert_eq!(desk.text(), TEXT.replace(".9 .2 .2   #", ".9 .2 .2 0 0.5 0   #"));
+}
+
+#[test]
+fn the_selection_stays_with_its_lines() {
+    let mut desk = Desk::new(TEXT);
+    desk.ask(Ask::Select { lines: vec![4, 5] });
+    desk.ask(Ask::Insert { at: 0, text: "# one\n# two".into() });
+    assert_eq!(desk.state().selection, [6, 7]);
+    desk.ask(Ask::Remove { lines: vec![6] });
+    desk.ask(Ask::Undo);
+    desk.ask(Ask::Select { lines: vec![7] });
+    desk.ask(Ask::Undo);
+    assert_eq!(desk.state().selection, [5]);
+    assert_eq!(desk.text(), TEXT);
+}
+
+#[test]
+fn handles_lead_to_the_numbers_of_the_line() {
+    let mut desk = Desk::new(TEXT);
+    let handles = desk.ask(Ask::Select { lines: vec![5] }).tell.state.unwrap().handles;
+    let grips: Vec<_> = handles.iter().map(|handle| handle.grip).collect();
+    let axes = [0, 1, 2].map(|axis| Grip::Axis { axis });
+    assert_eq!(grips, [axes.as_slice(), &[Grip::Point { first: 0 }, Grip::Point { first: 3 }]].concat());
+    let Handle { at, .. } = handles[4];
+    let (grip, line) = (Some(Grip::Point { first: 3 }), Some(5));
+    desk.ask(Ask::Press { x: at[0], y: at[1], extend: false, grip, line });
+    desk.ask(Ask::Drag { x: at[0], y: at[1] - 12.0, manner: Manner { upright: true, snap: false } });
+    let text = desk.text();
+    assert!(text.contains("\nBox -3 -1 -3 3 0.") && text.contains(" 3 0 0 0 .5 .5 .5\n"), "{text}");
+}
+
+/// All example scenes: whichever object of the first script is moved, the difference is its line.
+#[test]
+fn touching_one_object_of_each_example_changes_its_line_alone() {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+    let mut seen = 0;
+    for entry in fs::read_dir(scenes).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_dir())
+    {
+        let project = Project::open(&entry).unwrap();
+        let text = String::from_utf8(project.files[0].document.bytes()).unwrap();
+        let mut desk = Desk::new(&text);
+        let objects = desk.session.stage(&desk.project).objects;
+        for line in objects.into_iter().take(12) {
+            desk.ask(Ask::Nudge { lines: vec![line], by: [1.0, 0.0, 0.0] });
+            desk.project.save(true);
+            let saved = fs::read_to_string(&desk.path).unwrap();
+            let (new, old): (Vec<_>, Vec<_>) = (saved.split('\n').collect(), text.split('\n').collect());
+            assert_eq!(new.len(), old.len());
+            let differ: Vec<_> = (0..new.len()).filter(|&at| new[at] != old[at]).collect();
+            assert_eq!(differ, [line], "{}", entry.display());
+            desk.ask(Ask::Undo);
+            assert_eq!(desk.text(), text);
+            seen += 1;
+        }
+    }
+    assert!(seen > 20, "are the scenes still there?");
+}
+
+#[test]
+fn a_huge_script_is_edited_line_by_line() {
+    let mut text = String::from("Screen 160 90\nCamera 0 0 500  0 0 -1  0 1 0  1  -.8 -.45  .8 .45\n");
+    for object in 0..100_000 {
+        text.push_str(&format!(
+            "Sphere 1 {} {} 0  .1 .1 .1  1 1 1\n",
+            object % 400 - 200,
+            object / 400 - 125
+        ));
+    }
+    text.push_str("Trace\n");
+    let mut desk = Desk::new(&text);
+    let answer = desk.ask(Ask::Set { line: 50_000, first: 1, values: vec![7.5], gesture: Some(1) });
+    assert!(answer.picture.is_some() && answer.tell.lines.is_none());
+    assert_eq!(answer.tell.splices.len(), 1, "what is told is small");
+    assert_eq!(answer.tell.splices[0].lines.len(), 1);
+    desk.ask(Ask::Undo);
+    assert_eq!(desk.text(), text);
+}

@@ -1,0 +1,251 @@
+//! What the viewport looks through: the script's camera or a free one; from the world to its picture and back.
+//!
+//! Points of a picture are in its pixels, (0, 0) the upper left corner of the upper left one. A pinhole's pixel (i, j)
+//! is the ray of the language through its middle.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use glam::{DVec2, DVec3};
+use rayfold_scene::{Camera, InvalidValue, Pinhole, Scene};
+
+/// Nearest and farthest that the free camera may stand, in sizes of what is looked at.
+const NEAR_AND_FAR: (f64, f64) = (1e-3, 1e3);
+
+/// Radians that the free camera turns where the pointer crosses the picture's height.
+const TURN: f64 = PI;
+
+/// A camera that turns around what it looks at; it stands upright.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Orbit {
+    /// What is looked at.
+    pub(crate) target: DVec3,
+    /// How far away it is.
+    pub(crate) distance: f64,
+    /// Radians to the right from looking along -z.
+    pub(crate) yaw: f64,
+    /// Radians from above; a quarter turn looks straight down.
+    pub(crate) pitch: f64,
+    /// Half the vertical angle, in radians.
+    pub(crate) half_fov: f64,
+}
+
+/// Where something lies that is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Bounds {
+    /// Least coordinates.
+    pub(crate) low: DVec3,
+    /// Greatest coordinates.
+    pub(crate) high: DVec3,
+}
+
+impl Bounds {
+    /// Of points with a radius around each; `None` where there is none.
+    pub(crate) fn of(points: impl IntoIterator<Item = (DVec3, f64)>) -> Option<Self> {
+        points
+            .into_iter()
+            .map(|(p, r)| Self { low: p - r, high: p + r })
+            .reduce(|a, b| Self { low: a.low.min(b.low), high: a.high.max(b.high) })
+    }
+
+    /// Its middle.
+    pub(crate) fn center(&self) -> DVec3 {
+        0.5 * self.low + 0.5 * self.high
+    }
+
+    /// Half its diagonal, greater than 0.
+    pub(crate) fn radius(&self) -> f64 {
+        let radius = (0.5 * self.high - 0.5 * self.low).length();
+        if radius > 0.0 { radius } else { 1.0 }
+    }
+}
+
+impl Orbit {
+    /// Looks at something, all of it in the picture, from a direction given by yaw and pitch.
+    pub(crate) fn at(bounds: Bounds, yaw: f64, pitch: f64) -> Self {
+        let half_fov = 0.35_f64;
+        Self {
+            target: bounds.center(),
+            distance: 1.1 * bounds.radius() / half_fov.sin(),
+            yaw,
+            pitch,
+            half_fov,
+        }
+    }
+
+    /// Goes on from a script's camera; `bounds` is the scene.
+    pub(crate) fn from_camera(camera: &Camera, bounds: Bounds) -> Self {
+        let Camera::Pinhole(pinhole) = camera else { return Self::at(bounds, 0.0, 0.0) };
+        let (_, _, w) = pinhole.basis();
+        let along = (bounds.center() - pinhole.eye()).dot(-w);
+        let distance = if along > 0.0 { along } else { bounds.radius() };
+        let half = pinhole.lower_left().y.abs().max(pinhole.upper_right().y.abs());
+        Self {
+            target: pinhole.eye() - w * distance,
+            distance,
+            yaw: w.x.atan2(w.z),
+            pitch: w.y.clamp(-1.0, 1.0).asin(),
+            half_fov: (half / pinhole.distance()).atan(),
+        }
+    }
+
+    /// From the target to the eye, of length 1.
+    fn backward(&self) -> DVec3 {
+        let (sin, cos) = self.pitch.sin_cos();
+        DVec3::new(cos * self.yaw.sin(), sin, cos * self.yaw.cos())
+    }
+
+    fn up(&self) -> DVec3 {
+        let (sin, cos) = self.pitch.sin_cos();
+        DVec3::new(-sin * self.yaw.sin(), cos, -sin * self.yaw.cos())
+    }
+
+    /// Where it stands.
+    pub(crate) fn eye(&self) -> DVec3 {
+        self.target + self.distance * self.backward()
+    }
+
+    /// As a camera of the language, for a picture of this width in heights.
+    ///
+    /// # Errors
+    /// When its numbers are beyond what a camera can have.
+    pub(crate) fn camera(&self, aspect: f64) -> Result<Pinhole, InvalidValue> {
+        let half = self.half_fov.tan();
+        let corner = DVec2::new(half * aspect, half);
+        Pinhole::new(self.eye(), -self.backward(), self.up(), 1.0, -corner, corner)
+    }
+
+    /// Turns around the target; in heights of the picture.
+    pub(crate) fn turn(&mut self, moved: DVec2) {
+        self.yaw = (self.yaw - TURN * moved.x) % (2.0 * PI);
+        self.pitch = (self.pitch + TURN * moved.y).clamp(-FRAC_PI_2, FRAC_PI_2);
+    }
+
+    /// Moves sideways, so that what is looked at follows the pointer; in heights of the picture.
+    pub(crate) fn pan(&mut self, moved: DVec2) {
+        let height = 2.0 * self.distance * self.half_fov.tan();
+        let right = self.up().cross(self.backward());
+        self.target += height * (moved.y * self.up() - moved.x * right);
+    }
+
+    /// Goes nearer or farther by a factor; `size` is that of the scene.
+    pub(crate) fn zoom(&mut self, factor: f64, size: f64) {
+        self.distance = (self.distance * factor).clamp(NEAR_AND_FAR.0 * size, NEAR_AND_FAR.1 * size);
+    }
+}
+
+/// From the world to the picture of a scene and back.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Projection<'a> {
+    scene: &'a Scene,
+}
+
+impl<'a> Projection<'a> {
+    /// Of a scene, as it is drawn: its screen is the picture.
+    pub(crate) fn new(scene: &'a Scene) -> Self {
+        Self { scene }
+    }
+
+    /// Where a point of the world is seen; `None` behind the eye.
+    pub(crate) fn point(&self, point: DVec3) -> Option<DVec2> {
+        let (width, height) = self.size();
+        let (i, j) = match &self.scene.camera {
+            Camera::Orthographic => (point.x, point.y),
+            Camera::Pinhole(pinhole) => {
+                let (u, v, w) = pinhole.basis();
+                let to = point - pinhole.eye();
+                let depth = -to.dot(w);
+                if depth <= 1e-9 * to.length() {
+                    return None;
+                }
+                let on_window = DVec2::new(to.dot(u), to.dot(v)) * (pinhole.distance() / depth);
+                let share =
+                    (on_window - pinhole.lower_left()) / (pinhole.upper_right() - pinhole.lower_left());
+                (share.x * (width - 1.0), share.y * (height - 1.0))
+            }
+        };
+        let seen = DVec2::new(i + 0.5, height - 0.5 - j);
+        seen.is_finite().then_some(seen)
+    }
+
+    /// The ray through a point of the picture: its origin, and its direction of length 1.
+    pub(crate) fn ray(&self, at: DVec2) -> (DVec3, DVec3) {
+        let (_, height) = self.size();
+        rayfold_tracer::pixel_ray(self.scene, at.x - 0.5, height - 0.5 - at.y)
+    }
+
+    /// How much of the world a pixel spans at a point of it.
+    pub(crate) fn pixel_at(&self, point: DVec3) -> f64 {
+        let (_, height) = self.size();
+        match &self.scene.camera {
+            Camera::Orthographic => 1.0,
+            Camera::Pinhole(pinhole) => {
+                let (_, _, w) = pinhole.basis();
+                let depth = (point - pinhole.eye()).dot(w).abs();
+                let window = (pinhole.upper_right().y - pinhole.lower_left().y).abs();
+                depth * window / (pinhole.distance() * (height - 1.0).max(1.0))
+            }
+        }
+    }
+
+    /// Right, up and towards the eye, each of length 1.
+    pub(crate) fn axes(&self) -> (DVec3, DVec3, DVec3) {
+        match &self.scene.camera {
+            Camera::Orthographic => (DVec3::X, DVec3::Y, DVec3::Z),
+            Camera::Pinhole(pinhole) => pinhole.basis(),
+        }
+    }
+
+    fn size(&self) -> (f64, f64) {
+        (f64::from(self.scene.screen.width()), f64::from(self.scene.screen.height()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rayfold_scene::Screen;
+
+    use super::*;
+
+    fn bounds() -> Bounds {
+        Bounds { low: DVec3::new(-1.0, 0.0, -3.0), high: DVec3::new(2.0, 4.0, 1.0) }
+    }
+
+    fn scene(orbit: &Orbit) -> Scene {
+        Scene::new(Screen::new(160, 90).unwrap(), Camera::Pinhole(orbit.camera(16.0 / 9.0).unwrap()))
+    }
+
+    #[test]
+    fn a_point_is_seen_where_its_ray_goes() {
+        let mut orbit = Orbit::at(bounds(), 0.4, 0.3);
+        for turned in 0..8 {
+            orbit.turn(DVec2::new(0.3, 0.07 * f64::from(turned)));
+            let scene = scene(&orbit);
+            let projection = Projection::new(&scene);
+            for at in [DVec2::new(0.5, 0.5), DVec2::new(80.0, 45.0), DVec2::new(159.5, 12.25)] {
+                let (origin, direction) = projection.ray(at);
+                let seen = projection.point(origin + 7.0 * direction).unwrap();
+                assert!(seen.distance(at) < 1e-9, "{seen} {at}");
+                assert_eq!(projection.point(origin - 7.0 * direction), None);
+            }
+        }
+    }
+
+    #[test]
+    fn panning_follows_the_pointer_and_straight_down_is_no_hole() {
+        let mut orbit = Orbit::at(bounds(), 1.0, FRAC_PI_2);
+        let target = orbit.target;
+        orbit.pan(DVec2::new(0.25, -0.125));
+        let scene = scene(&orbit);
+        let moved = Projection::new(&scene).point(target).unwrap() - DVec2::new(80.0, 45.0);
+        assert!((moved - DVec2::new(22.5, -11.25)).length() < 0.6, "{moved}");
+    }
+
+    #[test]
+    fn a_free_camera_goes_on_from_that_of_the_script() {
+        let orbit = Orbit::at(bounds(), -2.0, 0.7);
+        let again = Orbit::from_camera(&scene(&orbit).camera, bounds());
+        assert!(again.eye().distance(orbit.eye()) < 1e-9);
+        assert!((again.half_fov - orbit.half_fov).abs() < 1e-12);
+        assert!(again.backward().distance(orbit.backward()) < 1e-12);
+    }
+}

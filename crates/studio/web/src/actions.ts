@@ -1,0 +1,76 @@
+// What can be done by a key or a button, once: the key, the words for people, and what is asked for.
+
+import { ask, help, playing, selection, state } from "./store";
+
+export interface Action {
+  readonly title: string;
+  /** As `KeyboardEvent.key`, with `Ctrl+` (or the command key) and `Shift+` before it. */
+  readonly keys: readonly string[];
+  readonly run: () => void;
+  readonly enabled?: () => boolean;
+}
+
+const any = (): boolean => selection.value.length > 0;
+const nudge = (x: number, y: number, z: number) => (): void =>
+  ask({ ask: "nudge", lines: selection.value, by: [x, y, z] });
+
+export function step(by: number): void {
+  const now = state.value;
+  if (now) ask({ ask: "frame", frame: (now.frame + by + now.frames) % now.frames, moving: false });
+}
+
+export const actions = {
+  undo: { title: "Undo", keys: ["Ctrl+z"], run: () => ask({ ask: "undo" }), enabled: () => state.value?.canUndo ?? false },
+  redo: {
+    title: "Redo",
+    keys: ["Ctrl+Shift+Z", "Ctrl+y"],
+    run: () => ask({ ask: "redo" }),
+    enabled: () => state.value?.canRedo ?? false,
+  },
+  duplicate: {
+    title: "Duplicate",
+    keys: ["Ctrl+d"],
+    run: () => ask({ ask: "duplicate", lines: selection.value }),
+    enabled: any,
+  },
+  remove: { title: "Delete", keys: ["Delete", "Backspace"], run: () => ask({ ask: "remove", lines: selection.value }), enabled: any },
+  hide: { title: "Hide or show", keys: ["h"], run: () => ask({ ask: "hide", lines: selection.value }), enabled: any },
+  drop: { title: "Drop onto what is below", keys: ["d"], run: () => ask({ ask: "drop", lines: selection.value }), enabled: any },
+  left: { title: "Move left", keys: ["ArrowLeft"], run: nudge(-1, 0, 0), enabled: any },
+  right: { title: "Move right", keys: ["ArrowRight"], run: nudge(1, 0, 0), enabled: any },
+  back: { title: "Move back", keys: ["ArrowUp"], run: nudge(0, 0, -1), enabled: any },
+  front: { title: "Move to the front", keys: ["ArrowDown"], run: nudge(0, 0, 1), enabled: any },
+  up: { title: "Move up", keys: ["Shift+ArrowUp"], run: nudge(0, 1, 0), enabled: any },
+  down: { title: "Move down", keys: ["Shift+ArrowDown"], run: nudge(0, -1, 0), enabled: any },
+  none: { title: "Select nothing", keys: ["Escape"], run: () => ask({ ask: "select", lines: [] }), enabled: any },
+  play: { title: "Play or stop", keys: [" "], run: () => (playing.value = !playing.value), enabled: () => (state.value?.frames ?? 1) > 1 },
+  previous: { title: "Previous frame", keys: [","], run: () => step(-1) },
+  next: { title: "Next frame", keys: ["."], run: () => step(1) },
+  script: { title: "Look through the script's camera", keys: ["0"], run: () => ask({ ask: "look", at: "script" }) },
+  lookFront: { title: "Look from the front", keys: ["1"], run: () => ask({ ask: "look", at: "front" }) },
+  lookSide: { title: "Look from the side", keys: ["3"], run: () => ask({ ask: "look", at: "side" }) },
+  lookTop: { title: "Look from above", keys: ["7"], run: () => ask({ ask: "look", at: "top" }) },
+  frame: { title: "Look at the selection", keys: ["f"], run: () => ask({ ask: "look", at: "selection" }) },
+  keepCamera: {
+    title: "Make this the script's camera",
+    keys: ["c"],
+    run: () => ask({ ask: "keep-camera" }),
+    enabled: () => state.value?.free ?? false,
+  },
+  help: { title: "Show the keys", keys: ["?"], run: () => (help.value = !help.value) },
+} as const satisfies Record<string, Action>;
+
+export function listen(): void {
+  addEventListener("keydown", (event) => {
+    const target = event.target as HTMLElement;
+    if (target.closest("input, select, textarea, [role=listbox]") || event.altKey) return;
+    if (event.key === " " && target.closest("button, a")) return;
+    const control = event.ctrlKey || event.metaKey ? "Ctrl+" : "";
+    const name = `${control}${event.shiftKey && event.key !== "?" ? "Shift+" : ""}${event.key}`;
+    const found: Action | undefined = Object.values<Action>(actions).find((action) => action.keys.includes(name));
+    if (found && (found.enabled?.() ?? true)) {
+      event.preventDefault();
+      found.run();
+    }
+  });
+}

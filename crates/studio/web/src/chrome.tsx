@@ -1,0 +1,241 @@
+// What stands around the panels: the bar, what can be added, the frames, what comes out, and what must be told.
+
+import type { JSX } from "preact";
+import { useEffect } from "preact/hooks";
+
+import { actions, step, type Action } from "./actions";
+import { Button, keyName } from "./button";
+import { ask, connected, files, help, notice, output, playing, state, tables } from "./store";
+
+const SAVED = { yes: "saved", soon: "saving", conflict: "not saved", failed: "cannot be saved" } as const;
+
+export function Bar(): JSX.Element {
+  const now = state.value;
+  const file = now ? files.value[now.file] : undefined;
+  return (
+    <header class="bar">
+      <h1>{now?.title ?? "rayfold studio"}</h1>
+      <span class="file">
+        {file?.name} <span class={`saved ${now?.saved ?? ""}`} role="status">{now ? SAVED[now.saved] : ""}</span>
+      </span>
+      <nav aria-label="Edit">
+        <Button action={actions.undo} />
+        <Button action={actions.redo} />
+      </nav>
+      <nav aria-label="View">
+        <Button action={actions.script} label="Camera" />
+        <Button action={actions.lookFront} label="Front" />
+        <Button action={actions.lookSide} label="Side" />
+        <Button action={actions.lookTop} label="Top" />
+        <Button action={actions.frame} label="Selection" />
+        <Button action={actions.keepCamera} label="Keep this view" />
+      </nav>
+      <span class="gap" />
+      <Result />
+      <button type="button" title="Light or dark" onClick={theme}>
+        Light or dark
+      </button>
+      <Button action={actions.help} label="Keys" />
+    </header>
+  );
+}
+
+function theme(): void {
+  const dark = getComputedStyle(document.documentElement).colorScheme.trim() === "dark";
+  const isDark = dark || (document.documentElement.style.colorScheme === "" && matchMedia("(prefers-color-scheme: dark)").matches);
+  document.documentElement.style.colorScheme = isDark ? "light" : "dark";
+}
+
+function Result(): JSX.Element {
+  const now = output.value;
+  const frame = state.value?.frame ?? 0;
+  return (
+    <div class="result" role="group" aria-label="Output">
+      {now?.is === "running" ? (
+        <>
+          <progress value={now.done} max={now.of} aria-label="Frames drawn" /> {now.done} of {now.of}
+          <button type="button" onClick={() => ask({ ask: "cancel" })}>
+            Cancel
+          </button>
+        </>
+      ) : (
+        <button type="button" class="main" onClick={() => ask({ ask: "render" })}>
+          Render GIF
+        </button>
+      )}
+      {now?.is === "done" && (
+        <a class="button" href="animation.gif" download={`${state.value?.title.replace(/\.txt$/, "") ?? "animation"}.gif`}>
+          Download GIF ({Math.max(1, Math.round(now.bytes / 1000))} kB)
+        </a>
+      )}
+      {now?.is === "failed" && <span class="failed">{now.why}</span>}
+      {now?.is === "cancelled" && <span>cancelled</span>}
+      <a class="button" href={`frame.png?${frame}`} download={`frame${frame + 1}.png`}>
+        Frame
+      </a>
+      <a class="button" href="scripts.zip" download="scripts.zip">
+        Scripts
+      </a>
+    </div>
+  );
+}
+
+export function Palette(): JSX.Element {
+  return (
+    <section class="panel palette" aria-labelledby="palette-title">
+      <h2 id="palette-title">Add</h2>
+      <div class="buttons">
+        {tables.value
+          .filter((table) => table.role === "object" || table.role === "light")
+          .map((table) => (
+            <button
+              type="button"
+              key={table.name}
+              class={table.role}
+              draggable
+              title={`${table.name}: click, or drag it into the picture`}
+              onDragStart={(event) => event.dataTransfer?.setData("text/plain", table.name)}
+              onClick={() => ask({ ask: "add", command: table.name, at: null })}
+            >
+              {table.name}
+            </button>
+          ))}
+      </div>
+    </section>
+  );
+}
+
+export function Frames(): JSX.Element | null {
+  const now = state.value;
+  const frames = now?.frames ?? 1;
+  const isPlaying = playing.value;
+  const fps = now?.fps ?? 10;
+  useEffect(() => {
+    if (!isPlaying) return;
+    const begin = performance.now();
+    const from = state.value?.frame ?? 0;
+    let shown = from;
+    let timer = 0;
+    const tick = (): void => {
+      const frame = (from + Math.floor(((performance.now() - begin) / 1000) * fps)) % (state.value?.frames ?? 1);
+      if (frame !== shown) {
+        shown = frame;
+        ask({ ask: "frame", frame, moving: true });
+      }
+      timer = requestAnimationFrame(tick);
+    };
+    timer = requestAnimationFrame(tick);
+    return () => {
+      cancelAnimationFrame(timer);
+      ask({ ask: "frame", frame: state.value?.frame ?? 0, moving: false });
+    };
+  }, [isPlaying, fps]);
+  if (!now || frames < 2) return null;
+  return (
+    <footer class="frames" aria-label="Frames">
+      <button type="button" onClick={() => step(-1)} title="Previous frame (,)">
+        Previous
+      </button>
+      <Button action={actions.play} label={isPlaying ? "Stop" : "Play"} />
+      <button type="button" onClick={() => step(1)} title="Next frame (.)">
+        Next
+      </button>
+      <input
+        type="range"
+        aria-label="Frame"
+        min={1}
+        max={frames}
+        value={now.frame + 1}
+        onInput={(event) => ask({ ask: "frame", frame: event.currentTarget.valueAsNumber - 1, moving: true })}
+        onChange={(event) => ask({ ask: "frame", frame: event.currentTarget.valueAsNumber - 1, moving: false })}
+      />
+      <output>
+        frame {now.frame + 1} of {frames}, {now.fps} a second
+      </output>
+    </footer>
+  );
+}
+
+export function Notices(): JSX.Element {
+  const now = state.value;
+  const file = now ? files.value[now.file]?.name : "";
+  return (
+    <div class="notices" role="alert">
+      {!connected.value && (
+        <p>
+          The connection has ended. <a href="">Open the page again</a>, if <code>rayfold studio</code> still runs.
+        </p>
+      )}
+      {now?.saved === "conflict" && (
+        <p>
+          {file} was changed by another program meanwhile.{" "}
+          <button type="button" onClick={() => ask({ ask: "resolve", "keep-mine": true })}>
+            Keep what is here
+          </button>
+          <button type="button" onClick={() => ask({ ask: "resolve", "keep-mine": false })}>
+            Take what is in the file
+          </button>
+        </p>
+      )}
+      {notice.value && (
+        <p>
+          {notice.value}{" "}
+          <button type="button" onClick={() => (notice.value = "")}>
+            Close
+          </button>
+        </p>
+      )}
+    </div>
+  );
+}
+
+export function Keys(): JSX.Element | null {
+  if (!help.value) return null;
+  return (
+    <dialog
+      class="keys"
+      aria-labelledby="keys-title"
+      ref={(dialog) => {
+        if (dialog && !dialog.open) dialog.showModal();
+      }}
+      onClose={() => (help.value = false)}
+    >
+      <h2 id="keys-title">Keys</h2>
+      <table>
+        <tbody>
+          {Object.values<Action>(actions).map((action) => (
+            <tr key={action.title}>
+              <th scope="row">{action.title}</th>
+              <td>
+                {action.keys.map((key) => (
+                  <kbd key={key}>{keyName(key)}</kbd>
+                ))}
+              </td>
+            </tr>
+          ))}
+          {POINTER.map(([what, how]) => (
+            <tr key={what}>
+              <th scope="row">{what}</th>
+              <td>{how}</td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+      <form method="dialog">
+        <button>Close</button>
+      </form>
+    </dialog>
+  );
+}
+
+const POINTER = [
+  ["Move along the ground", "drag an object"],
+  ["Move up and down", "Shift and drag"],
+  ["Move in steps", "Ctrl and drag"],
+  ["Look around", "drag beside all objects"],
+  ["Move the view", "drag with the right button"],
+  ["Go nearer or farther", "wheel"],
+  ["Select several", "Shift and click"],
+  ["Rename, in the list", "F2 or double click"],
+  ["Change the order, in the list", "Alt with ↑ or ↓"],
+] as const;

@@ -1,0 +1,145 @@
+// The parameters of what is selected, from the parser's tables: a new command needs nothing here.
+
+import type { JSX } from "preact";
+
+import { actions } from "./actions";
+import { Button } from "./button";
+import type { Field, Inspected } from "./protocol";
+import { ask, commands, gesture, lines, selection, state } from "./store";
+
+/** The gesture of the slider that is being moved. */
+let sliding: number | null = null;
+
+/** Three decimals are finer than a level of a picture. */
+const round = (value: number): number => Math.round(value * 1000) / 1000;
+
+function set(line: number, first: number, values: readonly number[], under: number | null): void {
+  if (values.every(Number.isFinite)) ask({ ask: "set", line, first, values, gesture: under });
+}
+
+export function Inspector(): JSX.Element {
+  const inspected = state.value?.inspected;
+  const count = selection.value.length;
+  const table = inspected ? commands.value.get(inspected.command) : undefined;
+  const line = inspected ? lines.value[inspected.line] : undefined;
+  return (
+    <section class="panel inspector" aria-labelledby="inspector-title">
+      <h2 id="inspector-title">{table ? `${table.name}${line?.name ? `: ${line.name}` : ""}` : "Nothing selected"}</h2>
+      {count > 0 && (
+        <div class="buttons">
+          {[actions.duplicate, actions.hide, actions.drop, actions.remove].map((action) => (
+            <Button key={action.title} action={action} />
+          ))}
+        </div>
+      )}
+      {count > 1 && <p class="note">{count} lines are selected; moving, dropping and hiding concern all of them.</p>}
+      {inspected && table?.fields.map((field) => <FieldRow key={`${inspected.line}:${field.first}`} field={field} inspected={inspected} />)}
+      {!inspected && <p class="note">Click something in the picture or in the list.</p>}
+    </section>
+  );
+}
+
+interface FieldProps {
+  readonly field: Field;
+  readonly inspected: Inspected;
+}
+
+function FieldRow({ field, inspected }: FieldProps): JSX.Element {
+  const values = field.names.map((_, i) => inspected.values[field.first + i]);
+  const isColor = (field.kind === "colour" || field.kind === "coefficients") && field.names.length === 3;
+  const missing = values.every((value) => value === undefined);
+  return (
+    <fieldset class="field">
+      <legend title={`${field.kind} in ${field.unit}; ${field.values}`}>
+        {field.label}
+        {field.optional && missing ? " (left out)" : ""}
+      </legend>
+      {isColor && <Swatch field={field} inspected={inspected} values={values} />}
+      {field.names.map((name, i) => (
+        <NumberRow key={name} field={field} inspected={inspected} name={name} index={i} value={values[i]} slider={isColor || field.kind === "length"} />
+      ))}
+    </fieldset>
+  );
+}
+
+interface SwatchProps extends FieldProps {
+  readonly values: readonly (number | null | undefined)[];
+}
+
+function Swatch({ field, inspected, values }: SwatchProps): JSX.Element | null {
+  if (values.includes(null)) return null;
+  const byte = (value: number | null | undefined): string =>
+    Math.round(255 * Math.max(0, Math.min(1, value ?? 0)))
+      .toString(16)
+      .padStart(2, "0");
+  const pick = (text: string, under: number | null): void => {
+    const channels = [1, 3, 5].map((at) => round(Number.parseInt(text.slice(at, at + 2), 16) / 255));
+    set(inspected.line, field.first, channels, under);
+  };
+  return (
+    <input
+      type="color"
+      aria-label={`${field.label}, as a colour`}
+      value={`#${values.map(byte).join("")}`}
+      onFocus={() => (sliding = gesture())}
+      onInput={(event) => pick(event.currentTarget.value, sliding)}
+      onChange={(event) => {
+        pick(event.currentTarget.value, sliding);
+        set(inspected.line, field.first, [], null);
+        sliding = gesture();
+      }}
+    />
+  );
+}
+
+interface NumberProps extends FieldProps {
+  readonly name: string;
+  readonly index: number;
+  readonly value: number | null | undefined;
+  readonly slider: boolean;
+}
+
+function NumberRow({ field, inspected, name, index, value, slider }: NumberProps): JSX.Element {
+  const at = field.first + index;
+  if (value === null) {
+    return (
+      <p class="number">
+        <span>{name}</span> <em>changes over time, or has a name; see the script</em>
+      </p>
+    );
+  }
+  const label = field.names.length > 1 ? `${field.label}: ${name}` : field.label;
+  const most = field.kind === "length" ? 2 * 10 ** Math.ceil(Math.log10(Math.max(Math.abs(value ?? 1), 1e-6))) : 1;
+  return (
+    <p class="number">
+      <span aria-hidden="true">{name}</span>
+      <input
+        type="number"
+        step="any"
+        aria-label={label}
+        value={value ?? ""}
+        placeholder="0"
+        onChange={(event) => {
+          if (event.currentTarget.value !== "") set(inspected.line, at, [event.currentTarget.valueAsNumber], null);
+        }}
+      />
+      {slider && (
+        <input
+          type="range"
+          aria-label={`${label}, slider`}
+          min={field.values === "greater than 0" ? most / 1000 : 0}
+          max={most}
+          step={most / 1000}
+          value={value ?? 0}
+          onPointerDown={() => (sliding = gesture())}
+          onKeyDown={() => (sliding = sliding ?? gesture())}
+          onInput={(event) => set(inspected.line, at, [round(event.currentTarget.valueAsNumber / most) * most], sliding)}
+          onChange={() => {
+            sliding = null;
+            set(inspected.line, at, [], null);
+          }}
+        />
+      )}
+    </p>
+  );
+}

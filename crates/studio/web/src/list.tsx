@@ -1,0 +1,60 @@
+// A list of rows of one height, of which only those in sight are made: a script may have a hundred thousand lines.
+
+import { signal } from "@preact/signals";
+import type { ComponentChildren, HTMLAttributes, JSX } from "preact";
+import { useEffect, useMemo, useRef } from "preact/hooks";
+
+interface Props extends Omit<HTMLAttributes<HTMLDivElement>, "children"> {
+  readonly count: number;
+  readonly height: number;
+  /** The row to keep in sight. */
+  readonly reveal: number | null;
+  readonly children: (row: number) => ComponentChildren;
+}
+
+/** Rows that are made beyond those in sight. */
+const BEYOND = 6;
+
+export function List({ count, height, reveal, children, ...rest }: Props): JSX.Element {
+  const box = useRef<HTMLDivElement>(null);
+  const seen = useMemo(() => signal({ top: 0, height: 600 }), []);
+  useEffect(() => {
+    const element = box.current;
+    if (!element) return;
+    const look = (): void => {
+      seen.value = { top: element.scrollTop, height: element.clientHeight };
+    };
+    const observer = new ResizeObserver(look);
+    observer.observe(element);
+    element.addEventListener("scroll", look, { passive: true });
+    return () => {
+      observer.disconnect();
+      element.removeEventListener("scroll", look);
+    };
+  }, []);
+  useEffect(() => {
+    const element = box.current;
+    if (!element || reveal === null) return;
+    const top = reveal * height;
+    if (top < element.scrollTop) element.scrollTop = top;
+    else if (top + height > element.scrollTop + element.clientHeight)
+      element.scrollTop = top + height - element.clientHeight;
+  }, [reveal]);
+  const first = Math.max(0, Math.floor(seen.value.top / height) - BEYOND);
+  const last = Math.min(count, Math.ceil((seen.value.top + seen.value.height) / height) + BEYOND);
+  const rows = [];
+  for (let row = first; row < last; row += 1) {
+    rows.push(
+      <div key={row} class="row" style={{ top: `${row * height}px`, height: `${height}px` }} role="presentation">
+        {children(row)}
+      </div>,
+    );
+  }
+  return (
+    <div ref={box} {...rest}>
+      <div class="rows" style={{ height: `${count * height}px` }} role="presentation">
+        {rows}
+      </div>
+    </div>
+  );
+}

@@ -1,0 +1,133 @@
+// What there is to see: objects, lights and cameras of the script, by name.
+
+import { computed, signal } from "@preact/signals";
+import type { JSX } from "preact";
+
+import { actions } from "./actions";
+import { List } from "./list";
+import type { Line } from "./protocol";
+import { ask, lines, selected, selection } from "./store";
+
+const ROW = 28;
+
+/** The lines that are listed. */
+const listed = computed(() =>
+  lines.value.flatMap((line, at) => (line.role && line.role !== "setting" ? [at] : [])),
+);
+
+/** The line whose name is being written. */
+const renaming = signal<number | null>(null);
+
+/** Where a range of rows begins that is selected with the shift key. */
+const anchor = signal(0);
+
+
+export function Outliner(): JSX.Element {
+  const rows = listed.value;
+  const main = selection.value.at(-1) ?? null;
+  const active = main === null ? -1 : rows.indexOf(main);
+  const go = (row: number, extend: boolean): void => {
+    const line = rows[Math.max(0, Math.min(rows.length - 1, row))];
+    if (line === undefined) return;
+    ask({ ask: "select", lines: extend ? [...selection.value, line] : [line] });
+  };
+  const keyed = (event: KeyboardEvent): void => {
+    if ((event.target as HTMLElement).tagName === "INPUT") return;
+    if (event.altKey && main !== null && (event.key === "ArrowUp" || event.key === "ArrowDown")) {
+      ask({ ask: "reorder", line: main, down: event.key === "ArrowDown" });
+    } else if (event.key === "ArrowDown") go(active + 1, event.shiftKey);
+    else if (event.key === "ArrowUp") go(active < 0 ? 0 : active - 1, event.shiftKey);
+    else if (event.key === "Home") go(0, false);
+    else if (event.key === "End") go(rows.length - 1, false);
+    else if (event.key === "F2" || event.key === "Enter") renaming.value = main;
+    else if (event.key === "Delete") actions.remove.run();
+    else if (event.key === "h") actions.hide.run();
+    else if (event.ctrlKey && event.key === "d") actions.duplicate.run();
+    else if (event.key === "Escape") actions.none.run();
+    else return;
+    event.preventDefault();
+    event.stopPropagation();
+  };
+  return (
+    <section class="panel outliner" aria-labelledby="outliner-title">
+      <h2 id="outliner-title">Scene</h2>
+      <List
+        class="list"
+        count={rows.length}
+        height={ROW}
+        reveal={active < 0 ? null : active}
+        role="listbox"
+        aria-label="Objects, lights and cameras"
+        aria-multiselectable="true"
+        aria-activedescendant={active < 0 ? undefined : `line-${main}`}
+        tabIndex={0}
+        onKeyDown={keyed}
+      >
+        {(row) => {
+          const at = rows[row];
+          const line = at === undefined ? undefined : lines.value[at];
+          return at === undefined || !line ? null : <Row at={at} row={row} line={line} rows={rows} />;
+        }}
+      </List>
+    </section>
+  );
+}
+
+interface RowProps {
+  readonly at: number;
+  readonly row: number;
+  readonly line: Line;
+  readonly rows: readonly number[];
+}
+
+function Row({ at, row, line, rows }: RowProps): JSX.Element {
+  const isSelected = selected.value.has(at);
+  const click = (event: MouseEvent): void => {
+    if (event.shiftKey) {
+      const [from, to] = [Math.min(anchor.value, row), Math.max(anchor.value, row)];
+      ask({ ask: "select", lines: rows.slice(from, to + 1) });
+    } else if (event.ctrlKey || event.metaKey) {
+      const others = selection.value.filter((other) => other !== at);
+      ask({ ask: "select", lines: isSelected ? others : [...others, at] });
+    } else {
+      anchor.value = row;
+      ask({ ask: "select", lines: [at] });
+    }
+  };
+  const rename = (event: Event): void => {
+    if (renaming.value === at) {
+      renaming.value = null;
+      ask({ ask: "rename", line: at, name: (event.currentTarget as HTMLInputElement).value });
+    }
+  };
+  if (renaming.value === at) {
+    return (
+      <input
+        class="rename"
+        aria-label={`Name of ${line.command ?? ""}`}
+        value={line.name ?? ""}
+        ref={(input) => input?.focus()}
+        onBlur={rename}
+        onKeyDown={(event) => {
+          event.stopPropagation();
+          if (event.key === "Enter") rename(event);
+          if (event.key === "Escape") renaming.value = null;
+        }}
+      />
+    );
+  }
+  return (
+    <div
+      id={`line-${at}`}
+      class={`item ${line.role ?? ""}${line.hidden ? " hidden" : ""}`}
+      role="option"
+      aria-selected={isSelected}
+      onClick={click}
+      onDblClick={() => (renaming.value = at)}
+    >
+      <span class="kind">{line.command}</span>
+      <span class="name">{line.name ?? ""}</span>
+      {line.hidden && <span class="state">hidden</span>}
+    </div>
+  );
+}

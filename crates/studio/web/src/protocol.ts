@@ -1,0 +1,139 @@
+// What page and server say to each other: the types of `protocol.rs`. Points are in pixels of the picture, lines count
+// from 0.
+
+export type Role = "object" | "light" | "camera" | "setting";
+
+export interface Field {
+  readonly label: string;
+  readonly names: readonly string[];
+  readonly kind: string;
+  readonly unit: string;
+  readonly values: string;
+  readonly optional: boolean;
+  readonly first: number;
+}
+
+export interface Command {
+  readonly name: string;
+  readonly role: Role;
+  readonly fields: readonly Field[];
+}
+
+export interface FileState {
+  readonly name: string;
+  readonly frames: number;
+  readonly faulty: boolean;
+}
+
+export interface Line {
+  readonly text: string;
+  readonly command?: string;
+  readonly role?: Role;
+  readonly name?: string;
+  readonly hidden?: boolean;
+}
+
+export type Grip =
+  | { readonly what: "body" }
+  | { readonly what: "axis"; readonly axis: number }
+  | { readonly what: "point" | "length" | "direction"; readonly first: number };
+
+export type Point = readonly [number, number];
+
+export interface Handle {
+  readonly grip: Grip;
+  readonly line: number;
+  readonly label: string;
+  readonly at: Point;
+  readonly from: Point;
+}
+
+export interface Fault {
+  readonly line: number;
+  readonly column: number;
+  readonly length: number;
+  readonly error: boolean;
+  readonly message: string;
+  readonly help: string;
+}
+
+export interface Inspected {
+  readonly line: number;
+  readonly command: string;
+  readonly values: readonly (number | null)[];
+}
+
+export interface State {
+  readonly title: string;
+  readonly fps: number;
+  readonly frame: number;
+  readonly frames: number;
+  readonly file: number;
+  readonly saved: "yes" | "soon" | "conflict" | "failed";
+  readonly canUndo: boolean;
+  readonly canRedo: boolean;
+  readonly selection: readonly number[];
+  readonly inspected: Inspected | null;
+  readonly faults: readonly Fault[];
+  readonly handles: readonly Handle[];
+  readonly grid: string;
+  readonly free: boolean;
+  /** Number, width and height of the picture that was ordered last. */
+  readonly picture: readonly [number, number, number] | null;
+}
+
+export type Output =
+  | { readonly is: "running"; readonly done: number; readonly of: number }
+  | { readonly is: "done"; readonly bytes: number }
+  | { readonly is: "cancelled" }
+  | { readonly is: "failed"; readonly why: string };
+
+/** What is left out has not changed. */
+export interface Tell {
+  readonly tables?: readonly Command[];
+  readonly files?: readonly FileState[];
+  readonly lines?: readonly Line[];
+  readonly splices?: readonly { readonly at: number; readonly removed: number; readonly lines: readonly Line[] }[];
+  readonly state?: State;
+  readonly hovered?: number | null;
+  readonly outline?: string;
+  readonly output?: Output;
+  readonly notice?: string;
+}
+
+export type Standpoint = "script" | "free" | "front" | "side" | "top" | "selection";
+
+export type Ask =
+  | { readonly ask: "size"; readonly width: number; readonly height: number }
+  | { readonly ask: "shown" | "release" | "keep-camera" | "undo" | "redo" | "render" | "cancel" }
+  | { readonly ask: "frame"; readonly frame: number; readonly moving: boolean }
+  | { readonly ask: "select" | "remove" | "duplicate" | "hide" | "drop"; readonly lines: readonly number[] }
+  | { readonly ask: "hover"; readonly x: number; readonly y: number }
+  | {
+      readonly ask: "press";
+      readonly x: number;
+      readonly y: number;
+      readonly extend: boolean;
+      readonly grip: Grip | null;
+      readonly line: number | null;
+    }
+  | { readonly ask: "drag"; readonly x: number; readonly y: number; readonly upright: boolean; readonly snap: boolean }
+  | { readonly ask: "navigate"; readonly how: "turn" | "pan" | "zoom"; readonly x: number; readonly y: number }
+  | { readonly ask: "look"; readonly at: Standpoint }
+  | {
+      readonly ask: "set";
+      readonly line: number;
+      readonly first: number;
+      readonly values: readonly number[];
+      readonly gesture: number | null;
+    }
+  | { readonly ask: "text"; readonly line: number; readonly text: string }
+  | { readonly ask: "insert"; readonly at: number; readonly text: string }
+  | { readonly ask: "reorder"; readonly line: number; readonly down: boolean }
+  | { readonly ask: "rename"; readonly line: number; readonly name: string }
+  | { readonly ask: "nudge"; readonly lines: readonly number[]; readonly by: readonly [number, number, number] }
+  | { readonly ask: "add"; readonly command: string; readonly at: Point | null }
+  | { readonly ask: "resolve"; readonly "keep-mine": boolean };
+
+/** Bytes before the pixels of a picture: number, width, height, microseconds; little-endian. */
+export const PICTURE_HEADER = 16;

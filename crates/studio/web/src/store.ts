@@ -1,0 +1,105 @@
+// All that the page knows, as signals, and the connection that they come by. Nothing is decided here: what is done is
+// asked of the server, and what the server tells is shown.
+
+import { batch, computed, signal } from "@preact/signals";
+
+import type { Ask, Command, FileState, Line, Output, State, Tell } from "./protocol";
+
+export const connected = signal(true);
+export const tables = signal<readonly Command[]>([]);
+export const files = signal<readonly FileState[]>([]);
+export const lines = signal<readonly Line[]>([]);
+export const state = signal<State | null>(null);
+export const hovered = signal<number | null>(null);
+export const outline = signal("");
+export const output = signal<Output | null>(null);
+export const notice = signal("");
+export const playing = signal(false);
+/** Whether the list of keys is open. */
+export const help = signal(false);
+
+export const selection = computed(() => state.value?.selection ?? []);
+export const selected = computed(() => new Set(selection.value));
+export const commands = computed(() => new Map(tables.value.map((table) => [table.name, table])));
+
+/** Takes pictures as they come: their bytes with the header. */
+type Show = (picture: ArrayBuffer) => void;
+
+let socket: WebSocket | null = null;
+let show: Show = () => {};
+let hovering = false;
+let nextHover: Ask | null = null;
+let gestures = 0;
+
+export function onPicture(take: Show): void {
+  show = take;
+}
+
+/** A number for a new gesture: what is set under it is one step of undo. */
+export function gesture(): number {
+  gestures += 1;
+  return gestures;
+}
+
+export function ask(wish: Ask): void {
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(wish));
+}
+
+/** Asks what is under the pointer; while one answer is awaited only the newest question waits. */
+export function hover(x: number, y: number): void {
+  const wish: Ask = { ask: "hover", x, y };
+  if (hovering) {
+    nextHover = wish;
+  } else {
+    hovering = true;
+    ask(wish);
+  }
+}
+
+export function connect(): void {
+  const address = new URL("socket", location.href);
+  address.protocol = "ws:";
+  const opened = new WebSocket(address);
+  opened.binaryType = "arraybuffer";
+  opened.onopen = () => {
+    connected.value = true;
+    hovering = false;
+    dispatchEvent(new Event("resize"));
+  };
+  opened.onmessage = (message: MessageEvent<string | ArrayBuffer>) => {
+    if (typeof message.data === "string") hear(JSON.parse(message.data) as Tell);
+    else show(message.data);
+  };
+  opened.onclose = () => {
+    connected.value = false;
+    playing.value = false;
+  };
+  socket = opened;
+}
+
+function hear(tell: Tell): void {
+  batch(() => {
+    if (tell.tables) tables.value = tell.tables;
+    if (tell.files) files.value = tell.files;
+    if (tell.lines) lines.value = tell.lines;
+    if (tell.splices) {
+      const all = lines.value.slice();
+      for (const splice of tell.splices) all.splice(splice.at, splice.removed, ...splice.lines);
+      lines.value = all;
+    }
+    if (tell.state) state.value = tell.state;
+    if (tell.hovered !== undefined) {
+      hovered.value = tell.hovered;
+      hovering = false;
+      if (nextHover) {
+        const wish = nextHover;
+        nextHover = null;
+        hovering = true;
+        ask(wish);
+      }
+    }
+    if (tell.outline !== undefined) outline.value = tell.outline;
+    if (tell.output) output.value = tell.output;
+    if (tell.notice) notice.value = tell.notice;
+  });
+}

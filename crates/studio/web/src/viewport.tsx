@@ -1,0 +1,202 @@
+// The picture, and over it what can be taken hold of. What a drag does is decided by the server; here it is only where
+// the pointer is.
+
+import type { JSX } from "preact";
+import { signal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+
+import type { Handle, Point } from "./protocol";
+import { PICTURE_HEADER } from "./protocol";
+import { ask, hover, hovered, lines, onPicture, outline, selected, state } from "./store";
+
+/** How far an arrow key moves a handle, in pixels of the picture. */
+const KEY_STEP = 8;
+
+/** How fast the wheel goes nearer. */
+const WHEEL = 0.0012;
+
+/** Milliseconds after the wheel's last turn at which the picture rests. */
+const REST = 160;
+
+type Held = "drag" | "pan";
+
+/** Width and height of the panel, in the window's pixels. */
+const room = signal<Point>([1, 1]);
+
+let resting = 0;
+
+function rest(): void {
+  clearTimeout(resting);
+  resting = setTimeout(() => ask({ ask: "release" }), REST);
+}
+
+export function Viewport(): JSX.Element {
+  const panel = useRef<HTMLDivElement>(null);
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const held = useRef<{ readonly what: Held; last: Point } | null>(null);
+
+  useEffect(() => {
+    const element = panel.current;
+    const context = canvas.current?.getContext("2d", { alpha: false });
+    if (!element || !context) return;
+    const size = (): void => {
+      const box = element.getBoundingClientRect();
+      room.value = [box.width, box.height];
+      const pixels = (length: number): number => Math.max(1, Math.round(length * devicePixelRatio));
+      ask({ ask: "size", width: pixels(box.width), height: pixels(box.height) });
+    };
+    const observer = new ResizeObserver(size);
+    observer.observe(element);
+    addEventListener("resize", size);
+    onPicture((picture) => {
+      const head = new DataView(picture, 0, PICTURE_HEADER);
+      const [number, width, height] = [head.getUint32(0, true), head.getUint32(4, true), head.getUint32(8, true)];
+      const target = context.canvas;
+      if (target.width !== width || target.height !== height) [target.width, target.height] = [width, height];
+      const pixels = new Uint8ClampedArray(picture, PICTURE_HEADER);
+      context.putImageData(new ImageData(pixels, width, height), 0, 0);
+      ask({ ask: "shown" });
+      target.dataset["picture"] = String(number);
+      target.dispatchEvent(new CustomEvent("picture", { detail: number }));
+    });
+    return () => {
+      observer.disconnect();
+      removeEventListener("resize", size);
+    };
+  }, []);
+
+  const now = state.value;
+  const picture = now?.picture ?? null;
+  const [, width, height] = picture ?? [0, 1, 1];
+  const at = (event: MouseEvent): Point => {
+    const box = canvas.current?.getBoundingClientRect();
+    if (!box) return [0, 0];
+    return [((event.clientX - box.left) / box.width) * width, ((event.clientY - box.top) / box.height) * height];
+  };
+
+  const press = (event: PointerEvent, handle: Handle | null): void => {
+    if (event.button > 2) return;
+    event.stopPropagation();
+    event.preventDefault();
+    panel.current?.setPointerCapture(event.pointerId);
+    panel.current?.focus({ preventScroll: true });
+    const [x, y] = at(event);
+    if (event.button > 0) {
+      held.current = { what: "pan", last: [x, y] };
+      return;
+    }
+    held.current = { what: "drag", last: [x, y] };
+    const extend = event.shiftKey;
+    ask({ ask: "press", x, y, extend, grip: handle?.grip ?? null, line: handle?.line ?? null });
+  };
+  const move = (event: PointerEvent): void => {
+    const [x, y] = at(event);
+    const holding = held.current;
+    if (!holding) {
+      hover(x, y);
+    } else if (holding.what === "drag") {
+      ask({ ask: "drag", x, y, upright: event.shiftKey, snap: event.ctrlKey || event.metaKey });
+    } else {
+      const [left, top] = holding.last;
+      holding.last = [x, y];
+      ask({ ask: "navigate", how: "pan", x: (x - left) / height, y: (y - top) / height });
+    }
+  };
+  const release = (): void => {
+    if (held.current) ask({ ask: "release" });
+    held.current = null;
+  };
+  const keyed = (event: KeyboardEvent, handle: Handle): void => {
+    const ways: Record<string, Point> = {
+      ArrowLeft: [-KEY_STEP, 0],
+      ArrowRight: [KEY_STEP, 0],
+      ArrowUp: [0, -KEY_STEP],
+      ArrowDown: [0, KEY_STEP],
+    };
+    const way = ways[event.key];
+    if (!way) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const [x, y] = handle.at;
+    ask({ ask: "press", x, y, extend: false, grip: handle.grip, line: handle.line });
+    ask({ ask: "drag", x: x + way[0], y: y + way[1], upright: event.shiftKey, snap: event.ctrlKey });
+    ask({ ask: "release" });
+  };
+
+  // Pictures of an orthographic camera have the script's size, which need not fit.
+  const scale = Math.min(1 / devicePixelRatio, room.value[0] / width, room.value[1] / height);
+  const shown = { width: `${width * scale}px`, height: `${height * scale}px` };
+  const under = hovered.value === null ? null : (lines.value[hovered.value] ?? null);
+  return (
+    <div
+      ref={panel}
+      class={under ? "viewport over" : "viewport"}
+      tabIndex={0}
+      role="application"
+      aria-label="Viewport: drag objects to move them, drag beside them to look around"
+      onPointerDown={(event) => press(event, null)}
+      onPointerMove={move}
+      onPointerUp={release}
+      onPointerCancel={release}
+      onPointerLeave={() => (hovered.value = null)}
+      onContextMenu={(event) => event.preventDefault()}
+      onWheel={(event) => {
+        event.preventDefault();
+        ask({ ask: "navigate", how: "zoom", x: 0, y: event.deltaY * WHEEL });
+        rest();
+      }}
+      onDragOver={(event) => event.preventDefault()}
+      onDrop={(event) => {
+        event.preventDefault();
+        const command = event.dataTransfer?.getData("text/plain");
+        if (command) ask({ ask: "add", command, at: at(event) });
+      }}
+    >
+      <div class={picture ? "stage" : "stage empty"} style={shown}>
+        <canvas ref={canvas} style={shown} />
+        <svg viewBox={`0 0 ${width} ${height}`} style={shown} aria-hidden={picture ? "false" : "true"}>
+          {now?.grid && <path class="grid" d={now.grid} />}
+          <path class="outline" d={outline.value} />
+          {picture && now?.handles.map((handle) => <HandleShape key={key(handle)} handle={handle} unit={1 / scale} press={press} keyed={keyed} />)}
+        </svg>
+      </div>
+      {now && !picture && <p class="hint">Nothing to see yet: drag a shape in from the left, or click one.</p>}
+      {under && !held.current && !selected.value.has(hovered.value ?? -1) && (
+        <p class="under">{under.name ?? under.command}</p>
+      )}
+    </div>
+  );
+}
+
+function key(handle: Handle): string {
+  return JSON.stringify([handle.grip, handle.line]);
+}
+
+interface HandleProps {
+  readonly handle: Handle;
+  /** A pixel of the window, in pixels of the picture. */
+  readonly unit: number;
+  readonly press: (event: PointerEvent, handle: Handle) => void;
+  readonly keyed: (event: KeyboardEvent, handle: Handle) => void;
+}
+
+function HandleShape({ handle, unit, press, keyed }: HandleProps): JSX.Element {
+  const { grip, at, from, label } = handle;
+  const which = grip.what === "axis" ? `axis-${"xyz"[grip.axis] ?? ""}` : grip.what;
+  return (
+    <g
+      class={`handle ${which}`}
+      tabindex={0}
+      role="button"
+      aria-label={`${label}; arrow keys move it`}
+      data-grip={which}
+      onPointerDown={(event) => press(event, handle)}
+      onKeyDown={(event) => keyed(event, handle)}
+    >
+      <title>{label}</title>
+      <line x1={from[0]} y1={from[1]} x2={at[0]} y2={at[1]} />
+      <circle class="reach" cx={at[0]} cy={at[1]} r={14 * unit} />
+      <circle class="dot" cx={at[0]} cy={at[1]} r={6 * unit} />
+    </g>
+  );
+}

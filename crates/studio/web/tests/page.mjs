@@ -1,0 +1,393 @@
+// Drives the page in a real browser, against a real server: `node --test`, with RAYFOLD (the program) and CHROMIUM.
+// Each test has a folder and a server of its own; whatever it starts it ends.
+
+import assert from "node:assert/strict";
+import { spawn, spawnSync } from "node:child_process";
+import { cpSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
+import { request } from "node:http";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+
+import { chromium } from "playwright-core";
+
+const program = process.env.RAYFOLD;
+const scenes = join(import.meta.dirname, "../../../../scenes");
+const shots = process.env.SHOTS;
+
+let browser;
+before(async () => {
+  browser = await chromium.launch({ executablePath: process.env.CHROMIUM, args: ["--no-sandbox"] });
+});
+after(() => browser?.close());
+
+/** A page of a server that serves a copy of `from`, or a new script with `text`. */
+async function open(t, { from, text, name = "scene.txt", scheme = "light", blank = text === "" }) {
+  const folder = mkdtempSync(join(tmpdir(), "rayfold-studio-"));
+  const path = join(folder, name);
+  if (from) cpSync(from, path, { recursive: true });
+  if (text !== undefined) writeFileSync(path, text);
+  const server = spawn(program, ["studio", path, "--no-open"], { stdio: ["ignore", "pipe", "pipe"] });
+  let said = "";
+  server.stderr.on("data", (bytes) => (said += bytes));
+  const ended = new Promise((resolve) => server.on("exit", resolve));
+  const address = await new Promise((resolve, reject) => {
+    let line = "";
+    server.stdout.on("data", (bytes) => {
+      line += bytes;
+      if (line.includes("\n")) resolve(line.trim());
+    });
+    server.on("exit", () => reject(new Error(`rayfold studio ended: ${said}`)));
+  });
+  const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, colorScheme: scheme });
+  const page = await context.newPage();
+  const faults = [];
+  const outside = [];
+  page.on("pageerror", (error) => faults.push(String(error)));
+  page.on("console", (message) => message.type() === "error" && faults.push(message.text()));
+  page.on("request", (sent) => {
+    if (!sent.url().startsWith(address) && !/^(data|blob):/.test(sent.url())) outside.push(sent.url());
+  });
+  t.after(async () => {
+    await context.close();
+    server.kill("SIGINT");
+    await ended;
+    rmSync(folder, { recursive: true, force: true });
+  });
+  await page.goto(address);
+  const drawn = () => page.locator("canvas").getAttribute("data-picture");
+  if (!blank) await until(async () => (await drawn()) !== null);
+  /** Waits until the picture that was ordered last is on the canvas. */
+  const settled = async () => {
+    let last = "";
+    await until(async () => {
+      const now = `${await drawn()}`;
+      const same = now === last;
+      last = now;
+      await page.waitForTimeout(150);
+      return same;
+    });
+  };
+  const saved = async () => {
+    await page.waitForTimeout(300);
+    await page.getByText("saved", { exact: true }).waitFor();
+    return readFileSync(path, "utf8");
+  };
+  const check = () => {
+    assert.deepEqual(faults, [], "errors of the page");
+    assert.deepEqual(outside, [], "nothing but its own server");
+  };
+  return { page, path, folder, address, settled, saved, check, ended, server };
+}
+
+async function until(condition) {
+  const end = Date.now() + 20_000;
+  while (!(await condition())) {
+    assert.ok(Date.now() < end, `waited in vain for ${condition}`);
+    await new Promise((resolve) => setTimeout(resolve, 40));
+  }
+}
+
+/** The pixels of the canvas. */
+const pixels = (page) =>
+  page.locator("canvas").evaluate((canvas) => {
+    const { width, height } = canvas;
+    return { width, height, data: [...canvas.getContext("2d").getImageData(0, 0, width, height).data] };
+  });
+
+/** What the command line draws of a script, as the browser decodes it. */
+async function rendered(page, path, size, frame = 1) {
+  const out = `${path}.${frame}.png`;
+  const run = spawnSync(program, ["render", path, "-o", out, "--size", size, "--frame", String(frame)]);
+  assert.equal(run.status, 0, String(run.stderr));
+  const png = readFileSync(out).toString("base64");
+  rmSync(out);
+  return page.evaluate(async (png) => {
+    const image = new Image();
+    image.src = `data:image/png;base64,${png}`;
+    await image.decode();
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [image.width, image.height];
+    const context = canvas.getContext("2d");
+    context.drawImage(image, 0, 0);
+    return { width: image.width, height: image.height, data: [...context.getImageData(0, 0, image.width, image.height).data] };
+  }, png);
+}
+
+function same(shown, expected) {
+  assert.deepEqual([shown.width, shown.height], [expected.width, expected.height]);
+  const differ = shown.data.filter((level, at) => level !== expected.data[at]).length;
+  assert.equal(differ, 0, "levels that differ");
+}
+
+/** A point of the window over a point of the picture, given by shares of its sides. */
+async function over(page, x, y) {
+  const box = await page.locator("canvas").boundingBox();
+  return [box.x + x * box.width, box.y + y * box.height];
+}
+
+async function drag(page, from, to, steps = 8) {
+  await page.mouse.move(...from);
+  await page.mouse.down();
+  await page.mouse.move(...to, { steps });
+  await page.mouse.up();
+}
+
+async function shot(page, name) {
+  if (shots) await page.screenshot({ path: join(shots, `studio-${name}.png`) });
+}
+
+test("the viewport's pixels are the tracer's, also after a drag", async (t) => {
+  const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
+  const { page } = studio;
+  for (let round = 0; round < 2; round += 1) {
+    await studio.settled();
+    const shown = await pixels(page);
+    same(shown, await rendered(page, studio.path, `${shown.width}x${shown.height}`));
+    if (round === 0) {
+      await drag(page, await over(page, 0.66, 0.67), await over(page, 0.55, 0.72));
+      assert.notEqual(await studio.saved(), readFileSync(join(scenes, "hello/frame01.txt"), "utf8"));
+    }
+  }
+  studio.check();
+});
+
+test("touching one object of each example, by the mouse, changes one line of one file", async (t) => {
+  for (const name of readdirSync(scenes).filter((name) => !name.includes("."))) {
+    await t.test(name, async (t) => {
+      const from = join(scenes, name);
+      const studio = await open(t, { from, name });
+      await studio.settled();
+      const first = studio.page.locator(".item.object").first();
+      await first.click();
+      await studio.page.locator(".viewport").focus();
+      await studio.page.keyboard.press("ArrowRight");
+      await studio.page.getByText("saved", { exact: true }).waitFor();
+      const changed = readdirSync(from).flatMap((file) => {
+        const [old, now] = [from, studio.path].map((folder) => readFileSync(join(folder, file), "utf8").split("\n"));
+        assert.equal(old.length, now.length, file);
+        return old.filter((line, at) => line !== now[at]);
+      });
+      assert.equal(changed.length, 1, changed.join("\n"));
+      studio.check();
+    });
+  }
+});
+
+test("five objects from an empty page without a number, and the GIF is that of the command line", async (t) => {
+  const studio = await open(t, { text: "", name: "mine.txt" });
+  const { page } = studio;
+  const add = page.locator(".palette");
+  for (const name of ["Box", "Sphere", "Sphere"]) await add.getByRole("button", { name, exact: true }).click();
+  await studio.settled();
+  const target = page.locator(".viewport");
+  const box = await target.boundingBox();
+  for (const [name, x, y] of [["Sphere", 0.3, 0.6], ["Triangle", 0.7, 0.6]]) {
+    await add.getByRole("button", { name, exact: true }).dragTo(target, { targetPosition: { x: x * box.width, y: y * box.height } });
+  }
+  await page.locator(".item.object").nth(4).waitFor();
+  const handle = page.locator("[data-grip=axis-x] .reach");
+  const at = await handle.boundingBox();
+  const middle = [at.x + at.width / 2, at.y + at.height / 2];
+  await drag(page, middle, [middle[0] + 60, middle[1]]);
+  await page.getByLabel("diffuse coefficient: rr, slider").press("ArrowRight");
+  const text = await studio.saved();
+  assert.equal(text.split("\n").filter((line) => /^(Box|Sphere|Triangle) /.test(line)).length, 5, text);
+  await shot(page, "five-objects");
+  await page.getByRole("button", { name: "Render GIF" }).click();
+  const [download] = await Promise.all([
+    page.waitForEvent("download"),
+    page.getByRole("link", { name: /Download GIF/ }).click(),
+  ]);
+  const expected = join(studio.folder, "expected.gif");
+  const run = spawnSync(program, ["render", studio.path, "-o", expected]);
+  assert.equal(run.status, 0, String(run.stderr));
+  assert.ok(readFileSync(await download.path()).equals(readFileSync(expected)), "the same bytes");
+  for (let undone = 0; undone < 40; undone += 1) await page.keyboard.press("Control+z");
+  await until(async () => (await studio.saved()) === "");
+  studio.check();
+});
+
+test("the script and the picture follow each other, and faults are told where they are", async (t) => {
+  const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
+  const { page } = studio;
+  const ball = page.getByLabel("Line 34", { exact: true });
+  await page.locator(".item", { hasText: "Sphere" }).first().click();
+  await ball.waitFor();
+  const text = await ball.inputValue();
+  assert.match(text, /^Sphere/);
+  await ball.fill(text.replace("Sphere", "Spere"));
+  await page.locator(".wave.error").waitFor();
+  await page.getByText("did you mean `Sphere`?").waitFor();
+  await shot(page, "fault");
+  await ball.fill(text.replace("Sphere 0.72", "Sphere 0.5"));
+  await page.locator(".wave.error").waitFor({ state: "detached" });
+  await until(async () => (await page.getByRole("spinbutton", { name: "radius" }).inputValue()) === "0.5");
+  await studio.settled();
+  await studio.saved();
+  const shown = await pixels(page);
+  same(shown, await rendered(page, studio.path, `${shown.width}x${shown.height}`));
+  studio.check();
+});
+
+test("what another program writes meanwhile is never overwritten", async (t) => {
+  const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
+  const { page, path } = studio;
+  const text = readFileSync(path, "utf8");
+  writeFileSync(path, text.replace("# H", "# another H"));
+  await page.getByText("was changed on the disk").waitFor();
+  await until(async () => (await page.locator(".code input").evaluateAll((all) => all.map((i) => i.value))).includes("# another H"));
+  // A change on both sides before either is told: the page must ask.
+  const socketed = page.getByLabel("Line 1", { exact: true });
+  await socketed.fill("# mine");
+  writeFileSync(path, "# theirs\n");
+  await page.getByRole("button", { name: "Keep what is here" }).waitFor();
+  assert.equal(readFileSync(path, "utf8"), "# theirs\n");
+  await page.getByRole("button", { name: "Keep what is here" }).click();
+  await until(async () => readFileSync(path, "utf8").startsWith("# mine\n"));
+  studio.check();
+});
+
+test("frames are scrubbed, and each is the tracer's picture", async (t) => {
+  const studio = await open(t, { from: join(scenes, "hello"), name: "hello" });
+  const { page } = studio;
+  await page.getByRole("slider", { name: "Frame" }).fill("20");
+  await page.getByText("frame 20 of 50").waitFor();
+  await studio.settled();
+  const shown = await pixels(page);
+  same(shown, await rendered(page, studio.path, `${shown.width}x${shown.height}`, 20));
+  await page.getByRole("button", { name: "Play" }).click();
+  await until(async () => !(await page.getByText("frame 20 of 50").isVisible()));
+  await page.getByRole("button", { name: "Stop" }).click();
+  studio.check();
+});
+
+test("a free camera turns, and becomes that of the script", async (t) => {
+  const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
+  const { page } = studio;
+  const text = readFileSync(studio.path, "utf8");
+  await page.getByRole("button", { name: "Top", exact: true }).click();
+  await studio.settled();
+  await shot(page, "top");
+  await drag(page, await over(page, 0.02, 0.05), await over(page, 0.1, 0.02));
+  assert.equal(readFileSync(studio.path, "utf8"), text, "looking around changes nothing");
+  await page.getByRole("button", { name: "Keep this view" }).click();
+  await until(async () => readFileSync(studio.path, "utf8") !== text);
+  await studio.settled();
+  const shown = await pixels(page);
+  same(shown, await rendered(page, studio.path, `${shown.width}x${shown.height}`));
+  const differ = readFileSync(studio.path, "utf8").split("\n").filter((line, at) => line !== text.split("\n")[at]);
+  assert.equal(differ.length, 1);
+  assert.match(differ[0], /^Camera /);
+  studio.check();
+});
+
+test("an empty, a broken and a huge script open and stay usable", async (t) => {
+  const sphere = (at) => `Sphere 1 ${(at % 400) - 200} ${Math.floor(at / 400) - 125} 0  .1 .1 .1  1 1 1`;
+  const huge = `Screen 160 90\nCamera 0 0 500  0 0 -1  0 1 0  1  -.8 -.45  .8 .45\nIlight 1 1 1 0 0 -1\n${Array.from({ length: 100_000 }, (_, at) => sphere(at)).join("\n")}\nTrace\n`;
+  for (const [name, text] of Object.entries({ "broken.txt": "Spere 1\n\u0000\nScreen", "huge.txt": huge })) {
+    await t.test(name, async (t) => {
+      const folder = mkdtempSync(join(tmpdir(), "rayfold-text-"));
+      t.after(() => rmSync(folder, { recursive: true, force: true }));
+      const from = join(folder, name);
+      writeFileSync(from, text);
+      const studio = await open(t, { from, name, blank: name === "broken.txt" });
+      const line = studio.page.getByLabel("Line 1", { exact: true });
+      await line.fill("Screen 320 180");
+      await until(async () => readFileSync(studio.path, "utf8").startsWith("Screen 320 180\n"));
+      assert.equal(readFileSync(studio.path, "utf8").split("\n").length, text.split("\n").length);
+      if (name === "huge.txt") assert.ok((await studio.page.locator("body *").count()) < 3000, "only rows in sight are made");
+      studio.check();
+    });
+  }
+});
+
+test("axe finds nothing, light and dark, and the keyboard reaches all", async (t) => {
+  const source = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+  for (const scheme of ["light", "dark"]) {
+    await t.test(scheme, async (t) => {
+      const studio = await open(t, { from: join(scenes, "hello"), name: "hello", scheme });
+      const { page } = studio;
+      await page.getByRole("listbox").focus();
+      for (let down = 0; down < 16; down += 1) await page.keyboard.press("ArrowDown");
+      await page.getByRole("spinbutton", { name: "radius" }).waitFor();
+      await studio.settled();
+      await shot(page, scheme);
+      const audit = async () => {
+        await page.evaluate(source);
+        const found = await page.evaluate(() => window.axe.run(document, { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"] }));
+        const told = found.violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.html).slice(0, 3).join(" | ")}`);
+        assert.deepEqual(told, []);
+      };
+      await audit();
+      const handle = page.locator("[data-grip=length]");
+      await handle.focus();
+      const before = await page.getByRole("spinbutton", { name: "radius" }).inputValue();
+      await page.keyboard.press("ArrowRight");
+      await until(async () => (await page.getByRole("spinbutton", { name: "radius" }).inputValue()) !== before);
+      await page.locator(".viewport").focus();
+      await page.keyboard.press("?");
+      await page.getByRole("dialog").waitFor();
+      await shot(page, `keys-${scheme}`);
+      await audit();
+      studio.check();
+    });
+  }
+});
+
+test("only who knows the address gets in, and only from this page", async (t) => {
+  const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
+  const url = new URL(studio.address);
+  const get = (path, headers = {}) =>
+    new Promise((resolve, reject) => {
+      const sent = request({ host: url.hostname, port: url.port, path, headers }, (answer) => {
+        answer.resume();
+        resolve(answer.statusCode);
+      });
+      sent.on("upgrade", (answer, socket) => {
+        socket.destroy();
+        resolve(101);
+      });
+      sent.on("error", reject);
+      sent.end();
+    });
+  const upgrade = {
+    Connection: "Upgrade",
+    Upgrade: "websocket",
+    "Sec-WebSocket-Version": "13",
+    "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
+  };
+  const socket = `${url.pathname}socket`;
+  assert.equal(await get(url.pathname), 200);
+  assert.equal(await get("/"), 403);
+  assert.equal(await get(`/${"0".repeat(32)}/`), 403);
+  assert.equal(await get(url.pathname.slice(0, -2) + "/"), 403);
+  assert.equal(await get(url.pathname, { Host: "evil.example" }), 403);
+  assert.equal(await get(url.pathname, { Host: `localhost:${url.port}` }), 403);
+  assert.equal(await get(url.pathname, { Origin: "http://evil.example" }), 403);
+  assert.equal(await get(socket, upgrade), 403, "a socket says from where it is opened");
+  assert.equal(await get(socket, { ...upgrade, Origin: "http://evil.example" }), 403);
+  assert.equal(await get(socket, { ...upgrade, Origin: url.origin }), 101);
+  for (const path of ["../Cargo.toml", "%2e%2e/scene.txt", "scene.txt", "frame.png/../../scene.txt"]) {
+    assert.notEqual(await get(url.pathname + path), 200, path);
+  }
+});
+
+test("pictures keep up with a drag, and what was changed is written when the server is told to end", async (t) => {
+  const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
+  const { page } = studio;
+  await studio.settled();
+  const text = readFileSync(studio.path, "utf8");
+  await page.locator("canvas").evaluate((canvas) => {
+    window.shown = 0;
+    canvas.addEventListener("picture", () => (window.shown += 1));
+  });
+  await drag(page, await over(page, 0.66, 0.67), await over(page, 0.4, 0.75), 60);
+  const shown = await page.evaluate(() => window.shown);
+  assert.ok(shown >= 3, `${shown} pictures in a drag of 60 steps`);
+  studio.server.kill("SIGTERM");
+  assert.equal(await studio.ended, 0);
+  assert.notEqual(readFileSync(studio.path, "utf8"), text);
+  await page.getByText("The connection has ended").waitFor();
+});

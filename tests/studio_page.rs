@@ -1,0 +1,52 @@
+//! The studio's page in a real browser, against the real program: what `crates/studio/web/tests/page.mjs` does.
+//!
+//! It takes Node, Chromium and the page's packages (`npm ci` in `crates/studio/web`). Where one of them is not there one
+//! line says that the page was not tested; nothing is installed here.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// The names of the browser, in the order in which they are tried.
+const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
+
+/// The first Node that knows all that the tests use.
+const NODE: u32 = 20;
+
+#[test]
+fn the_page_does_in_a_browser_what_it_promises() {
+    let web = Path::new(env!("CARGO_MANIFEST_DIR")).join("../studio/web");
+    let browser = match tools(&web) {
+        Ok(browser) => browser,
+        Err(missing) => {
+            eprintln!("studio: the page was NOT TESTED: {missing}");
+            return;
+        }
+    };
+    let status = Command::new("node")
+        .args(["--test", "--test-reporter=spec", "tests/page.mjs"])
+        .current_dir(&web)
+        .env("RAYFOLD", env!("CARGO_BIN_EXE_rayfold"))
+        .env("CHROMIUM", browser)
+        .stdin(Stdio::null())
+        .status()
+        .expect("node runs");
+    assert!(status.success(), "see above which of the page's tests failed");
+}
+
+/// The browser, or what is missing.
+fn tools(web: &Path) -> Result<PathBuf, String> {
+    let node = Command::new("node").arg("--version").output().map_err(|_| "there is no node".to_owned())?;
+    let version = String::from_utf8_lossy(&node.stdout).trim().trim_start_matches('v').to_owned();
+    let major = version.split('.').next().and_then(|major| major.parse::<u32>().ok());
+    if major.is_none_or(|major| major < NODE) {
+        return Err(format!("node is {version}, expected {NODE} or newer"));
+    }
+    if !web.join("node_modules/playwright-core").exists() {
+        return Err("its packages are not installed: `npm ci` in crates/studio/web".into());
+    }
+    let paths = std::env::var_os("PATH").unwrap_or_default();
+    let found = std::env::split_paths(&paths)
+        .flat_map(|folder| BROWSERS.map(|name| folder.join(name)))
+        .find(|path| path.is_file());
+    found.ok_or_else(|| format!("there is none of {}", BROWSERS.join(", ")))
+}
