@@ -326,7 +326,7 @@ impl Field {
     }
 
     /// The same, but its numbers may be left out from the end; what holds then.
-    pub(crate) const fn from_the_end(self, default: &'static str) -> Self {
+    pub(crate) const fn omittable(self, default: &'static str) -> Self {
         Self { presence: Presence::FromTheEnd(default), ..self }
     }
 }

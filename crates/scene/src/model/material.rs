@@ -16,7 +16,7 @@ pub(in crate::model) const DIFFUSE: Field =
     Field::new(Parameter::Diffuse, &["rr", "rg", "rb"], Kind::Coefficients, Values::Any);
 /// Of an object's parameters.
 pub(in crate::model) const MIRROR: Field =
-    Field::new(Parameter::Mirror, &["sr", "sg", "sb"], Kind::Coefficients, Values::Any).from_the_end("0");
+    Field::new(Parameter::Mirror, &["sr", "sg", "sb"], Kind::Coefficients, Values::Any).omittable("0");
 
 /// Coefficients of a surface, a channel each; any finite numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]

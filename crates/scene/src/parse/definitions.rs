@@ -422,6 +422,7 @@ impl<'a> Parser<'a> {
         origin: Origin,
         row: &Row,
     ) -> usize {
+        self.is_fresh = true;
         self.moving.push(Moving { line, spans, row: row.clone(), origin, seen: None });
         self.moving.len() - 1
     }
@@ -436,6 +437,7 @@ impl<'a> Parser<'a> {
 
     /// A material with curves is seen.
     pub(super) fn see_material(&mut self, number: usize) {
+        self.is_fresh = true;
         match &mut self.group {
             Some(group) => group.contents.materials.push(number),
             None => {
@@ -448,6 +450,7 @@ impl<'a> Parser<'a> {
 
     /// A group is drawn, as far away and as large as that.
     pub(super) fn see_group(&mut self, number: usize, distance: f64, scale: f64) {
+        self.is_fresh = true;
         match &mut self.group {
             Some(group) => {
                 let Reach { distance: d, scale: s } = group.reach;

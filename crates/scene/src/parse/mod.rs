@@ -75,7 +75,10 @@ struct Parser<'a> {
     lights: usize,
     /// Frames so far.
     frames: u64,
+    /// What the Traces so far are; those in a row that are alike, with nothing between that has curves, are one.
     exposures: Vec<Exposure>,
+    /// Whether something that has curves came since the last `Trace`.
+    is_fresh: bool,
     trace_misspelt: bool,
     /// Whether a line could not be read: an `End` may have stood there, or a `Group`.
     line_lost: bool,
@@ -124,6 +127,7 @@ impl<'a> Parser<'a> {
             lights: 0,
             frames: 0,
             exposures: Vec::new(),
+            is_fresh: false,
             trace_misspelt: false,
             line_lost: false,
             unseen: Unseen::NOTHING,
@@ -397,7 +401,10 @@ impl<'a> Parser<'a> {
             let frames = self.frames;
             self.report.error(s.line, s.words.command.clone(), || wording::too_many_frames(frames, limit));
         }
-        self.exposures.push(Exposure { numbers, open: shutter.open() });
+        let exposure = Exposure { numbers, open: shutter.open() };
+        if std::mem::take(&mut self.is_fresh) || self.exposures.last() != Some(&exposure) {
+            self.exposures.push(exposure);
+        }
         match self.screen {
             ScreenState::Set(screen) => {
                 self.picture.check(screen, &mut self.report);

@@ -65,10 +65,10 @@ impl<'a> Picture<'a> {
 
     /// What is odd about the picture that is drawn now, each thing once.
     pub(super) fn check(&mut self, screen: Screen, report: &mut Report<'a>) {
-        if self.is_orthographic || !self.has_camera {
-            if let Some((line, span)) = self.lens.take() {
-                report.warning(line, span, wording::lens_without_effect);
-            }
+        if (self.is_orthographic || !self.has_camera)
+            && let Some((line, span)) = self.lens.take()
+        {
+            report.warning(line, span, wording::lens_without_effect);
         }
         if std::mem::replace(&mut self.is_compared, true) {
             return;

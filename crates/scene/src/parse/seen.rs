@@ -24,7 +24,7 @@ const MOST_WORK: usize = 1 << 24;
 const READING: usize = 32;
 
 /// What a `Trace` is, to those that it sees.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Exposure {
     pub(super) numbers: FrameNumbers,
     /// The shutter's share of a frame.

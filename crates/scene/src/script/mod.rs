@@ -6,7 +6,7 @@
 //! before it. What has no curves is kept as it is drawn; what has is kept as its line, and read at each moment that is
 //! asked for (`moment`).
 //!
-//! Invariants: every range lies within its list; what no frame sees is not kept; no two neighbours in `views` are equal;
+//! Invariants: every range lies within its list; what no frame sees is not kept; no two neighbours in `views` are equal, nor in `shots`;
 //! materials and groups refer only to earlier ones.
 
 mod moment;
@@ -45,7 +45,7 @@ pub struct Script {
     shots: Vec<Shot>,
 }
 
-/// What one `Trace` renders, without its scenes.
+/// What one `Trace`, or several in a row that see the same, renders, without its scenes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShotSummary {
     /// How many frames it is.
@@ -85,13 +85,15 @@ pub(crate) struct Template {
     pub(crate) row: Row,
 }
 
-/// What a `Trace` sees.
+/// What a `Trace` sees, or several in a row that see the same.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Shot {
     view: usize,
     objects: Extent,
     lights: Extent,
     numbers: FrameNumbers,
+    /// How many Traces.
+    times: usize,
     /// How many frames come before.
     before: usize,
     /// The most objects that a frame has, as drawn.
@@ -194,7 +196,7 @@ impl Script {
         })
     }
 
-    /// What each `Trace` renders, in order; costs nothing for the frames that it is.
+    /// What the `Trace` commands render, in order; costs nothing for the frames that they are.
     pub fn shots(&self) -> impl Iterator<Item = ShotSummary> + '_ {
         self.shots.iter().map(|shot| {
             let view = &self.views[shot.view];
@@ -218,6 +220,7 @@ impl Script {
             objects: objects.list.whole(),
             lights: lights.whole(),
             numbers: FrameNumbers { first: number, last: number },
+            times: 1,
             before: 0,
             drawn: shot.drawn,
         };
@@ -236,8 +239,9 @@ impl Script {
     /// What frame `k` is a part of, and its number.
     fn shot_of(&self, k: usize) -> Option<(&Shot, f64)> {
         let shot = &self.shots[self.shots.partition_point(|shot| shot.before <= k).checked_sub(1)?];
-        let number = f64::from(shot.numbers.first) + (k - shot.before) as f64;
-        (number <= f64::from(shot.numbers.last)).then_some((shot, number))
+        let place = k - shot.before;
+        let number = f64::from(shot.numbers.first) + (place % shot.numbers.count() as usize) as f64;
+        (place < shot.frame_count()).then_some((shot, number))
     }
 
     /// Forgets materials and groups that nothing refers to, and numbers the others anew.
@@ -289,7 +293,7 @@ fn renumbered(kept: &[bool]) -> Vec<Option<usize>> {
 
 impl Shot {
     fn frame_count(&self) -> usize {
-        usize::try_from(self.numbers.count()).unwrap_or(usize::MAX)
+        usize::try_from(self.numbers.count()).unwrap_or(usize::MAX).saturating_mul(self.times)
     }
 }
 

@@ -136,12 +136,21 @@ impl Recorder {
         if self.views.last() != Some(&view) {
             self.views.push(view);
         }
+        let (objects, lights) = (self.objects.note(), self.lights.note());
+        if let Some(last) = self.shots.last_mut()
+            && (last.view, last.numbers) == (self.views.len() - 1, self.numbers)
+            && (&last.objects, &last.lights) == (&objects, &lights)
+        {
+            last.times += 1;
+            return;
+        }
         let before = self.shots.last().map_or(0, |shot| shot.before.saturating_add(shot.frame_count()));
         self.shots.push(Shot {
             view: self.views.len() - 1,
-            objects: self.objects.note(),
-            lights: self.lights.note(),
+            objects,
+            lights,
             numbers: self.numbers,
+            times: 1,
             before,
             drawn,
         });

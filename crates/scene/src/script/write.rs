@@ -56,7 +56,7 @@ impl Display for Script {
             }
             self.write_lights(f, &lights)?;
             self.write_objects(f, &self.objects, &objects)?;
-            write_name(f, Command::Trace)?;
+            (0..shot.times).try_for_each(|_| write_name(f, Command::Trace))?;
             (last, seen) = (view, Some(shot));
         }
         Ok(())
