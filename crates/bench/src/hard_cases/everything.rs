@@ -460,4 +460,39 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn pixel_dev() {
+        let Ok(seed) = std::env::var("SEED") else { return };
+        let kind: usize = std::env::var("KIND").unwrap().parse().unwrap();
+        let scene = KINDS[kind].1(&mut Rng::with_seed(seed.parse().unwrap())).unwrap();
+        println!("{:?} {:?}", scene.screen, scene.camera);
+        for (k, object) in scene.objects.iter().enumerate() {
+            println!("{k} {object:?}");
+        }
+        println!("{:?} {:?} {:?}", scene.lights, scene.depth, scene.tone);
+        let mut left = 6;
+        for j in 0..scene.screen.height() {
+            for i in 0..scene.screen.width() {
+                let a = rayfold_tracer::reference::color(&scene, i, j);
+                let b = crate::oracle::color(&scene, i, j);
+                let (a, b) = (a.clamp(DVec3::ZERO, DVec3::ONE), b.clamp(DVec3::ZERO, DVec3::ONE));
+                if (a - b).abs().max_element() > 0.008 && left > 0 {
+                    left -= 1;
+                    println!("{i} {j}: {a} {b} {:?}", crate::oracle::first_hit(&scene, i, j));
+                    for depth in 0..=scene.depth.bounces() {
+                        let mut scene = scene.clone();
+                        scene.depth = Depth::new(depth).unwrap();
+                        let a = rayfold_tracer::reference::color(&scene, i, j);
+                        let b = crate::oracle::color(&scene, i, j);
+                        println!("   depth {depth} {a} {b}");
+                        scene.lights = vec![].into();
+                        let a = rayfold_tracer::reference::color(&scene, i, j);
+                        let b = crate::oracle::color(&scene, i, j);
+                        println!("   no lights {depth} {a} {b}");
+                    }
+                }
+            }
+        }
+    }
 }

@@ -9,7 +9,7 @@ use glam::DVec3;
 use rayfold_scene::model::unit;
 
 use super::twofold::{Twofold, between, cross, dot};
-use super::{ROUNDOFF, Surface};
+use super::{ROUNDOFF, Surface, plane};
 use crate::camera::Ray;
 use crate::scale::below_inverse;
 
@@ -187,7 +187,11 @@ impl Frustum {
             }
         }
         let slack = EDGE * ROUNDOFF * (leave.0.abs() + height.max(low).max(high));
-        let world = |(at, part): (f64, Part)| (near + at / scale, part);
+        // A cap is as far as all else in its plane.
+        let world = |(at, part): (f64, Part)| match part {
+            Part::Side => (near + at / scale, part),
+            Part::Cap(end) => (plane::along(ray, self.ends[end], b - a), part),
+        };
         (enter.0 <= leave.0 + slack).then(|| Stretch { enter: world(enter), leave: world(leave) })
     }
 }
@@ -228,7 +232,7 @@ fn inside([a, b, c]: [f64; 3], discriminant: f64, growth: f64) -> Option<(f64, f
 
 #[cfg(test)]
 mod tests {
-    use rayfold_scene::{Cone, Cylinder, Material, Object};
+    use rayfold_scene::{Cone, Cuboid, Cylinder, Disc, Material, Object, Plane};
 
     use super::*;
     use crate::reference::shapes::{distance, surface};
@@ -291,6 +295,32 @@ mod tests {
         let found = [t([2.0, -2.0, 0.0], [-1.0, 2.0, 0.0]), t([-1.0, 4.0, 0.0], [1.0, -2.0, 0.0])];
         for at in found {
             assert!(at.is_some_and(|at| (at - 5f64.sqrt()).abs() < 1e-14), "{at:?}");
+        }
+    }
+
+    #[test]
+    fn a_cap_is_as_far_as_a_plane_a_disc_and_a_box_there() {
+        let (surface, height) = (Material::default, 0.3);
+        let top = DVec3::Y * height;
+        let objects: [Object; 5] = [
+            Cylinder::new(2.0, [DVec3::NEG_Y, top], surface()).unwrap().into(),
+            Cone::new([3.0, 0.7], [top, DVec3::Y], surface()).unwrap().into(),
+            Plane::new(top, DVec3::new(0.0, -2.7, 0.0), surface()).unwrap().into(),
+            Disc::new(2.0, top, DVec3::new(0.0, 0.1, 0.0), surface()).unwrap().into(),
+            Cuboid::new([DVec3::new(-3.0, 0.0, -3.0), DVec3::new(3.0, height, 3.0)], surface())
+                .unwrap()
+                .into(),
+        ];
+        let mut rng = fastrand::Rng::with_seed(20);
+        for _ in 0..1000 {
+            let origin = DVec3::new(rng.f64(), 7.0 + rng.f64(), rng.f64());
+            let direction = (DVec3::new(rng.f64(), height, rng.f64()) - origin).normalize();
+            let cone =
+                Ray { origin: origin - DVec3::Y * 14.0, direction: direction * DVec3::new(1.0, -1.0, 1.0) };
+            let met = |k: usize, r: Ray| distance(&objects[k], r);
+            let r = Ray { origin, direction };
+            assert_eq!([met(0, r), met(2, r), met(3, r)], [met(4, r); 3]);
+            assert_eq!(met(1, cone), met(2, cone));
         }
     }
 

@@ -31,9 +31,11 @@ impl Shape for Plane {
 }
 
 /// How far along the ray a plane is met; not a finite number for a ray that runs along it, and 0 exactly for one that starts
-/// in it.
+/// in it. Whatever lies in one plane square to an axis, faces of boxes too, is met at the same distance bit for bit.
 pub(super) fn along(ray: Ray, point: DVec3, normal: DVec3) -> f64 {
-    let normal = normal * below_inverse(normal.abs().max_element());
+    let largest = normal.abs().max_element();
+    let square_to_an_axis = normal.to_array().iter().filter(|x| **x != 0.0).count() == 1;
+    let normal = if square_to_an_axis { normal / largest } else { normal * below_inverse(largest) };
     height(ray.origin, point, normal) / -ray.direction.dot(normal)
 }
 
