@@ -45,7 +45,7 @@ impl Band<'_> {
 
 /// How many rays the packets of a tile have, those beyond its edges included.
 #[inline(always)]
-pub(super) fn rays_of<S: Simd, E: Real>(tile: Tile) -> usize {
+pub(super) fn rays_of<S: Simd, E: Real>(tile: &Tile) -> usize {
     let (width, height) = packet_shape::<S, E>();
     (tile.width as usize).next_multiple_of(width) * (tile.height as usize).next_multiple_of(height)
 }

@@ -10,7 +10,7 @@ use super::real::{Lanes, Real, Vec3};
 const PIXELS: usize = 256;
 
 /// A tile's pixels, and room for a packet that begins at the last of them.
-const ROOM: usize = PIXELS + 16;
+pub(super) const ROOM: usize = PIXELS + 16;
 
 /// A number for each ray of a tile.
 #[derive(Clone)]
@@ -70,8 +70,8 @@ pub(super) struct Hits<E> {
     /// Diffuse coefficient times the ray's weight.
     pub(super) diffuse: Columns<E>,
     pub(super) color: Columns<E>,
-    /// Mirror coefficient times the ray's weight, in scenes that have patterns.
-    pub(super) mirror: Columns<E>,
+    /// Mirror coefficient times the ray's weight; made for scenes that have patterns.
+    pub(super) mirror: [Vec<E>; 3],
     /// For each packet with hits: where it begins, and the spheres that can be in its light, as bits.
     pub(super) packets: Vec<(usize, u64)>,
     /// For each packet with mirrors: where it begins, and the lanes that meet them, as bits.
@@ -87,7 +87,7 @@ impl<E: Real> Hits<E> {
             normal: columns(),
             diffuse: columns(),
             color: columns(),
-            mirror: columns(),
+            mirror: [vec![], vec![], vec![]],
             packets: Vec::with_capacity(PIXELS),
             mirrors: Vec::new(),
         }

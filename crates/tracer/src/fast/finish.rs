@@ -10,7 +10,7 @@ use glam::DVec3;
 use rayfold_scene::model::unit;
 use rayfold_scene::{Coefficients, Object, Scene};
 
-use super::bounce::{Column, Hits, Queue};
+use super::bounce::{Column, Hits, Queue, ROOM};
 use super::geometry::Geometry;
 use super::packet::Ray;
 use super::real::{Lanes, Mask, Real, Vec3};
@@ -49,6 +49,9 @@ impl Finishes {
     /// coefficients of all; `EYE` says that the rays count for 1.
     #[inline(never)]
     pub(super) fn paint<E: Real, const EYE: bool>(&self, queue: &Queue<E>, hits: &mut Hits<E>, lanes: usize) {
+        for column in &mut hits.mirror {
+            column.resize(ROOM, E::narrow(0.0));
+        }
         for &(at, _) in &hits.packets {
             for lane in at..at + lanes {
                 if hits.distance.0[lane].widen() >= E::FAR {
@@ -72,16 +75,11 @@ impl Finishes {
                 } else {
                     material.coefficients()
                 };
-                let write = |columns: &mut [Column<E>; 3], color: DVec3| {
-                    for (column, value) in columns.iter_mut().zip((color * weight).to_array()) {
-                        column.0[lane] = E::narrow(value);
-                    }
-                };
                 if is_painted {
-                    write(&mut hits.color, seen.ambient());
-                    write(&mut hits.diffuse, seen.diffuse());
+                    write(&mut hits.color, lane, seen.ambient() * weight);
+                    write(&mut hits.diffuse, lane, seen.diffuse() * weight);
                 }
-                write(&mut hits.mirror, seen.mirror());
+                write(&mut hits.mirror, lane, seen.mirror() * weight);
             }
         }
     }
@@ -111,6 +109,12 @@ impl Finishes {
 
     pub(super) fn gloss(&self) -> Gloss<'_> {
         Gloss { finishes: self, sum: [DVec3::ZERO; 16], is_seen: false }
+    }
+}
+
+fn write<E: Real>(columns: &mut [impl AsMut<[E]>; 3], lane: usize, color: DVec3) {
+    for (column, value) in columns.iter_mut().zip(color.to_array()) {
+        column.as_mut()[lane] = E::narrow(value);
     }
 }
 

@@ -11,6 +11,7 @@ mod bounce;
 mod bounds;
 mod candidates;
 mod coincidence;
+mod descent;
 mod dispatch;
 mod exact;
 mod features;

@@ -110,6 +110,16 @@ impl Colors {
             mirror = mirror.max(material.mirror().abs().max_element());
             let signs = material.ambient().min(material.diffuse()).min(material.mirror());
             least = least.min(signs.min_element());
+            // Such scenes are drawn in `f64`: only what that holds matters.
+            let Some(finish) = material.finish() else { continue };
+            if let Some(other) = finish.pattern.map(|pattern| pattern.other) {
+                ambient = ambient.max(other.ambient().abs().max_element());
+                diffuse = diffuse.max(other.diffuse().abs().max_element());
+                mirror = mirror.max(other.mirror().abs().max_element());
+            }
+            if let Some(shine) = finish.shine {
+                diffuse = diffuse.max(shine.color().abs().max_element());
+            }
         }
         for light in scene.lights.iter() {
             least = least.min(light.color().min_element());

@@ -84,8 +84,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             fitted!(N, seen, tree, C T D => {
                 look_from_eye::<S, E, Variant<N::By, C, T, D>>(simd, scene, image, rays, candidates, queue, hits)
             });
-            let count = rays_of::<S, E>(tile);
-            let met = Met { kinds: seen, background, queue, count, next: Some(&mut *next) };
+            let met = Met { kinds: seen, background, queue, tile: &tile, next: Some(&mut *next) };
             shade::<S, E, N, true>(simd, scene, met, hits, in_the_way);
         }
         Rays::Parallel(rays) => {
@@ -93,7 +92,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             fitted!(N, seen, tree, C T D => {
                 look::<S, E, Variant<N::By, C, T, D>>(simd, scene, candidates, background, queue, hits)
             });
-            let met = Met { kinds: seen, background, queue, count: queue.count, next: Some(&mut *next) };
+            let met = Met { kinds: seen, background, queue, tile: &tile, next: Some(&mut *next) };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
         }
     }
@@ -108,8 +107,8 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             fitted!(N, all.kinds, tree, C T D => {
                 look::<S, E, Variant<N::By, C, T, D>>(simd, scene, all, scene.background, queue, hits)
             });
-            let (kinds, background, count) = (all.kinds, scene.background, queue.count);
-            let met = Met { kinds, background, queue, count, next: after };
+            let (kinds, background) = (all.kinds, scene.background);
+            let met = Met { kinds, background, queue, tile: &tile, next: after };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
             for ray in 0..queue.count {
                 let pixel = queue.pixel.0[ray].to_index();
@@ -135,8 +134,7 @@ struct Met<'a, E> {
     kinds: ByKind<bool>,
     background: [E; 3],
     queue: &'a Queue<E>,
-    /// How many they are, those beyond the tile's edges included.
-    count: usize,
+    tile: &'a Tile,
     /// Where mirrors send them on to, if they do.
     next: Option<&'a mut Queue<E>>,
 }
@@ -151,11 +149,26 @@ fn shade<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     in_the_way: &mut InTheWay,
 ) {
     if scene.is_plain() {
-        return shade_plain::<S, E, N, EYE>(simd, scene, met, hits, in_the_way);
+        shade_plain::<S, E, N, EYE>(simd, scene, met, hits, in_the_way);
+    } else {
+        shade_more::<S, E, N, EYE>(simd, scene, met, hits, in_the_way);
     }
-    let (queue, count) = (met.queue, met.count);
+}
+
+/// In scenes that have more than version 1 of the language.
+// Out of line, so that tiles of all others are not prepared for it.
+#[inline(never)]
+fn shade_more<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    met: Met<E>,
+    hits: &mut Hits<E>,
+    in_the_way: &mut InTheWay,
+) {
+    let queue = met.queue;
+    let count = if EYE { rays_of::<S, E>(met.tile) } else { queue.count };
     match &scene.beyond {
-        Some(beyond) => shade_beyond::<S, E, N, EYE>(simd, scene, beyond, met, hits, in_the_way),
+        Some(beyond) => shade_beyond::<S, E, N, EYE>(simd, scene, (beyond, count), met, hits, in_the_way),
         None => shade_plain::<S, E, N, EYE>(simd, scene, met, hits, in_the_way),
     }
     if let Some(sky) = &scene.sky {
@@ -168,8 +181,8 @@ fn shade<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
 fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
-    beyond: &Beyond<E>,
-    Met { kinds: _, background, queue, count, next }: Met<E>,
+    (beyond, count): (&Beyond<E>, usize),
+    Met { kinds: _, background, queue, tile: _, next }: Met<E>,
     hits: &mut Hits<E>,
     in_the_way: &mut InTheWay,
 ) {
@@ -196,7 +209,7 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
 fn shade_plain<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
-    Met { kinds, background, queue, count: _, next }: Met<E>,
+    Met { kinds, background, queue, tile: _, next }: Met<E>,
     hits: &mut Hits<E>,
     in_the_way: &mut InTheWay,
 ) {

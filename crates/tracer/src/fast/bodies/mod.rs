@@ -26,9 +26,9 @@ use self::disc::Disc;
 pub(super) use self::placed::{Form, Solid, body, reach};
 use self::torus::Torus;
 use super::bounds::Crossing;
+use super::descent::{backwards, descend};
 use super::packet::{Nearest, Ray, Surface};
 use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
-use super::search::{backwards, descend};
 use super::tree::{Tree, group};
 
 /// A packet of rays in the coordinates of a body.

@@ -68,7 +68,7 @@ impl<E: Real> Lamp<E> {
         let direction = to.scale(one / distance);
         let far = distance * constant::<S, E>(simd, 1.0 - AT_THE_LAMP * E::ROUNDOFF);
         let part = match self.reach {
-            Some(reach) => splat::<S, E>(simd, reach) / square,
+            Some(reach) => (splat::<S, E>(simd, reach) / square).min(constant::<S, E>(simd, E::FAR)),
             None => one,
         };
         Rays { ray: Ray { origin: start, direction }, far, part }
