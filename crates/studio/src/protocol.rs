@@ -184,6 +184,8 @@ pub(crate) struct LinesChanged {
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct State {
+    /// How many wishes were heard when it stood so.
+    pub(crate) asked: u32,
     /// The animation's name.
     pub(crate) title: String,
     /// Frames a second.

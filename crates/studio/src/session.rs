@@ -47,6 +47,8 @@ pub(crate) struct Session {
     free: Option<Orbit>,
     selection: Vec<usize>,
     held: Option<Held>,
+    /// How many wishes were heard.
+    asked: u32,
     gestures: u64,
     /// The line that is being typed in, and its gesture.
     typing: Option<(usize, u64)>,
@@ -99,6 +101,7 @@ impl Session {
             free: None,
             selection: Vec::new(),
             held: None,
+            asked: 0,
             gestures: 0,
             typing: None,
             pictures: 0,
@@ -118,6 +121,7 @@ impl Session {
 
     /// Does what the page asks for.
     pub(crate) fn ask(&mut self, project: &mut Project, ask: Ask) -> Answer {
+        self.asked = self.asked.wrapping_add(1);
         let mut tell = Tell::default();
         let change = self.run(project, ask, &mut tell);
         match change {
@@ -350,12 +354,11 @@ impl Session {
         if let Some(scene) = scene {
             let projection = Projection::new(scene);
             let around = self.around(project);
-            if !matches!(self.held, Some(Held::Turn(_))) {
-                if let Some(&line) = self.selection.last() {
-                    shown = lines
-                        .get(line)
-                        .map_or_else(Vec::new, |text| handles(line, text, &projection, around));
-                }
+            if !matches!(self.held, Some(Held::Turn(_)))
+                && let Some(&line) = self.selection.last()
+                && let Some(text) = lines.get(line)
+            {
+                shown = handles(line, text, &projection, around);
             }
             if self.free.is_some() {
                 grid = grid_path(&projection, self.bounds(project));
@@ -380,6 +383,7 @@ impl Session {
             })
             .collect();
         State {
+            asked: self.asked,
             title: project.name.clone(),
             fps: project.settings.fps(),
             frame: self.frame.min(project.frame_count() - 1),

@@ -6,7 +6,7 @@ import type { JSX } from "preact";
 import { actions } from "./actions";
 import { List } from "./list";
 import type { Line } from "./protocol";
-import { ask, lines, selected, selection } from "./store";
+import { ask, lines, select, selected, selection } from "./store";
 
 const ROW = 28;
 
@@ -29,10 +29,12 @@ export function Outliner(): JSX.Element {
   const go = (row: number, extend: boolean): void => {
     const line = rows[Math.max(0, Math.min(rows.length - 1, row))];
     if (line === undefined) return;
-    ask({ ask: "select", lines: extend ? [...selection.value, line] : [line] });
+    select(extend ? [...selection.value, line] : [line]);
   };
   const keyed = (event: KeyboardEvent): void => {
     if ((event.target as HTMLElement).tagName === "INPUT") return;
+    const main = selection.value.at(-1) ?? null;
+    const active = main === null ? -1 : listed.value.indexOf(main);
     if (event.altKey && main !== null && (event.key === "ArrowUp" || event.key === "ArrowDown")) {
       ask({ ask: "reorder", line: main, down: event.key === "ArrowDown" });
     } else if (event.key === "ArrowDown") go(active + 1, event.shiftKey);
@@ -85,13 +87,13 @@ function Row({ at, row, line, rows }: RowProps): JSX.Element {
   const click = (event: MouseEvent): void => {
     if (event.shiftKey) {
       const [from, to] = [Math.min(anchor.value, row), Math.max(anchor.value, row)];
-      ask({ ask: "select", lines: rows.slice(from, to + 1) });
+      select(rows.slice(from, to + 1));
     } else if (event.ctrlKey || event.metaKey) {
       const others = selection.value.filter((other) => other !== at);
-      ask({ ask: "select", lines: isSelected ? others : [...others, at] });
+      select(isSelected ? others : [...others, at]);
     } else {
       anchor.value = row;
-      ask({ ask: "select", lines: [at] });
+      select([at]);
     }
   };
   const rename = (event: Event): void => {

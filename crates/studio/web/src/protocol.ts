@@ -64,6 +64,8 @@ export interface Inspected {
 }
 
 export interface State {
+  /** How many wishes were heard when it stood so. */
+  readonly asked: number;
   readonly title: string;
   readonly fps: number;
   readonly frame: number;

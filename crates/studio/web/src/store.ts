@@ -30,6 +30,10 @@ let show: Show = () => {};
 let hovering = false;
 let nextHover: Ask | null = null;
 let gestures = 0;
+/** How many wishes were sent. */
+let sent = 0;
+/** What was selected last, and how many wishes had been sent with it. */
+let chosen: { readonly lines: readonly number[]; readonly sent: number } | null = null;
 
 export function onPicture(take: Show): void {
   show = take;
@@ -42,7 +46,16 @@ export function gesture(): number {
 }
 
 export function ask(wish: Ask): void {
-  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(wish));
+  if (socket?.readyState !== WebSocket.OPEN) return;
+  sent += 1;
+  socket.send(JSON.stringify(wish));
+}
+
+/** Selects lines; shown at once, so that keys that are held go on from there. */
+export function select(lines: readonly number[]): void {
+  if (state.value) state.value = { ...state.value, selection: lines };
+  ask({ ask: "select", lines });
+  chosen = { lines, sent };
 }
 
 /** Asks what is under the pointer; while one answer is awaited only the newest question waits. */
@@ -64,6 +77,7 @@ export function connect(): void {
   opened.onopen = () => {
     connected.value = true;
     hovering = false;
+    sent = 0;
     dispatchEvent(new Event("resize"));
   };
   opened.onmessage = (message: MessageEvent<string | ArrayBuffer>) => {
@@ -87,7 +101,11 @@ function hear(tell: Tell): void {
       for (const splice of tell.splices) all.splice(splice.at, splice.removed, ...splice.lines);
       lines.value = all;
     }
-    if (tell.state) state.value = tell.state;
+    if (tell.state) {
+      // What the server said before it heard of the last selection does not undo it.
+      const isOld = chosen !== null && tell.state.asked < chosen.sent;
+      state.value = isOld && chosen ? { ...tell.state, selection: chosen.lines } : tell.state;
+    }
     if (tell.hovered !== undefined) {
       hovered.value = tell.hovered;
       hovering = false;
