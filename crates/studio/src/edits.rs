@@ -2,7 +2,7 @@
 //! splices out.
 
 use glam::DVec3;
-use rayfold_scene::{Command, Kind, Parameter, Scene};
+use rayfold_scene::{Command, Kind, Parameter, Presence, Scene};
 use rayfold_tracer::RenderOptions;
 use rayfold_tracer::probe::nearest_hits;
 
@@ -38,7 +38,7 @@ pub(crate) fn set(line: usize, to: Line) -> Splice {
 pub(crate) fn new_line(command: Command, ground: DVec3, size: f64, count: usize) -> Line {
     let decimals = (2.0 - size.log10().floor()).clamp(0.0, 12.0) as usize;
     let round = |x: f64| format!("{x:.decimals$}").parse::<f64>().unwrap_or(x);
-    let all = || fields(command).map(|(_, field)| field).filter(|field| !field.optional);
+    let all = || fields(command).map(|(_, field)| field).filter(|field| field.presence == Presence::Required);
     let places = all().filter(|field| field.kind == Kind::Position).count();
     let is_round = all().any(|field| field.kind == Kind::Length) && places == 1;
     let color = COLORS[count % COLORS.len()];
@@ -149,7 +149,7 @@ pub(crate) fn hidden(line: &Line) -> Option<Line> {
     let command = inner.command()?;
     let words = inner.words()?;
     let is_meant = role(command) != Role::Setting
-        && command.form().arity().contains(&words.parameters.len())
+        && command.form().takes(words.parameters.len())
         && words.parameters.iter().all(|word| inner.number(word).is_some());
     is_meant.then_some(inner)
 }

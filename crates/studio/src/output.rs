@@ -50,7 +50,7 @@ impl Job {
     fn run(&self, cancel: &AtomicBool, told: &impl Fn(OutputState)) -> Result<Vec<u8>, Error> {
         let of = self.scripts.iter().map(Script::frame_count).sum();
         let failed = |error: &dyn std::error::Error| Error::Output(format!("cannot make the GIF: {error}"));
-        let settings = Settings { fps: self.settings.fps(), loops: self.settings.loops() };
+        let settings = Settings::new(self.settings.fps(), self.settings.loops());
         let mut gif = Bounded(Vec::new());
         let mut encoder = Encoder::new(&mut gif, settings).map_err(|error| failed(&error))?;
         let options = RenderOptions { cancel: Some(cancel), ..RenderOptions::default() };

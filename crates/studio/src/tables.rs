@@ -1,7 +1,7 @@
 //! The commands of the language for the page, from the parser's own tables: a command that is added there appears in the
 //! palette and in the inspector without a form of its own.
 
-use rayfold_scene::{Command, Field, Kind, Parameter};
+use rayfold_scene::{Command, Field, Kind, Parameter, Presence};
 use serde::Serialize;
 
 /// What a command is to the page.
@@ -97,7 +97,7 @@ impl FieldTable {
             kind: field.kind.to_string(),
             unit: field.kind.unit().to_string(),
             values: field.values.to_string(),
-            optional: field.optional,
+            optional: field.presence != Presence::Required,
             first,
         }
     }

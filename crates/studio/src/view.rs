@@ -6,7 +6,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DVec2, DVec3};
-use rayfold_scene::{Camera, InvalidValue, Pinhole, Scene};
+use rayfold_scene::{Camera, InvalidValue, Look, Pinhole, Scene};
 
 /// Nearest and farthest that the free camera may stand, in sizes of what is looked at.
 const NEAR_AND_FAR: (f64, f64) = (1e-3, 1e3);
@@ -162,6 +162,16 @@ impl<'a> Projection<'a> {
                     (on_window - pinhole.lower_left()) / (pinhole.upper_right() - pinhole.lower_left());
                 (share.x * (width - 1.0), share.y * (height - 1.0))
             }
+            Camera::Look(look) => {
+                let (u, v, w) = look.basis();
+                let to = point - look.eye();
+                let depth = -to.dot(w);
+                if depth <= 1e-9 * to.length() {
+                    return None;
+                }
+                let pixels = height / (slope(look) * depth);
+                (0.5 * (to.dot(u) * pixels + width - 1.0), 0.5 * (to.dot(v) * pixels + height - 1.0))
+            }
         };
         let seen = DVec2::new(i + 0.5, height - 0.5 - j);
         seen.is_finite().then_some(seen)
@@ -184,6 +194,10 @@ impl<'a> Projection<'a> {
                 let window = (pinhole.upper_right().y - pinhole.lower_left().y).abs();
                 depth * window / (pinhole.distance() * (height - 1.0).max(1.0))
             }
+            Camera::Look(look) => {
+                let (_, _, w) = look.basis();
+                (point - look.eye()).dot(w).abs() * 2.0 * slope(look) / height
+            }
         }
     }
 
@@ -192,12 +206,18 @@ impl<'a> Projection<'a> {
         match &self.scene.camera {
             Camera::Orthographic => (DVec3::X, DVec3::Y, DVec3::Z),
             Camera::Pinhole(pinhole) => pinhole.basis(),
+            Camera::Look(look) => look.basis(),
         }
     }
 
     fn size(&self) -> (f64, f64) {
         (f64::from(self.scene.screen.width()), f64::from(self.scene.screen.height()))
     }
+}
+
+/// How much higher the upper edge of the view lies than its middle, at distance 1.
+fn slope(look: &Look) -> f64 {
+    (0.5 * look.field_of_view().to_radians()).tan()
 }
 
 #[cfg(test)]
