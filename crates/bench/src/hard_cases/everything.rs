@@ -340,9 +340,10 @@ fn copies(rng: &mut Rng) -> Result<Scene> {
     picture(rng, objects, EYE, DVec3::ZERO)
 }
 
-/// Lamps in rooms, in bodies, on surfaces.
+/// Lamps in rooms, in bodies, on surfaces. Nothing shines: where a lamp lies in the plane of a surface, the sign of a cosine
+/// that is 0 would say whether there is a highlight.
 fn lamps(rng: &mut Rng) -> Result<Scene> {
-    let mut objects = heap(rng, 6, some)?;
+    let mut objects = heap(rng, 6, pattern)?;
     objects.push(floor(rng, -1.5)?);
     let mut scene = picture(rng, objects, EYE, DVec3::ZERO)?;
     let mut lights = Vec::new();
