@@ -13,7 +13,8 @@ use rayfold_scene::{
 };
 
 use super::figures::{Figures, Size};
-use super::nasty::{Kind, color, judge_kinds, point, power, within};
+use super::images::off_by_more_than;
+use super::nasty::{Kind, color, first_seed, judge_kinds, point, power, within};
 use super::setup::direction;
 use crate::backends::Backend;
 use crate::scenes::light;
@@ -43,6 +44,75 @@ pub(super) const KINDS: &[Kind] = &[
 /// Every backend on every kind of scene.
 pub(super) fn scenes(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     judge_kinds(KINDS, FEW, backends, size, figures)
+}
+
+/// The same pictures, bit for bit, in any unit that is a power of two.
+pub(super) fn scaled_by_two(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
+    let mut rng = Rng::with_seed(first_seed());
+    let exponents = size.pick(vec![-300, -1, 40], (-500..=500).step_by(50).collect());
+    // Pixels of a parallel projection have the size 1, and what is far or tiny is so by other numbers.
+    let made = KINDS.iter().filter(|(name, _)| !["parallel rays", "far and tiny"].contains(name));
+    let scenes: Vec<Scene> = made.map(|(_, make)| make(&mut rng)).collect::<Result<_>>()?;
+    for backend in backends {
+        let (mut different, mut pixels) = (0, 0);
+        for scene in &scenes {
+            let image = backend.render(scene)?;
+            for &exponent in &exponents {
+                let other = backend.render(&scaled(scene, 2f64.powi(exponent))?)?;
+                different += off_by_more_than(0, &image, &other);
+                pixels += image.pixels().len();
+            }
+        }
+        let what = format!("pixels that differ at all, seed {}", first_seed());
+        figures.add(backend, what, pixels, different as f64, 0.0);
+    }
+    Ok(())
+}
+
+fn scaled(scene: &Scene, scale: f64) -> Result<Scene> {
+    let place = |p: DVec3| scale * p;
+    let mut scaled = scene.clone();
+    let Camera::Look(look) = &scene.camera else { anyhow::bail!("only a camera with an eye is scaled") };
+    let up = Some(look.up());
+    let look = Look::new(place(look.eye()), place(look.target()), look.field_of_view(), up)?;
+    scaled.camera = Camera::Look(look);
+    let objects = scene.objects.iter().map(|object| with_cells(object.placed(scale, place)?, scale));
+    scaled.objects = objects.collect::<Result<Vec<_>>>()?.into();
+    let lights = scene.lights.iter().map(|light| match light {
+        Light::Lamp(lamp) => {
+            let (radius, reach) = (scale * lamp.radius(), scale * lamp.reach());
+            Ok(Lamp::new(lamp.color(), place(lamp.position()), radius, reach)?.into())
+        }
+        Light::Directional(_) => Ok(*light),
+    });
+    scaled.lights = lights.collect::<Result<Vec<_>>>()?.into();
+    Ok(scaled)
+}
+
+/// The object with a pattern of cells so many times as large; those of groups are in the units of the group.
+fn with_cells(object: Object, scale: f64) -> Result<Object> {
+    let material = object.material();
+    let Some(finish) = material.finish() else { return Ok(object) };
+    let Some(pattern) = finish.pattern else { return Ok(object) };
+    let weight = match pattern.weight {
+        Weight::Checker(size) => Weight::Checker(scale * size),
+        Weight::Stripes(size) => Weight::Stripes(scale * size),
+        Weight::Noise(size) => Weight::Noise(scale * size),
+        Weight::Gradient(start, end) => Weight::Gradient(scale * start, scale * end),
+    };
+    let pattern = Some(Pattern { weight: weight.checked()?, ..pattern });
+    let material = Material::finished(material.coefficients(), Finish { pattern, ..*finish });
+    Ok(match &object {
+        Object::Sphere(o) => Sphere::new(o.radius(), o.center(), material)?.into(),
+        Object::Triangle(o) => Triangle::new(*o.vertices(), material)?.into(),
+        Object::Cuboid(o) => Cuboid::new(*o.corners(), material)?.into(),
+        Object::Plane(o) => Plane::new(o.point(), o.normal(), material)?.into(),
+        Object::Disc(o) => Disc::new(o.radius(), o.center(), o.normal(), material)?.into(),
+        Object::Cylinder(o) => Cylinder::new(o.radius(), o.ends(), material)?.into(),
+        Object::Cone(o) => Cone::new(o.radii(), o.ends(), material)?.into(),
+        Object::Torus(o) => Torus::new(o.radius(), o.thickness(), o.center(), o.normal(), material)?.into(),
+        Object::Instance(_) => object,
+    })
 }
 
 fn coefficients(rng: &mut Rng, mirror: f64) -> Result<Coefficients> {
@@ -270,9 +340,10 @@ fn copies(rng: &mut Rng) -> Result<Scene> {
     picture(rng, objects, EYE, DVec3::ZERO)
 }
 
-/// Lamps in rooms, in bodies, on surfaces.
+/// Lamps in rooms, in bodies, on surfaces. Nothing shines: where a lamp lies in the plane of a surface, the sign of a cosine
+/// that is 0 would say whether there is a highlight.
 fn lamps(rng: &mut Rng) -> Result<Scene> {
-    let mut objects = heap(rng, 6, some)?;
+    let mut objects = heap(rng, 6, pattern)?;
     objects.push(floor(rng, -1.5)?);
     let mut scene = picture(rng, objects, EYE, DVec3::ZERO)?;
     let mut lights = Vec::new();
@@ -428,71 +499,4 @@ fn slender(rng: &mut Rng) -> Result<Scene> {
         });
     }
     picture(rng, objects, EYE, DVec3::ZERO)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::backends;
-
-    /// Dev harness.
-    #[test]
-    fn reference_dev() {
-        let rounds: usize = std::env::var("ROUNDS").ok().and_then(|r| r.parse().ok()).unwrap_or(2);
-        let only: Option<usize> = std::env::var("KIND").ok().and_then(|r| r.parse().ok());
-        for (k, kind) in KINDS.iter().enumerate() {
-            if only.is_some_and(|only| only != k) {
-                continue;
-            }
-            let began = std::time::Instant::now();
-            let mut figures = Figures::default();
-            super::super::nasty::judge_rounds(
-                std::slice::from_ref(kind),
-                FEW,
-                &[backends::reference()],
-                rounds,
-                60,
-                &mut figures,
-            )
-            .unwrap();
-            for figure in figures.0 {
-                println!("{k} {figure} {:.1} s", began.elapsed().as_secs_f64());
-            }
-        }
-    }
-
-    #[test]
-    fn pixel_dev() {
-        let Ok(seed) = std::env::var("SEED") else { return };
-        let kind: usize = std::env::var("KIND").unwrap().parse().unwrap();
-        let scene = KINDS[kind].1(&mut Rng::with_seed(seed.parse().unwrap())).unwrap();
-        println!("{:?} {:?}", scene.screen, scene.camera);
-        for (k, object) in scene.objects.iter().enumerate() {
-            println!("{k} {object:?}");
-        }
-        println!("{:?} {:?} {:?}", scene.lights, scene.depth, scene.tone);
-        let mut left = 6;
-        for j in 0..scene.screen.height() {
-            for i in 0..scene.screen.width() {
-                let a = rayfold_tracer::reference::color(&scene, i, j);
-                let b = crate::oracle::color(&scene, i, j);
-                let (a, b) = (a.clamp(DVec3::ZERO, DVec3::ONE), b.clamp(DVec3::ZERO, DVec3::ONE));
-                if (a - b).abs().max_element() > 0.008 && left > 0 {
-                    left -= 1;
-                    println!("{i} {j}: {a} {b} {:?}", crate::oracle::first_hit(&scene, i, j));
-                    for depth in 0..=scene.depth.bounces() {
-                        let mut scene = scene.clone();
-                        scene.depth = Depth::new(depth).unwrap();
-                        let a = rayfold_tracer::reference::color(&scene, i, j);
-                        let b = crate::oracle::color(&scene, i, j);
-                        println!("   depth {depth} {a} {b}");
-                        scene.lights = vec![].into();
-                        let a = rayfold_tracer::reference::color(&scene, i, j);
-                        let b = crate::oracle::color(&scene, i, j);
-                        println!("   no lights {depth} {a} {b}");
-                    }
-                }
-            }
-        }
-    }
 }

@@ -7,6 +7,7 @@
 
 mod bounces;
 mod boxes;
+mod curved;
 mod everyday;
 mod everything;
 mod extremes;
@@ -213,5 +214,23 @@ pub const CASES: &[Case] = &[
         title: "random scenes of all that the language has",
         asked: "at most 0.01 % of the pixels other than the oracle's",
         run: everything::scenes,
+    },
+    Case {
+        number: "29",
+        title: "outlines of discs, cylinders, cones and tori",
+        asked: "hit or miss right but for 16 ulp of the distance, places to 16 ulp, normals that face the ray",
+        run: curved::outlines,
+    },
+    Case {
+        number: "30",
+        title: "rays along axes, in planes, on rims, tips and surfaces",
+        asked: "hits and misses right, distances to 16 ulp",
+        run: curved::exact,
+    },
+    Case {
+        number: "31",
+        title: "all that the language has, scaled by powers of two",
+        asked: "the same picture bit for bit",
+        run: everything::scaled_by_two,
     },
 ];

@@ -86,19 +86,7 @@ pub(super) fn judge_kinds(
     size: Size,
     figures: &mut Figures,
 ) -> Result<()> {
-    judge_rounds(kinds, few, backends, size.pick(2, 60), size.pick(30, 100), figures)
-}
-
-/// The same for so many scenes of each kind, and so many pixels of each at random.
-pub(super) fn judge_rounds(
-    kinds: &[Kind],
-    few: f64,
-    backends: &[Backend],
-    rounds: usize,
-    samples: usize,
-    figures: &mut Figures,
-) -> Result<()> {
-    let rounds = rounds as u64;
+    let rounds = size.pick(2, 60);
     let first = first_seed() / kinds.len() as u64 * kinds.len() as u64;
     for (kind, (name, make)) in (0..).zip(kinds) {
         let mut wrong = vec![Vec::new(); backends.len()];
@@ -108,7 +96,7 @@ pub(super) fn judge_rounds(
             let scene = make(&mut Rng::with_seed(seed))?;
             pixels += scene.screen.pixels() as usize;
             let drawn = backends.iter().map(|backend| backend.render(&scene)).collect::<Result<Vec<_>>>()?;
-            for (wrong, count) in wrong.iter_mut().zip(judge(&scene, &drawn, samples, seed)?) {
+            for (wrong, count) in wrong.iter_mut().zip(judge(&scene, &drawn, size.pick(30, 100), seed)?) {
                 if count > 0 {
                     wrong.push((seed, count));
                 }
@@ -196,7 +184,7 @@ pub(super) fn color(rng: &mut Rng) -> DVec3 {
     DVec3::new(rng.f64(), rng.f64(), rng.f64())
 }
 
-pub(super) fn matte(rng: &mut Rng) -> Result<Material> {
+fn matte(rng: &mut Rng) -> Result<Material> {
     Ok(Material::new(0.3 * color(rng), 0.6 * color(rng), DVec3::ZERO)?)
 }
 
@@ -249,7 +237,7 @@ fn picture(rng: &mut Rng, objects: Vec<Object>, eye: DVec3, target: DVec3) -> Re
     Ok(scene)
 }
 
-pub(super) fn heap(rng: &mut Rng, count: usize) -> Result<Vec<Object>> {
+fn heap(rng: &mut Rng, count: usize) -> Result<Vec<Object>> {
     (0..count)
         .map(|_| {
             let (at, size) = (point(rng, 2.0), within(rng, 0.3, 1.5));

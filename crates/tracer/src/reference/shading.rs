@@ -111,3 +111,120 @@ impl Shader<'_> {
         is_followed.then(|| Path { bounces: path.bounces - 1, weight, has_met_glass })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rayfold_scene::{
+        Camera, Coefficients, Cuboid, Depth, Disc, Finish, Glass, Lamp, Material, Object, Plane, Scene,
+        Screen, Sphere,
+    };
+
+    use super::*;
+
+    fn matte(ambient: f64, diffuse: f64) -> Material {
+        Material::new(DVec3::splat(ambient), DVec3::splat(diffuse), DVec3::ZERO).unwrap()
+    }
+
+    fn pane(color: f64, ior: f64) -> Material {
+        let glass = Some(Glass::new(DVec3::splat(color), ior).unwrap());
+        Material::finished(Coefficients::default(), Finish { glass, ..Finish::default() })
+    }
+
+    fn disc(height: f64, material: Material) -> Object {
+        Disc::new(9.0, DVec3::Y * height, DVec3::Y, material).unwrap().into()
+    }
+
+    fn brick(low: f64, high: f64, material: Material) -> Object {
+        let corners = [DVec3::new(-9.0, low, -9.0), DVec3::new(9.0, high, 9.0)];
+        Cuboid::new(corners, material).unwrap().into()
+    }
+
+    fn scene(objects: Vec<Object>, lamp: Option<Lamp>) -> Scene {
+        let mut scene = Scene::new(Screen::new(1, 1).unwrap(), Camera::Orthographic);
+        scene.objects = objects.into();
+        scene.lights = lamp.into_iter().map(Into::into).collect();
+        scene
+    }
+
+    /// What a ray sees that goes straight down from a height of 5.
+    fn down(scene: &Scene, x: f64) -> f64 {
+        let ray = Ray { origin: DVec3::new(x, 5.0, 0.0), direction: DVec3::NEG_Y };
+        Shader { world: &World::new(scene), cancel: None }.color(ray, scene.depth.bounces()).x
+    }
+
+    fn lamp(position: DVec3, reach: f64) -> Option<Lamp> {
+        Some(Lamp::new(DVec3::ONE, position, 0.0, reach).unwrap())
+    }
+
+    #[test]
+    fn panes_let_through_what_they_do_not_mirror() {
+        let floor = || disc(0.0, matte(1.0, 0.0));
+        // An index of 1 mirrors nothing: each surface counts by its coefficient, those at one place once.
+        assert_eq!(down(&scene(vec![floor(), disc(1.0, pane(0.5, 1.0))], None), 0.0), 0.5);
+        assert_eq!(down(&scene(vec![floor(), brick(1.0, 2.0, pane(0.5, 1.0))], None), 0.0), 0.25);
+        let stacked = vec![floor(), brick(1.0, 2.0, pane(0.5, 1.0)), brick(2.0, 3.0, pane(0.25, 1.0))];
+        assert_eq!(down(&scene(stacked, None), 0.0), 0.0625);
+        // 4 % at the front of a pane: what it mirrors is black here.
+        let mirrored = down(&scene(vec![floor(), disc(1.0, pane(1.0, 1.5))], None), 0.0);
+        assert!((mirrored - 0.96).abs() < 1e-15);
+        // On the floor the floor is seen, whichever comes first.
+        assert_eq!(down(&scene(vec![disc(0.0, pane(0.5, 1.5)), floor()], None), 0.0), 1.0);
+    }
+
+    #[test]
+    fn shadows_of_panes_are_as_dark_as_their_glass() {
+        let floor = || disc(0.0, matte(0.0, 1.0));
+        let lit = |objects: Vec<Object>| down(&scene(objects, lamp(DVec3::new(4.0, 9.0, 0.0), 0.0)), 3.99);
+        let clear = lit(vec![floor()]);
+        let side = |half: f64| {
+            let corners = [DVec3::new(3.0, 6.0, -half), DVec3::new(5.0, 8.0, half)];
+            Cuboid::new(corners, pane(0.5, 2.0)).unwrap().into()
+        };
+        assert!((lit(vec![floor(), side(1.0)]) / clear - 0.25).abs() < 1e-15);
+        assert_eq!(lit(vec![floor(), side(1.0), disc(7.0, matte(0.0, 0.0))]), 0.0);
+    }
+
+    #[test]
+    fn a_lamp_is_not_hidden_by_the_surface_that_it_is_on_and_gives_nothing_there() {
+        let floor: Object = Plane::new(DVec3::ZERO, DVec3::Y, matte(0.0, 1.0)).unwrap().into();
+        let ceiling: Object =
+            Plane::new(DVec3::Y * 0.7, DVec3::new(0.1, 1.0, 0.2), matte(0.0, 0.0)).unwrap().into();
+        let light = scene(vec![floor.clone()], lamp(DVec3::new(3.0, 4.0, 0.0), 10.0));
+        assert!((down(&light, 0.0) - 0.8 * 4.0).abs() < 1e-14, "(10/5)² of what arrives");
+        let below = DVec3::new(0.3, 0.7 - 0.03, 0.0);
+        let world_of = |objects| scene(objects, lamp(below, 0.0));
+        let from_below = |scene: &Scene| {
+            let ray = Ray { origin: DVec3::new(0.2, 0.1, 0.0), direction: DVec3::NEG_Y };
+            Shader { world: &World::new(scene), cancel: None }.color(ray, 0).x
+        };
+        let open = from_below(&world_of(vec![floor.clone()]));
+        assert!(open > 0.5);
+        assert_eq!(from_below(&world_of(vec![floor.clone(), ceiling])), open);
+        assert_eq!(down(&scene(vec![floor], lamp(DVec3::ZERO, 1.0)), 0.0), 0.0);
+    }
+
+    #[test]
+    fn faint_rays_are_followed_until_a_path_has_met_glass() {
+        let floor = || disc(0.0, matte(4096.0, 0.0));
+        let pane = |share: f64| disc(1.0, pane(share, 1.0));
+        assert_eq!(down(&scene(vec![floor(), pane(1.0 / 4096.0)], None), 0.0), 1.0);
+        assert_eq!(down(&scene(vec![floor(), pane(1.0 / 4097.0)], None), 0.0), 0.0);
+        let mut linear = scene(vec![floor(), pane(1.0 / 65536.0)], None);
+        linear.tone = Tone::Srgb;
+        assert_eq!(down(&linear, 0.0), 0.0625);
+        linear.depth = Depth::new(0).unwrap();
+        assert_eq!(down(&linear, 0.0), 0.0);
+    }
+
+    #[test]
+    fn a_pixel_of_endless_glass_can_be_interrupted() {
+        let shells = (1..40).map(|k| Sphere::new(f64::from(k), DVec3::ZERO, pane(1.0, 1.5)).unwrap().into());
+        let mut endless = scene(shells.collect(), None);
+        endless.depth = Depth::new(16).unwrap();
+        let flag = AtomicBool::new(true);
+        let world = World::new(&endless);
+        let shader = Shader { world: &world, cancel: Some(&flag) };
+        let ray = Ray { origin: DVec3::ZERO, direction: DVec3::X };
+        assert_eq!((shader.color(ray, 16), shader.is_cancelled()), (DVec3::ZERO, true));
+    }
+}
