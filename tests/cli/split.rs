@@ -96,7 +96,7 @@ fn a_script_with_curves_is_split_into_its_frames() {
     folder.rayfold("render wave.txt -o whole.gif").assert().code(0);
     folder.rayfold("render parts -o parts.gif").assert().code(0);
     assert_eq!(folder.read("whole.gif"), folder.read("parts.gif"));
-    folder.rayfold("render wave.txt --frames 3..3 -o third.png").assert().code(0);
+    folder.rayfold("render wave.txt --frame 3 -o third.png").assert().code(0);
     folder.rayfold("render parts/wave-3.txt -o part.png").assert().code(0);
     assert_eq!(folder.read("third.png"), folder.read("part.png"));
 }
