@@ -15,6 +15,7 @@ mod material;
 mod sampling;
 mod screen;
 mod shapes;
+mod surface;
 mod vector;
 
 use glam::DVec3;
