@@ -172,6 +172,17 @@ async fn a_folder_becomes_the_gif_that_local_rendering_gives() {
 }
 
 #[tokio::test]
+async fn a_script_with_curves_is_split_into_its_frames() {
+    let mut world = World::new();
+    let text =
+        "Screen 16 12\nSphere 3 (1:2 5:14) 6 -9 1 .5 0 0 0 0\nFrames 2 5\nTrace\nBackground 0 0 1\nTrace\n";
+    world.upload("scripts/a/wave.txt", text).await;
+    let manifest = world.manifest("a").await;
+    assert_eq!((manifest.head.status, manifest.head.done), (Status::Done, 8));
+    assert!(world.gif("a").await.unwrap() == local_gif(&[text.to_owned()], 10.0));
+}
+
+#[tokio::test]
 async fn changes_deletions_and_repetitions() {
     let mut world = World::new();
     world.upload("scripts/a/animation.json", r#"{"frames": 2, "fps": 25}"#).await;

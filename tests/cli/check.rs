@@ -107,6 +107,38 @@ fn json_for_editors() {
 }
 
 #[test]
+fn json_has_the_table_of_the_language() {
+    let folder = Folder::with("a.txt", BALL);
+    let out = folder.rayfold("check a.txt --format json").output().unwrap();
+    let report: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let language = &report["language"];
+    assert_eq!(language["version"], 2);
+    let commands = language["commands"].as_array().unwrap();
+    let entry = |name: &str| commands.iter().find(|command| command["name"] == name).unwrap();
+    let scale = &entry("Use")["parameters"][2];
+    assert_eq!(
+        (&scale["names"][0], &scale["range"], &scale["default"]),
+        (&"s".into(), &"at least 0".into(), &"1".into())
+    );
+    assert_eq!(entry("Use")["subject"], serde_json::json!({"role": "refers", "of": "group"}));
+    assert_eq!(entry("Sphere")["material_instead_from"], "ar");
+    assert_eq!(entry("Tone")["parameters"][0]["words"], serde_json::json!(["plain", "srgb"]));
+    let names = |list: &str| -> Vec<&str> {
+        language[list].as_array().unwrap().iter().map(|entry| entry["name"].as_str().unwrap()).collect()
+    };
+    assert_eq!(names("curve_modes"), ["linear", "smooth", "step", "cycle"]);
+    assert!(names("clauses").contains(&"checker"));
+}
+
+#[test]
+fn a_script_of_very_many_frames_is_refused_at_once() {
+    let folder = Folder::with("a.txt", BALL.replace("Trace", "Frames 4000000000\nTrace"));
+    let out = folder.rayfold("check a.txt --format json").output().unwrap();
+    let report: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!((&report["errors"], &report["diagnostics"][0]["code"]), (&1.into(), &"limit-exceeded".into()));
+}
+
+#[test]
 fn colour_only_where_it_is_wanted() {
     let folder = Folder::with("a.txt", "Trace");
     let plain = folder.rayfold("check a.txt").output().unwrap().stderr;

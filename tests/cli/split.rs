@@ -63,3 +63,40 @@ error: nothing was written: 1 error
 "#]]);
     assert_eq!(folder.list("."), ["a.txt"]);
 }
+
+/// A ball that grows over some frames, one that has another material from frame to frame, and a second shot.
+const WAVE: &str = "\
+Screen 16 12
+Look 0 0 9 0 (1:0 6:1) 0 40
+Material skin diffuse (1:1 6:0) .2 (smooth 1:0 6:1)
+Ilight 1 1 1 0 -1 -1
+Sphere (smooth 1:1 6:2) 0 0 0 skin
+Frames 2 6
+Trace
+Clear
+Sphere 1 (cycle 1:0 4:3) 0 0 .1 .1 .1 0 .5 0
+Frames 3
+Trace
+";
+
+#[test]
+fn a_script_with_curves_is_split_into_its_frames() {
+    let folder = Folder::with("wave.txt", WAVE);
+    folder.rayfold("split wave.txt parts").assert().code(0).stderr_eq(str![[r#"
+8 scripts: parts/wave-1.txt and on
+
+"#]]);
+    let part = |k: usize| String::from_utf8(folder.read(&format!("parts/wave-{k}.txt"))).unwrap();
+    assert!(part(1).contains("\nFrames 2 2\n") && part(1).contains("(smooth 1:1 6:2)"), "{}", part(1));
+    assert!(part(7).contains("\nFrames 2 2\n") && !part(7).contains("skin"), "{}", part(7));
+    folder.rayfold("check parts").assert().code(0).stderr_eq(str![[r#"
+8 files, 8 frames: no errors
+
+"#]]);
+    folder.rayfold("render wave.txt -o whole.gif").assert().code(0);
+    folder.rayfold("render parts -o parts.gif").assert().code(0);
+    assert_eq!(folder.read("whole.gif"), folder.read("parts.gif"));
+    folder.rayfold("render wave.txt --frame 3 -o third.png").assert().code(0);
+    folder.rayfold("render parts/wave-3.txt -o part.png").assert().code(0);
+    assert_eq!(folder.read("third.png"), folder.read("part.png"));
+}

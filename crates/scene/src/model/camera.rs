@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::invalid::{Faults, InvalidValue, Parameter, direction, finite, positive};
 use super::look::Look;
-use super::vector::{to_unit_scale, unit};
+use super::vector::{cross, is_parallel, level, unit};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values, write_line};
 
 /// The command of the orthographic camera.
@@ -175,31 +175,6 @@ impl Scripted for Pinhole {
         line.pair(self.lower_left)?;
         line.pair(self.upper_right)
     }
-}
-
-/// Directions whose sine is below this are taken for parallel: what is parallel as written in decimals is only nearly
-/// so once it is rounded to floats.
-pub(crate) const PARALLEL: f64 = 4.0 * f64::EPSILON;
-
-pub(super) fn is_parallel(a: DVec3, b: DVec3) -> bool {
-    let (a, b) = (level(a), level(b));
-    cross(a, b).length() < PARALLEL * a.length() * b.length()
-}
-
-/// The vector times a power of two, about as long as 1.
-pub(super) fn level(v: DVec3) -> DVec3 {
-    v * to_unit_scale(v.abs().max_element())
-}
-
-/// The cross product to within 1.5 units in the last place of each component, also of nearly parallel vectors
-/// (Kahan's difference of products; Jeannerod, Louvet, Muller 2013, "Further analysis of Kahan's algorithm").
-pub(super) fn cross(a: DVec3, b: DVec3) -> DVec3 {
-    let difference = |a: f64, b: f64, c: f64, d: f64| {
-        let cd = c * d;
-        let error = (-c).mul_add(d, cd);
-        a.mul_add(b, -cd) + error
-    };
-    DVec3::new(difference(a.y, b.z, a.z, b.y), difference(a.z, b.x, a.x, b.z), difference(a.x, b.y, a.y, b.x))
 }
 
 #[cfg(test)]

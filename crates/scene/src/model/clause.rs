@@ -3,9 +3,8 @@
 use glam::DVec3;
 
 use super::invalid::{Faults, InvalidValue, Parameter, finite};
-use super::material::{
-    AMBIENT, Coefficients, DIFFUSE, Finish, Glass, MIRROR, Material, Pattern, Shine, Weight,
-};
+use super::material::{Coefficients, Finish, Glass, Material, Pattern, Shine, Weight};
+use super::surface::{AMBIENT, DIFFUSE, MIRROR};
 use crate::form::{Field, Form, Kind, Names, Numbers, Presence, Subject, Together, Values};
 
 /// The command that names a material.

@@ -4,9 +4,8 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::camera::{cross, is_parallel, level};
 use super::invalid::{Faults, InvalidValue, Parameter, finite};
-use super::vector::unit;
+use super::vector::{cross, is_parallel, level, unit};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
 
 /// A pinhole camera at an eye that looks at a target, with square pixels: the ray of column i and row j goes

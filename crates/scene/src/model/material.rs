@@ -1,22 +1,10 @@
 //! How a surface answers light.
 
-use std::fmt;
 use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::invalid::{InvalidValue, Parameter, finite, positive};
-use crate::form::{Field, Kind, Line, Numbers, Values};
-
-/// Of an object's parameters.
-pub(in crate::model) const AMBIENT: Field =
-    Field::new(Parameter::Ambient, &["ar", "ag", "ab"], Kind::Color, Values::Any);
-/// Of an object's parameters.
-pub(in crate::model) const DIFFUSE: Field =
-    Field::new(Parameter::Diffuse, &["rr", "rg", "rb"], Kind::Coefficients, Values::Any);
-/// Of an object's parameters.
-pub(in crate::model) const MIRROR: Field =
-    Field::new(Parameter::Mirror, &["sr", "sg", "sb"], Kind::Coefficients, Values::Any).omittable("0");
 
 /// Coefficients of a surface, a channel each; any finite numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -214,25 +202,6 @@ impl Material {
     /// What is mirrored of the colour along the reflected ray.
     pub fn mirror(&self) -> DVec3 {
         self.coefficients.mirror
-    }
-
-    /// [`AMBIENT`], [`DIFFUSE`] and [`MIRROR`], or the material that was named in their place.
-    pub(super) fn read(numbers: &mut Numbers<'_>) -> Result<Self, InvalidValue> {
-        match numbers.surface() {
-            Some(material) => Ok(material.clone()),
-            None => Self::new(numbers.vector(), numbers.vector(), numbers.vector()),
-        }
-    }
-
-    pub(super) fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
-        if let Some(name) = line.surface() {
-            return line.word(name);
-        }
-        line.vector(self.ambient())?;
-        line.vector(self.diffuse())?;
-        let mirror = self.mirror();
-        // A mirror of -0 is written, so that it reads back as that.
-        if mirror.to_array().map(f64::to_bits) == [0; 3] { Ok(()) } else { line.vector(mirror) }
     }
 }
 

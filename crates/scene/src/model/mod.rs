@@ -15,6 +15,7 @@ mod material;
 mod sampling;
 mod screen;
 mod shapes;
+mod surface;
 mod vector;
 
 use glam::DVec3;
@@ -31,11 +32,12 @@ pub use screen::Screen;
 pub use shapes::{Cone, Cuboid, Cylinder, Disc, Instance, Object, Placement, Plane, Sphere, Torus, Triangle};
 pub use vector::unit;
 
-pub(crate) use camera::{ORTHOCAMERA, PARALLEL};
+pub(crate) use camera::ORTHOCAMERA;
 pub(crate) use clause::{Clauses, MATERIAL};
 pub(crate) use invalid::{Doubt, Faults};
 pub(crate) use sampling::FrameNumbers;
 pub(crate) use shapes::USE;
+pub(crate) use vector::PARALLEL;
 
 use crate::shared_slice::SharedSlice;
 

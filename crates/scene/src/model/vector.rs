@@ -25,6 +25,31 @@ pub(super) fn to_unit_scale(largest: f64) -> f64 {
     2f64.powi(-exponent)
 }
 
+/// Directions whose sine is below this are taken for parallel: what is parallel as written in decimals is only nearly
+/// so once it is rounded to floats.
+pub(crate) const PARALLEL: f64 = 4.0 * f64::EPSILON;
+
+pub(super) fn is_parallel(a: DVec3, b: DVec3) -> bool {
+    let (a, b) = (level(a), level(b));
+    cross(a, b).length() < PARALLEL * a.length() * b.length()
+}
+
+/// The vector times a power of two, about as long as 1.
+pub(super) fn level(v: DVec3) -> DVec3 {
+    v * to_unit_scale(v.abs().max_element())
+}
+
+/// The cross product to within 1.5 units in the last place of each component, also of nearly parallel vectors
+/// (Kahan's difference of products; Jeannerod, Louvet, Muller 2013, "Further analysis of Kahan's algorithm").
+pub(super) fn cross(a: DVec3, b: DVec3) -> DVec3 {
+    let difference = |a: f64, b: f64, c: f64, d: f64| {
+        let cd = c * d;
+        let error = (-c).mul_add(d, cd);
+        a.mul_add(b, -cd) + error
+    };
+    DVec3::new(difference(a.y, b.z, a.z, b.y), difference(a.z, b.x, a.x, b.z), difference(a.x, b.y, a.y, b.x))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -183,7 +183,9 @@ impl Moving<'_> {
                 wrong.value = curve.at(frame);
             }
             good = false;
-            report.error(self.line, self.spans[i].clone(), || wording::wrong_at(field, wrong, seen));
+            report.error(self.line, self.spans[i].clone(), || {
+                wording::wrong_at(field, wrong, seen.from, seen.to)
+            });
         }
         good
     }

@@ -40,6 +40,7 @@ const CLASSES: [Class; 256] = {
 };
 
 /// The next word of `line` from byte `at` on; `at` comes to stand behind it.
+#[inline]
 pub(super) fn next_word(line: &[u8], at: &mut usize) -> Option<Range<usize>> {
     let mut end = *at;
     while end < line.len() && CLASSES[usize::from(line[end])] == Class::Separator {
@@ -58,6 +59,7 @@ pub(super) fn next_word(line: &[u8], at: &mut usize) -> Option<Range<usize>> {
 
 /// The next parameter: a word, or a curve from its opening bracket to the closing one or, where that lacks, the end of
 /// the last word.
+#[inline]
 fn next_parameter(line: &[u8], at: &mut usize) -> Option<Range<usize>> {
     let first = next_word(line, at)?;
     if line[first.start] != b'(' {

@@ -2,7 +2,6 @@
 
 use super::curve::CurveFault;
 use super::number::{self, NumberFault};
-use super::seen::Seen;
 use super::text::Words;
 use crate::command::Command;
 use crate::curve::{CYCLE, Mode, Moment};
@@ -259,7 +258,8 @@ pub(super) fn unwanted_curve(command: Command, parameter: &str) -> Fault {
 }
 
 /// A curve has a value that `field` does not take.
-pub(super) fn wrong_at(field: &Field, moment: Moment, seen: &Seen) -> Fault {
+/// It is seen `from` one time `to` another.
+pub(super) fn wrong_at(field: &Field, moment: Moment, from: f64, to: f64) -> Fault {
     let Moment { frame, value } = moment;
     let takes = match field.values {
         Values::Positive => "a number greater than 0".to_string(),
@@ -274,7 +274,6 @@ pub(super) fn wrong_at(field: &Field, moment: Moment, seen: &Seen) -> Fault {
         | Values::Whole(..)
         | Values::OneOf(_) => field.values.to_string(),
     };
-    let (from, to) = (seen.from, seen.to);
     let when = if from == to { format!("at frame {from}") } else { format!("from frame {from} to {to}") };
     Fault::new(Code::InvalidValue, format!("{} is {value} at frame {frame}", field.parameter))
         .expected(format!("expected {takes} {when}"))

@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative};
-use crate::model::material::{self, Material};
+use crate::model::material::Material;
+use crate::model::surface;
 
 /// A round cone, or what is left when its tip is cut off; closed at both ends.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,9 +64,9 @@ impl Scripted for Cone {
             Field::new(Parameter::RadiusB, &["Rb"], Kind::Length, Values::NotNegative),
             Field::new(Parameter::AxisEnd, &["ax", "ay", "az"], Kind::Position, Values::Any),
             Field::new(Parameter::AxisEnd, &["bx", "by", "bz"], Kind::Position, Values::Any),
-            material::AMBIENT,
-            material::DIFFUSE,
-            material::MIRROR,
+            surface::AMBIENT,
+            surface::DIFFUSE,
+            surface::MIRROR,
         ],
     )
     .with(&[Together::NotBothZero(0, 1), Together::Differ(2, 3)]);

@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite};
-use crate::model::material::{self, Material};
+use crate::model::material::Material;
+use crate::model::surface;
 
 /// An axis-aligned box, closed: its faces, edges and corners belong to it. One without thickness is a rectangle.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,9 +58,9 @@ impl Scripted for Cuboid {
         &[
             Field::new(Parameter::Corner, &["ux", "uy", "uz"], Kind::Position, Values::Any),
             Field::new(Parameter::Corner, &["vx", "vy", "vz"], Kind::Position, Values::Any),
-            material::AMBIENT,
-            material::DIFFUSE,
-            material::MIRROR,
+            surface::AMBIENT,
+            surface::DIFFUSE,
+            surface::MIRROR,
         ],
     );
 

@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, positive};
-use crate::model::material::{self, Material};
+use crate::model::material::Material;
+use crate::model::surface;
 
 /// A round cylinder, closed at both ends.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,9 +59,9 @@ impl Scripted for Cylinder {
             Field::new(Parameter::Radius, &["R"], Kind::Length, Values::Positive),
             Field::new(Parameter::AxisEnd, &["ax", "ay", "az"], Kind::Position, Values::Any),
             Field::new(Parameter::AxisEnd, &["bx", "by", "bz"], Kind::Position, Values::Any),
-            material::AMBIENT,
-            material::DIFFUSE,
-            material::MIRROR,
+            surface::AMBIENT,
+            surface::DIFFUSE,
+            surface::MIRROR,
         ],
     )
     .with(&[Together::Differ(1, 2)]);

@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite, positive};
-use crate::model::material::{self, Material};
+use crate::model::material::Material;
+use crate::model::surface;
 
 /// A flat, round disc, seen from both sides, with its rim.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,9 +62,9 @@ impl Scripted for Disc {
             Field::new(Parameter::Radius, &["R"], Kind::Length, Values::Positive),
             Field::new(Parameter::Center, &["cx", "cy", "cz"], Kind::Position, Values::Any),
             Field::new(Parameter::Normal, &["nx", "ny", "nz"], Kind::Direction, Values::NotZero),
-            material::AMBIENT,
-            material::DIFFUSE,
-            material::MIRROR,
+            surface::AMBIENT,
+            surface::DIFFUSE,
+            surface::MIRROR,
         ],
     );
 

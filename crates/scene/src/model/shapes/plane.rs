@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite};
-use crate::model::material::{self, Material};
+use crate::model::material::Material;
+use crate::model::surface;
 
 /// A plane without end, seen from both sides.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,9 +54,9 @@ impl Scripted for Plane {
         &[
             Field::new(Parameter::PlanePoint, &["px", "py", "pz"], Kind::Position, Values::Any),
             Field::new(Parameter::Normal, &["nx", "ny", "nz"], Kind::Direction, Values::NotZero),
-            material::AMBIENT,
-            material::DIFFUSE,
-            material::MIRROR,
+            surface::AMBIENT,
+            surface::DIFFUSE,
+            surface::MIRROR,
         ],
     );
 

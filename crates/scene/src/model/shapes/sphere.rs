@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, positive};
-use crate::model::material::{self, Material};
+use crate::model::material::Material;
+use crate::model::surface;
 
 /// A sphere of positive radius.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,9 +52,9 @@ impl Scripted for Sphere {
         &[
             Field::new(Parameter::Radius, &["R"], Kind::Length, Values::Positive),
             Field::new(Parameter::Center, &["cx", "cy", "cz"], Kind::Position, Values::Any),
-            material::AMBIENT,
-            material::DIFFUSE,
-            material::MIRROR,
+            surface::AMBIENT,
+            surface::DIFFUSE,
+            surface::MIRROR,
         ],
     );
 

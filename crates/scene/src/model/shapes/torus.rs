@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
 use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite, positive};
-use crate::model::material::{self, Material};
+use crate::model::material::Material;
+use crate::model::surface;
 
 /// A ring: all that is as far as its thickness from a circle.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,9 +81,9 @@ impl Scripted for Torus {
             Field::new(Parameter::Thickness, &["r"], Kind::Length, Values::Positive),
             Field::new(Parameter::Center, &["cx", "cy", "cz"], Kind::Position, Values::Any),
             Field::new(Parameter::Normal, &["nx", "ny", "nz"], Kind::Direction, Values::NotZero),
-            material::AMBIENT,
-            material::DIFFUSE,
-            material::MIRROR,
+            surface::AMBIENT,
+            surface::DIFFUSE,
+            surface::MIRROR,
         ],
     )
     .with(&[Together::Greater(0, 1)]);

@@ -6,7 +6,8 @@ use glam::{DVec2, DVec3, Vec3Swizzles};
 
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite};
-use crate::model::material::{self, Material};
+use crate::model::material::Material;
+use crate::model::surface;
 use crate::model::vector::to_unit_scale;
 
 /// A two-sided triangle; one of no area is allowed and never hit.
@@ -62,9 +63,9 @@ impl Scripted for Triangle {
             Field::new(Parameter::Vertex, &["ux", "uy", "uz"], Kind::Position, Values::Any),
             Field::new(Parameter::Vertex, &["vx", "vy", "vz"], Kind::Position, Values::Any),
             Field::new(Parameter::Vertex, &["wx", "wy", "wz"], Kind::Position, Values::Any),
-            material::AMBIENT,
-            material::DIFFUSE,
-            material::MIRROR,
+            surface::AMBIENT,
+            surface::DIFFUSE,
+            surface::MIRROR,
         ],
     );
 
