@@ -354,7 +354,7 @@ const PARALLEL: &str =
     "Screen 41 41\nOrthocamera\nIlight 0.6 0.6 0.6  -1 -2 -3\nPlight 0.3 0.2 0.1  20 30 -10";
 
 /// Places at which a formula that is nearly right is wrong.
-const EDGES: [(&str, &str, &str); 15] = [
+const EDGES: [(&str, &str, &str); 17] = [
     (
         "eye in a cylinder",
         FROM_THE_FRONT,
@@ -379,6 +379,16 @@ const EDGES: [(&str, &str, &str); 15] = [
         "eye on a plane",
         FROM_THE_FRONT,
         "Plane 0 0 9  0 0 1  1 0 0  0 0 0\nSphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7",
+    ),
+    (
+        "eye on a slanted plane",
+        FROM_THE_FRONT,
+        "Plane 0.1 0.7 9.3  0.3 0.6 -1.5  1 0 0  0 0 0\nSphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7",
+    ),
+    (
+        "eye on a cylinder",
+        FROM_THE_FRONT,
+        "Cylinder 0.5  0.3 -2 9.4  0.3 2 9.4  1 0 0  0 0 0\nSphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7",
     ),
     (
         "the horizon",

@@ -47,7 +47,8 @@ pub enum Precision {
     /// `f32` where bounds on its rounding errors say that they cannot be seen, otherwise `f64`.
     #[default]
     Auto,
-    /// Single precision, about twice as fast; double where it cannot hold the scene's numbers at all.
+    /// Single precision, about twice as fast; double where it cannot hold the scene's numbers at all, and for what has no
+    /// kernels in single precision: lamps, finishes, and shapes with axes of their own.
     F32,
     /// Double precision.
     F64,

@@ -43,11 +43,11 @@ impl Band<'_> {
     }
 }
 
-/// How many rays the packets of a tile have, those beyond its edges included.
+/// How many rays the packets of a tile of so many columns and rows have, those beyond its edges included.
 #[inline(always)]
-pub(super) fn rays_of<S: Simd, E: Real>(tile: &Tile) -> usize {
+pub(super) fn rays_of<S: Simd, E: Real>((columns, rows): (u32, u32)) -> usize {
     let (width, height) = packet_shape::<S, E>();
-    (tile.width as usize).next_multiple_of(width) * (tile.height as usize).next_multiple_of(height)
+    (columns as usize).next_multiple_of(width) * (rows as usize).next_multiple_of(height)
 }
 
 /// Nothing but background.

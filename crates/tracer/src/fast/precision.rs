@@ -9,6 +9,7 @@
 use rayfold_scene::Scene;
 
 use super::beyond::is_needed;
+use super::bodies;
 use super::coincidence::surfaces_blur;
 use super::geometry::{Geometry, View};
 use super::placed::{Placed, Sight};
@@ -54,7 +55,10 @@ const DOUBLE: Range = Range { least: 1e-100, most: 1e100, count: 1 << 32 };
 /// The numbers that are meant by a setting: never [`Precision::Auto`], and none if no kernel can hold the scene.
 pub(super) fn resolve(options: &RenderOptions, geometry: &Geometry, scene: &Scene) -> Option<Precision> {
     let colors = Colors::of(scene, options.bounces(scene));
-    if !DOUBLE.holds(geometry, scene, &colors) {
+    let is_pinhole = matches!(geometry.view, View::Pinhole { .. });
+    // Which side of such a surface the eye is on is decided with more than these numbers.
+    let is_at_eye = is_pinhole && geometry.bodies.iter().any(bodies::Solid::is_at_origin);
+    if is_at_eye || !DOUBLE.holds(geometry, scene, &colors) {
         return None;
     }
     // The errors of what few scenes have are bounded for `f64` alone.

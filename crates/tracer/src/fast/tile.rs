@@ -84,7 +84,13 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             fitted!(N, seen, tree, C T D => {
                 look_from_eye::<S, E, Variant<N::By, C, T, D>>(simd, scene, image, rays, candidates, queue, hits)
             });
-            let met = Met { kinds: seen, background, queue, tile: &tile, next: Some(&mut *next) };
+            let met = Met {
+                kinds: seen,
+                background,
+                queue,
+                sides: (tile.width, tile.height),
+                next: Some(&mut *next),
+            };
             shade::<S, E, N, true>(simd, scene, met, hits, in_the_way);
         }
         Rays::Parallel(rays) => {
@@ -92,7 +98,13 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             fitted!(N, seen, tree, C T D => {
                 look::<S, E, Variant<N::By, C, T, D>>(simd, scene, candidates, background, queue, hits)
             });
-            let met = Met { kinds: seen, background, queue, tile: &tile, next: Some(&mut *next) };
+            let met = Met {
+                kinds: seen,
+                background,
+                queue,
+                sides: (tile.width, tile.height),
+                next: Some(&mut *next),
+            };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
         }
     }
@@ -108,7 +120,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
                 look::<S, E, Variant<N::By, C, T, D>>(simd, scene, all, scene.background, queue, hits)
             });
             let (kinds, background) = (all.kinds, scene.background);
-            let met = Met { kinds, background, queue, tile: &tile, next: after };
+            let met = Met { kinds, background, queue, sides: (tile.width, tile.height), next: after };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
             for ray in 0..queue.count {
                 let pixel = queue.pixel.0[ray].to_index();
@@ -134,7 +146,8 @@ struct Met<'a, E> {
     kinds: ByKind<bool>,
     background: [E; 3],
     queue: &'a Queue<E>,
-    tile: &'a Tile,
+    /// Columns and rows of the tile.
+    sides: (u32, u32),
     /// Where mirrors send them on to, if they do.
     next: Option<&'a mut Queue<E>>,
 }
@@ -166,7 +179,7 @@ fn shade_more<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     in_the_way: &mut InTheWay,
 ) {
     let queue = met.queue;
-    let count = if EYE { rays_of::<S, E>(met.tile) } else { queue.count };
+    let count = if EYE { rays_of::<S, E>(met.sides) } else { queue.count };
     match &scene.beyond {
         Some(beyond) => shade_beyond::<S, E, N, EYE>(simd, scene, (beyond, count), met, hits, in_the_way),
         None => shade_plain::<S, E, N, EYE>(simd, scene, met, hits, in_the_way),
@@ -182,7 +195,7 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
     (beyond, count): (&Beyond<E>, usize),
-    Met { kinds: _, background, queue, tile: _, next }: Met<E>,
+    Met { kinds: _, background, queue, sides: _, next }: Met<E>,
     hits: &mut Hits<E>,
     in_the_way: &mut InTheWay,
 ) {
@@ -209,7 +222,7 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
 fn shade_plain<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
-    Met { kinds, background, queue, tile: _, next }: Met<E>,
+    Met { kinds, background, queue, sides: _, next }: Met<E>,
     hits: &mut Hits<E>,
     in_the_way: &mut InTheWay,
 ) {

@@ -17,6 +17,8 @@ pub(in crate::fast) struct Solid {
     pub(super) center: DVec3,
     pub(super) form: Form,
     pub(super) order: u32,
+    /// How far numbers of it reached before they were brought near the origin.
+    reach: f64,
 }
 
 /// What a body is, along its axes.
@@ -44,10 +46,13 @@ pub(in crate::fast) enum Form {
 /// How much wider than computed a body's box is, relative to its numbers.
 const WIDER: f64 = 32.0 * f64::EPSILON;
 
+/// How near the origin rounding may put it on the other side of a surface, relative to the body's numbers.
+const AT_ORIGIN: f64 = 64.0 * f64::EPSILON;
+
 /// An object moved so that `center` is the origin and then scaled, if it is a body that can be hit.
 pub(in crate::fast) fn body(object: &Object, order: u32, center: DVec3, scale: f64) -> Option<Solid> {
     let place = |point: DVec3| (point - center) * scale;
-    let (axes, center, form) = match object {
+    let (axes, middle, form) = match object {
         // From its place nearest to the eye, wherever its point lies.
         Object::Plane(o) => {
             let normal = unit(o.normal());
@@ -69,7 +74,8 @@ pub(in crate::fast) fn body(object: &Object, order: u32, center: DVec3, scale: f
         },
         Object::Sphere(_) | Object::Triangle(_) | Object::Cuboid(_) => return None,
     };
-    Some(Solid { axes, center, form, order })
+    let reach = if let Object::Plane(o) = object { place(o.point()).abs().element_sum() } else { 0.0 };
+    Some(Solid { axes, center: middle, form, order, reach })
 }
 
 type Placed = ([DVec3; 3], DVec3, Form);
@@ -111,6 +117,31 @@ impl Solid {
             Form::Cuboid { half } => half.element_sum(),
         };
         self.center.abs().max_element() + size
+    }
+
+    /// Whether the origin lies so near its surface that rounding might put it on the other side. Numbers along an axis are
+    /// exact enough to tell.
+    pub(in crate::fast) fn is_at_origin(&self) -> bool {
+        let near = AT_ORIGIN * self.extent().max(self.reach);
+        let [x, y, z] = self.axes.map(|axis| -axis.dot(self.center));
+        let is_slanted = self.axes[2].abs().max_element() < 1.0;
+        let aside = x.hypot(y);
+        match self.form {
+            Form::Plane => is_slanted && z.abs() <= near,
+            Form::Disc { radius } => is_slanted && z.abs() <= near && aside <= radius + near,
+            Form::Cone { radii: [a, b], height, .. } => {
+                let radius = a + (b - a) * (z / height).clamp(0.0, 1.0);
+                let ends = z.abs().min((z - height).abs());
+                let within = z >= -near && z <= height + near;
+                let slope = 1.0 + (b - a).abs() / height;
+                within && ((aside - radius).abs() <= near * slope || ends <= near && aside <= radius + near)
+            }
+            Form::Torus { radius, thickness } => ((aside - radius).hypot(z) - thickness).abs() <= near,
+            Form::Cuboid { half } => {
+                let outside = (DVec3::new(x, y, z).abs() - half).max_element();
+                outside.abs() <= near
+            }
+        }
     }
 
     /// The box around it; none around a plane.
