@@ -116,6 +116,8 @@ pub(crate) fn handles(number: usize, line: &Line, projection: &Projection, aroun
     let positions: Vec<_> = values.positions().collect();
     if !positions.is_empty() && role(values.command) != Role::Camera {
         let middle = middle(&positions);
+        // Beyond the handle of a radius.
+        let arrow = arrow + values.reach();
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             add(
                 Grip::Axis { axis },

@@ -18,13 +18,27 @@ const BEYOND = 6;
 export function List({ count, height, reveal, children, ...rest }: Props): JSX.Element {
   const box = useRef<HTMLDivElement>(null);
   const seen = useMemo(() => signal({ top: 0, height: 600 }), []);
+  const kept = useRef<number | null>(null);
+  kept.current = reveal;
+  const bring = (): void => {
+    const [element, row] = [box.current, kept.current];
+    if (!element || row === null) return;
+    const top = row * height;
+    if (top < element.scrollTop) element.scrollTop = top;
+    else if (top + height > element.scrollTop + element.clientHeight)
+      element.scrollTop = top + height - element.clientHeight;
+  };
   useEffect(() => {
     const element = box.current;
     if (!element) return;
     const look = (): void => {
       seen.value = { top: element.scrollTop, height: element.clientHeight };
     };
-    const observer = new ResizeObserver(look);
+    // A list that becomes lower, because another panel grows, keeps its row in sight.
+    const observer = new ResizeObserver(() => {
+      bring();
+      look();
+    });
     observer.observe(element);
     element.addEventListener("scroll", look, { passive: true });
     return () => {
@@ -32,14 +46,7 @@ export function List({ count, height, reveal, children, ...rest }: Props): JSX.E
       element.removeEventListener("scroll", look);
     };
   }, []);
-  useEffect(() => {
-    const element = box.current;
-    if (!element || reveal === null) return;
-    const top = reveal * height;
-    if (top < element.scrollTop) element.scrollTop = top;
-    else if (top + height > element.scrollTop + element.clientHeight)
-      element.scrollTop = top + height - element.clientHeight;
-  }, [reveal]);
+  useEffect(bring, [reveal]);
   const first = Math.max(0, Math.floor(seen.value.top / height) - BEYOND);
   const last = Math.min(count, Math.ceil((seen.value.top + seen.value.height) / height) + BEYOND);
   const rows = [];

@@ -128,7 +128,7 @@ function Row({ at, row, line, rows }: RowProps): JSX.Element {
       onDblClick={() => (renaming.value = at)}
     >
       <span class="kind">{line.command}</span>
-      <span class="name">{line.name ?? ""}</span>
+      <span class={line.name ? "name" : "name none"}>{line.name ?? `line ${at + 1}`}</span>
       {line.hidden && <span class="state">hidden</span>}
     </div>
   );
