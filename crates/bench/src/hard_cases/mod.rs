@@ -45,7 +45,16 @@ pub struct Case {
     run: fn(&[Backend], Size, &mut Figures) -> Result<()>,
 }
 
+/// The first of the cases that need version 2 of the language, which tracers of textbook formulas do not know.
+const FIRST_OF_VERSION_2: u32 = 28;
+
 impl Case {
+    /// Whether version 1 of the language has all that it draws.
+    pub(crate) fn is_of_version_1(&self) -> bool {
+        let first = self.number.split('-').next().and_then(|number| number.parse::<u32>().ok());
+        first.is_some_and(|number| number < FIRST_OF_VERSION_2)
+    }
+
     /// Measures every tracer.
     ///
     /// # Errors

@@ -3,9 +3,9 @@
 use glam::DVec3;
 use rayfold_scene::{Light, Scene};
 
+use super::hit::{glass_of, nearest_on};
 use super::line::Line;
 use super::real::{Real, Vector};
-use super::{glass_of, nearest_on};
 
 /// Light that arrives.
 pub(super) struct Arriving {
