@@ -215,7 +215,10 @@ impl<'a> Parser<'a> {
             Act::Camera(read) => self.camera(s, read),
             Act::Background => self.background(s),
             Act::Lens => self.lens(s),
-            Act::Samples => self.set(s, |recorder, samples| recorder.samples = samples),
+            Act::Samples => {
+                self.picture.samples_set(s);
+                self.set(s, |recorder, samples| recorder.samples = samples);
+            }
             Act::Shutter => self.set(s, |recorder, shutter| recorder.shutter = shutter),
             Act::Tone => self.set(s, |recorder, tone| recorder.tone = tone),
             Act::Depth => self.set(s, |recorder, depth| recorder.depth = depth),
