@@ -255,3 +255,14 @@ fn cost_did_not_say_that_an_assembly_would_not_fit() {
     assert!(told.starts_with("warning: assembling takes about 1,245 s, and the function"), "{told}");
     assert_eq!(said(&folder, "cost --frames 10000 --ms 400 --size 1920x1080", 0), "");
 }
+
+#[test]
+fn another_size_squashed_the_picture_without_a_word() {
+    let folder = Folder::new();
+    folder.write("a.txt", "Screen 40 30\nCamera 0 0 5 0 0 -1 0 1 0 1 -.4 -.3 .4 .3\nTrace");
+    let told = said(&folder, "render a.txt -o a.png --size 90x30", 0);
+    let expected = "warning: a.txt: at 90 x 30 the picture is squashed: a ball is no circle in it; the window that would \
+                    not: -0.9000 -0.3000 0.9000 0.3000";
+    assert!(told.contains(expected), "{told}");
+    assert!(!said(&folder, "render a.txt -o a.png --size 80x60", 0).contains("squashed"));
+}

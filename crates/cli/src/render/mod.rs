@@ -10,7 +10,7 @@ use anyhow::Context;
 use clap::ValueEnum;
 use image::RgbImage;
 use rayfold_gif::Plays;
-use rayfold_scene::{AnimationSettings, Limits, Scene, Screen};
+use rayfold_scene::{AnimationSettings, Camera, Limits, Scene, Screen};
 use rayfold_tracer::{Precision, RenderOptions};
 
 use crate::ahead;
@@ -179,11 +179,29 @@ fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<(
         Ok(plan) => plan,
         Err(faults) => anyhow::bail!("nothing was written: {}", faults.count()),
     };
+    if let Some(size) = args.size {
+        warn_if_squashed(&plan, size, console)?;
+    }
     match target {
         Target::Animation(container, place) => animation(args, *container, place, &plan, console),
         Target::Image(path, format) => image(path, *format, &plan, console),
         Target::Images(pattern, format) => images(pattern, *format, args.skip_existing, &plan, console),
     }
+}
+
+/// A script's window has the shape of its `Screen`; another size may not have it.
+fn warn_if_squashed(plan: &Plan, size: Screen, console: &Console) -> anyhow::Result<()> {
+    let Some(first) = plan.jobs().next() else { return Ok(()) };
+    if let Camera::Pinhole(camera) = plan.scene(&first)?.camera
+        && let Some([au, av, bu, bv]) = camera.unsquashed(size)
+    {
+        let (name, width, height) = (plan.name(&first), size.width(), size.height());
+        console.warn(format_args!(
+            "{name}: at {width} x {height} the picture is squashed: a ball is no circle in it; the window that would not: \
+             {au:.4} {av:.4} {bu:.4} {bv:.4}"
+        ));
+    }
+    Ok(())
 }
 
 fn animation(

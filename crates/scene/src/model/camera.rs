@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::invalid::{Faults, InvalidValue, Parameter, direction, finite, positive};
 use super::look::Look;
+use super::screen::Screen;
 use super::vector::{cross, is_parallel, level, unit};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values, write_line};
 
@@ -139,6 +140,13 @@ impl Pinhole {
         self.upper_right
     }
 
+    /// The window (au, av, bu, bv) that would show things in their shape on a screen, as high and around the same middle; `None`
+    /// where this one does, to 2 %.
+    pub fn unsquashed(&self, screen: Screen) -> Option<[f64; 4]> {
+        let (a, b) = (self.lower_left, self.upper_right);
+        unsquashed([a.x, a.y, b.x, b.y], screen)
+    }
+
     /// The orthonormal frame (u, v, w): u to the right, v up, w against the gaze.
     ///
     /// w = -g/|g|, u = (up x w)/|up x w|, v = w x u.
@@ -177,11 +185,47 @@ impl Scripted for Pinhole {
     }
 }
 
+/// How far a window's shape may be from the image's. A window's outer pixels lie on its border, so that its shape is
+/// between nx : ny and (nx - 1) : (ny - 1); and people round the shape that they write.
+const TOLERANCE: f64 = 0.02;
+
+/// The window that would show things in their shape, if this one does not: as high, and around the same middle.
+pub(crate) fn unsquashed([au, av, bu, bv]: [f64; 4], screen: Screen) -> Option<[f64; 4]> {
+    let (nx, ny) = (f64::from(screen.width()), f64::from(screen.height()));
+    // A single column or row shows the middle of the window, whatever its shape.
+    if screen.width() == 1 || screen.height() == 1 {
+        return None;
+    }
+    let shape = ((bu - au) / (bv - av)).abs();
+    let is_near = |other: f64| (shape / other - 1.0).abs() <= TOLERANCE;
+    if is_near(nx / ny) || is_near((nx - 1.0) / (ny - 1.0)) || !(shape > 0.0 && shape.is_finite()) {
+        return None;
+    }
+    let (middle, half) = (0.5 * au + 0.5 * bu, (0.5 * bv - 0.5 * av).abs() * nx / ny * (bu - au).signum());
+    let better = [middle - half, av, middle + half, bv];
+    better.iter().all(|x| x.is_finite()).then_some(better)
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn windows_of_the_image_s_shape_are_in_order() {
+        let check = |corners, nx, ny, expect| {
+            assert_eq!(unsquashed(corners, Screen::new(nx, ny).unwrap()), expect, "{corners:?} {nx} x {ny}");
+        };
+        check([-0.6, -0.45, 0.6, 0.45], 640, 480, None);
+        check([-1.0, -1.0, 1.0, 1.0], 4, 4, None);
+        check([-3.0, -2.0, 3.0, 2.0], 4, 3, None);
+        check([1.0, -1.0, -1.0, 1.0], 100, 100, None);
+        check([-1.778, -1.0, 1.778, 1.0], 1920, 1080, None);
+        check([-1.0, -1.0, 1.0, 1.0], 640, 1, None);
+        check([-1.0, -1.0, 1.0, 1.0], 200, 100, Some([-2.0, -1.0, 2.0, 1.0]));
+        check([2.0, 0.0, 0.0, 2.0], 200, 100, Some([3.0, 0.0, -1.0, 2.0]));
+    }
 
     fn pinhole(gaze: DVec3, up: DVec3) -> Result<Pinhole, InvalidValue> {
         Pinhole::new(DVec3::ZERO, gaze, up, 1.0, DVec2::NEG_ONE, DVec2::ONE)

@@ -32,7 +32,7 @@ pub use screen::Screen;
 pub use shapes::{Cone, Cuboid, Cylinder, Disc, Instance, Object, Placement, Plane, Sphere, Torus, Triangle};
 pub use vector::unit;
 
-pub(crate) use camera::ORTHOCAMERA;
+pub(crate) use camera::{ORTHOCAMERA, unsquashed};
 pub(crate) use clause::{Clauses, MATERIAL};
 pub(crate) use invalid::{Doubt, Faults};
 pub(crate) use sampling::FrameNumbers;

@@ -5,14 +5,10 @@ use std::ops::Range;
 use super::line::Statement;
 use super::wording;
 use crate::command::Command;
-use crate::model::{Camera, Lens, Screen};
+use crate::model::{Camera, Lens, Screen, unsquashed};
 use crate::report::{Line, Report};
 use crate::row::Number;
 use crate::script::Value;
-
-/// How far a window's shape may be from the image's. A window's outer pixels lie on its border, so that its shape is
-/// between nx : ny and (nx - 1) : (ny - 1); and people round the shape that they write.
-const TOLERANCE: f64 = 0.02;
 
 /// Screen, camera and lens as they stand, as far as they can be odd together.
 #[derive(Default)]
@@ -86,42 +82,5 @@ impl<'a> Picture<'a> {
         if let Some(better) = unsquashed(*corners, screen) {
             report.warning(*line, span.clone(), || wording::squashed(screen, better));
         }
-    }
-}
-
-/// The window that would show things in their shape, if this one does not: as high, and around the same middle.
-fn unsquashed([au, av, bu, bv]: [f64; 4], screen: Screen) -> Option<[f64; 4]> {
-    let (nx, ny) = (f64::from(screen.width()), f64::from(screen.height()));
-    // A single column or row shows the middle of the window, whatever its shape.
-    if screen.width() == 1 || screen.height() == 1 {
-        return None;
-    }
-    let shape = ((bu - au) / (bv - av)).abs();
-    let is_near = |other: f64| (shape / other - 1.0).abs() <= TOLERANCE;
-    if is_near(nx / ny) || is_near((nx - 1.0) / (ny - 1.0)) || !(shape > 0.0 && shape.is_finite()) {
-        return None;
-    }
-    let (middle, half) = (0.5 * au + 0.5 * bu, (0.5 * bv - 0.5 * av).abs() * nx / ny * (bu - au).signum());
-    let better = [middle - half, av, middle + half, bv];
-    better.iter().all(|x| x.is_finite()).then_some(better)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn windows_of_the_image_s_shape_are_in_order() {
-        let check = |corners, nx, ny, expect| {
-            assert_eq!(unsquashed(corners, Screen::new(nx, ny).unwrap()), expect, "{corners:?} {nx} x {ny}");
-        };
-        check([-0.6, -0.45, 0.6, 0.45], 640, 480, None);
-        check([-1.0, -1.0, 1.0, 1.0], 4, 4, None);
-        check([-3.0, -2.0, 3.0, 2.0], 4, 3, None);
-        check([1.0, -1.0, -1.0, 1.0], 100, 100, None);
-        check([-1.778, -1.0, 1.778, 1.0], 1920, 1080, None);
-        check([-1.0, -1.0, 1.0, 1.0], 640, 1, None);
-        check([-1.0, -1.0, 1.0, 1.0], 200, 100, Some([-2.0, -1.0, 2.0, 1.0]));
-        check([2.0, 0.0, 0.0, 2.0], 200, 100, Some([3.0, 0.0, -1.0, 2.0]));
     }
 }

@@ -142,7 +142,7 @@ test("the viewport's pixels are the tracer's, also after a drag", async (t) => {
   studio.check();
 });
 
-test("touching one object of each example, by the mouse, changes one line of one file", async (t) => {
+test("moving one object of each example by an arrow key changes one line of one file", async (t) => {
   for (const name of readdirSync(scenes).filter((name) => !name.includes("."))) {
     await t.test(name, async (t) => {
       const from = join(scenes, name);
