@@ -4,6 +4,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
 
+mod dice;
+
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
@@ -16,36 +18,14 @@ use rayfold_scene::{
 };
 use rayfold_tracer::{Level, Precision, RenderOptions, reference, render};
 
+use dice::Dice;
+
 /// Pixels of all pictures that rounding may put on the other side of an outline, as a share.
 const ISOLATED: f64 = 4e-4;
 
-struct Dice(fastrand::Rng);
+const SEED: u64 = 20_261_122;
 
 impl Dice {
-    fn new(test: &str) -> Self {
-        let seed =
-            std::env::var("RAYFOLD_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(20_261_122);
-        println!("{test}: RAYFOLD_SEED={seed}");
-        Self(fastrand::Rng::with_seed(seed))
-    }
-
-    fn within(&mut self, from: f64, to: f64) -> f64 {
-        from + (to - from) * self.0.f64()
-    }
-
-    fn point(&mut self, size: f64) -> DVec3 {
-        DVec3::new(self.within(-size, size), self.within(-size, size), self.within(-size, size))
-    }
-
-    fn color(&mut self) -> DVec3 {
-        self.point(0.5) + 0.5
-    }
-
-    fn material(&mut self) -> Material {
-        let mirror = if self.0.bool() { 0.6 * self.color() } else { DVec3::ZERO };
-        Material::new(0.1 * self.color(), self.color(), mirror).unwrap()
-    }
-
     /// A sphere, a box or a triangle, any of which may be a mirror.
     fn object(&mut self) -> Object {
         let at = self.point(3.0);
@@ -148,7 +128,7 @@ fn hold(scenes: &[Scene]) {
 
 #[test]
 fn skies_tones_depths_and_mirrors_of_all_kinds_are_the_references() {
-    let mut dice = Dice::new("sky");
+    let mut dice = Dice::new("sky", SEED);
     let scenes: Vec<Scene> = [0, 1, 6, 30, 90]
         .into_iter()
         .cycle()
@@ -189,7 +169,7 @@ fn placed(dice: &mut Dice, object: Object) -> Object {
 
 #[test]
 fn groups_are_the_references() {
-    let mut dice = Dice::new("groups");
+    let mut dice = Dice::new("groups", SEED);
     let scenes: Vec<Scene> = [1, 6, 30, 90]
         .into_iter()
         .cycle()
@@ -261,7 +241,7 @@ impl Dice {
 
 #[test]
 fn shapes_with_axes_of_their_own_are_the_references() {
-    let mut dice = Dice::new("bodies");
+    let mut dice = Dice::new("bodies", SEED);
     let mut scenes: Vec<Scene> = vec![];
     for (count, kinds) in [(1, 4), (1, 5), (3, 5), (8, 6), (20, 8), (40, 4), (100, 8)] {
         scenes.extend([(); 3].map(|()| dice.bodies(count, kinds)));
@@ -271,7 +251,7 @@ fn shapes_with_axes_of_their_own_are_the_references() {
 
 #[test]
 fn lamps_are_the_references() {
-    let mut dice = Dice::new("lamps");
+    let mut dice = Dice::new("lamps", SEED);
     let mut scenes: Vec<Scene> = vec![];
     for (count, kinds) in [(1, 6), (3, 6), (10, 8), (30, 8), (90, 9)] {
         scenes.extend([(); 2].map(|()| {
@@ -328,7 +308,7 @@ impl Dice {
 
 #[test]
 fn highlights_and_patterns_are_the_references() {
-    let mut dice = Dice::new("finishes");
+    let mut dice = Dice::new("finishes", SEED);
     let mut scenes: Vec<Scene> = vec![];
     for count in [1, 3, 10, 30, 90] {
         scenes.extend([(); 2].map(|()| {
@@ -452,7 +432,7 @@ fn edges_of_bodies_and_lamps_are_where_the_reference_has_them() {
 
 #[test]
 fn a_power_of_two_changes_no_byte() {
-    let mut dice = Dice::new("powers");
+    let mut dice = Dice::new("powers", SEED);
     for count in [1, 5, 20] {
         let objects: Vec<Object> = (0..count).map(|_| dice.body(8)).collect();
         let scene = dice.scene(objects);

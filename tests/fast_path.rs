@@ -4,6 +4,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
 
+mod dice;
+
 use std::path::Path;
 
 use glam::{DVec2, DVec3};
@@ -14,36 +16,14 @@ use rayfold_scene::{
 };
 use rayfold_tracer::{Level, Precision, RenderOptions, reference, render};
 
+use dice::Dice;
+
 /// Pixels of a picture that rounding may put on the other side of an outline, as a share.
 const ISOLATED: f64 = 1e-4;
 
-struct Dice(fastrand::Rng);
+const SEED: u64 = 20_261_121;
 
 impl Dice {
-    fn new(test: &str) -> Self {
-        let seed =
-            std::env::var("RAYFOLD_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(20_261_121);
-        println!("{test}: RAYFOLD_SEED={seed}");
-        Self(fastrand::Rng::with_seed(seed))
-    }
-
-    fn within(&mut self, from: f64, to: f64) -> f64 {
-        from + (to - from) * self.0.f64()
-    }
-
-    fn point(&mut self, size: f64) -> DVec3 {
-        DVec3::new(self.within(-size, size), self.within(-size, size), self.within(-size, size))
-    }
-
-    fn color(&mut self) -> DVec3 {
-        self.point(0.5) + 0.5
-    }
-
-    fn material(&mut self) -> Material {
-        let mirror = if self.0.bool() { 0.6 * self.color() } else { DVec3::ZERO };
-        Material::new(0.1 * self.color(), self.color(), mirror).unwrap()
-    }
-
     fn object(&mut self, kinds: u8) -> Object {
         let at = self.point(3.0);
         let material = self.material();
@@ -112,7 +92,7 @@ fn levels() -> Vec<(&'static str, Level)> {
 #[test]
 fn widths_with_fused_multiply_add_agree_bit_for_bit_and_others_but_for_isolated_pixels() {
     let (mut differ, mut pixels) = (0.0, 0.0);
-    for scene in Dice::new("widths").scenes() {
+    for scene in Dice::new("widths", SEED).scenes() {
         for precision in [Precision::F32, Precision::F64] {
             let options = RenderOptions { precision, ..Default::default() };
             let best = draw(&scene, options);
@@ -249,7 +229,7 @@ fn a_ray_that_starts_on_a_sphere_sees_it_from_within() {
 
 #[test]
 fn tiles_trees_and_threads_cannot_be_seen() {
-    for scene in Dice::new("tiles").scenes() {
+    for scene in Dice::new("tiles", SEED).scenes() {
         for precision in [Precision::F32, Precision::F64] {
             let options = RenderOptions { precision, ..Default::default() };
             let expected = draw(&scene, options);
@@ -271,7 +251,7 @@ fn tiles_trees_and_threads_cannot_be_seen() {
 
 #[test]
 fn the_reference_draws_the_same() {
-    let mut dice = Dice::new("reference");
+    let mut dice = Dice::new("reference", SEED);
     let mut scenes = dice.scenes();
     let orthographic = |scene: &Scene| {
         let mut scene = scene.clone();

@@ -2,19 +2,12 @@
 //!
 //! After a deliberate change `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews what is expected.
 
-use expect_test::{Expect, expect};
-use rayfold_scene::{Limits, parse};
+mod told;
 
-fn check(script: &str, expect: Expect) {
-    check_limited(script, Limits::default(), expect);
-}
+use expect_test::expect;
+use rayfold_scene::Limits;
 
-fn check_limited(script: &str, limits: Limits, expect: Expect) {
-    let parsed = parse("a.txt", script.as_bytes(), &limits);
-    assert_eq!(parsed.script.is_some(), !parsed.diagnostics.iter().any(|d| d.is_error()));
-    let shown: Vec<_> = parsed.diagnostics.iter().map(|d| d.render(false)).collect();
-    expect.assert_eq(&shown.join("\n\n"));
-}
+use told::{check, check_limited};
 
 #[test]
 fn a_radius_that_is_negative_at_a_frame() {

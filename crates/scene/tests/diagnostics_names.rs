@@ -2,19 +2,12 @@
 //!
 //! After a deliberate change `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews what is expected.
 
-use expect_test::{Expect, expect};
-use rayfold_scene::{Limits, parse};
+mod told;
 
-fn check(script: &str, expect: Expect) {
-    check_limited(script, Limits::default(), expect);
-}
+use expect_test::expect;
+use rayfold_scene::Limits;
 
-fn check_limited(script: &str, limits: Limits, expect: Expect) {
-    let parsed = parse("a.txt", script.as_bytes(), &limits);
-    assert_eq!(parsed.script.is_some(), !parsed.diagnostics.iter().any(|d| d.is_error()));
-    let shown: Vec<_> = parsed.diagnostics.iter().map(|d| d.render(false)).collect();
-    expect.assert_eq(&shown.join("\n\n"));
-}
+use told::{check, check_limited};
 
 #[test]
 fn a_material_that_is_not_there() {
@@ -506,7 +499,7 @@ fn a_chain_of_doublings_is_counted_not_drawn() {
         script += &format!("Group g{k}\nUse g{}\nUse g{}\nEnd\n", k - 1, k - 1);
     }
     check(
-        &format!("{script}Use g21\nUse g22\nUse g70\nTrace"),
+        format!("{script}Use g21\nUse g22\nUse g70\nTrace"),
         expect![[r#"
             error: more than 4,000,000 objects in a scene
                --> a.txt:286:1
@@ -521,7 +514,7 @@ fn a_chain_of_doublings_is_counted_not_drawn() {
                 | ^^^ expected at most 16,000,000, with this there are many more"#]],
     );
     check(
-        &format!("{script}Use g70\nTrace"),
+        format!("{script}Use g70\nTrace"),
         expect![[r#"
             error: more than 4,000,000 objects in a scene
                --> a.txt:285:1
@@ -546,7 +539,7 @@ fn a_long_chain_of_groups_is_counted_too() {
     let uses = "Use g1000\n".repeat(5);
     let limits = Limits { max_objects: 1000, ..Limits::default() };
     check_limited(
-        &format!("{script}{uses}Trace"),
+        format!("{script}{uses}Trace"),
         limits,
         expect![[r#"
         error: more than 4,000 groups drawn in a scene
