@@ -7,8 +7,8 @@ use std::ops::RangeInclusive;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use rayfold_scene::{AnimationSettings, Limits, SETTINGS_FILE, Scene, Screen, Script};
-use rayfold_tracer::Precision;
+use rayfold_scene::{AnimationSettings, Limits, SETTINGS_FILE, Samples, Scene, Screen, Script};
+use rayfold_tracer::{Exposure, Precision};
 
 use crate::console::Console;
 use crate::input::{Input, ScriptFile};
@@ -30,6 +30,7 @@ pub(crate) struct Plan {
     parts: Vec<Part>,
     limits: Limits,
     size: Option<Screen>,
+    samples: Option<Samples>,
     selected: RangeInclusive<u64>,
     /// What the folder says about the animation.
     pub(crate) settings: AnimationSettings,
@@ -69,6 +70,8 @@ struct Shape {
 pub(crate) struct Wishes {
     /// Draw them in this size.
     pub(crate) size: Option<Screen>,
+    /// Draw so many rays a pixel, whatever the scripts say.
+    pub(crate) samples: Option<Samples>,
     /// First and last frame; beyond the ends of what there is, when they are not given.
     pub(crate) frames: (Option<u64>, Option<u64>),
     /// The numbers to compute with.
@@ -165,6 +168,7 @@ impl Plan {
             parts,
             limits: *limits,
             size: wishes.size,
+            samples: wishes.samples,
             selected: first..=last,
             settings,
             precision: wishes.precision,
@@ -239,7 +243,24 @@ impl Plan {
         if let Some(size) = self.size {
             scene.screen = size;
         }
+        if let Some(samples) = self.samples {
+            scene.samples = samples;
+        }
         Ok(scene)
+    }
+
+    /// Draws a frame with `draw`, which gets it as it is in the middle of its exposure, and at other moments.
+    ///
+    /// # Errors
+    /// Those of [`Self::scene`].
+    pub(crate) fn expose<T>(&self, job: &Job, draw: impl FnOnce(Exposure) -> T) -> anyhow::Result<T> {
+        let scene = self.scene(job)?;
+        let script = self.parts[job.part].script(&self.limits)?;
+        let after = |frames: f64| Scene {
+            screen: scene.screen,
+            ..script.frame_after(job.index, frames).unwrap_or_else(|| scene.clone())
+        };
+        Ok(draw(Exposure::moving(&scene, &after)))
     }
 
     /// The script of a frame, as messages name it.

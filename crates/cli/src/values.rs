@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use rayfold_scene::Screen;
+use rayfold_scene::{Samples, Screen};
 
 /// A whole number of `1` or more.
 ///
@@ -54,6 +54,21 @@ pub(crate) fn hundredths(text: &str) -> Result<u16, String> {
     let value = text.parse::<f64>().map_err(|_| expected)? * 100.0;
     // Players slow a delay below two hundredths down to ten.
     if (2.0..=65_535.0).contains(&value.round()) { Ok(value.round() as u16) } else { Err(expected.into()) }
+}
+
+/// Rays a pixel and the error that is aimed at, as `64` or `64,0.5`.
+///
+/// # Errors
+/// What was expected.
+pub(crate) fn samples(text: &str) -> Result<Samples, String> {
+    let expected =
+        "expected rays a pixel, 1 or more, and after a comma the error in levels, such as 64 or 64,0.5";
+    let (most, error) = match text.split_once(',') {
+        Some((most, error)) => (most, error.parse().ok()),
+        None => (text, Some(Samples::default().error())),
+    };
+    let (most, error) = most.parse().ok().zip(error).ok_or(expected)?;
+    Samples::new(most, error).map_err(|_| expected.into())
 }
 
 /// Width and height, as `640x480`.

@@ -11,7 +11,7 @@ use rayfold_pipeline::keys::{Part, ScriptName};
 use rayfold_pipeline::manifest::Reason;
 use rayfold_pipeline::{Drawing, Error, Renderer, Result};
 use rayfold_scene::Limits;
-use rayfold_tracer::{RenderError, RenderOptions};
+use rayfold_tracer::{Exposure, RenderError, RenderOptions};
 
 use crate::{png, pool};
 
@@ -60,7 +60,9 @@ fn draw(file: &str, script: &[u8], part: Part, limits: &Limits, cancel: &AtomicB
     let Some(scene) = script.frame(place) else {
         return Ok(Drawing::Fault(Reason::new(format!("{file} has {count} frames, no frame {number}"))));
     };
-    match rayfold_tracer::render(&scene, &RenderOptions { cancel: Some(cancel), ..Default::default() }) {
+    let after = |frames| script.frame_after(place, frames).unwrap_or_else(|| scene.clone());
+    let options = RenderOptions { cancel: Some(cancel), ..Default::default() };
+    match rayfold_tracer::render_exposed(Exposure::moving(&scene, &after), &options) {
         Ok(image) => match png::encode(&image) {
             Ok(frame) => Ok(Drawing::Frame(frame)),
             Err(source) => Err(Error::Malformed { key: "the drawn frame".to_owned(), source: source.into() }),

@@ -89,8 +89,6 @@ pub enum Code {
     UnclosedGroup,
     /// A picture that is wider or narrower than what it shows.
     SquashedImage,
-    /// Something of the language that pictures do not show yet.
-    NotDrawnYet,
     /// More faults than are described one by one.
     TooManyFaults,
     /// Settings that are not JSON, or not an object.

@@ -563,17 +563,3 @@ fn more_frames_than_can_be_looked_at() {
               = help: split the frames among several scripts"#]],
     );
 }
-
-/// The language has them before the pictures do, and a picture that is sharp unasked would be a riddle.
-#[test]
-fn samples_that_are_not_drawn_yet() {
-    check(
-        "Screen 4 3\nSamples 1\nTrace\nSamples 16 .5\nTrace\nTrace\nSamples 4\nSamples 1\nTrace",
-        expect![[r#"
-            warning: this version draws one ray a pixel, whatever is asked for
-             --> a.txt:4:1
-              |
-            4 | Samples 16 .5
-              | ^^^^^^^ expected `Samples 1`, or edges, shadows, lens and motion will be sharp"#]],
-    );
-}

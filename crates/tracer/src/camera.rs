@@ -21,17 +21,21 @@ pub(crate) struct Ray {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Axis {
     pub(crate) start: f64,
-    /// From one sample to the next; 0 if there is only one.
+    /// From one sample to the next; 0 if there is only one, and its pixel is a point.
     pub(crate) step: f64,
 }
 
 impl Axis {
-    /// From the first of so many samples to the last; a single one lies in the middle.
-    fn between(from: f64, to: f64, samples: u32) -> Self {
-        if samples == 1 {
-            Self { start: 0.5 * from + 0.5 * to, step: 0.0 }
+    /// From the first of so many pixels to the last; a single one lies in the middle.
+    fn between(from: f64, to: f64, pixels: u32, single: Single) -> Self {
+        if pixels == 1 {
+            let step = match single {
+                Single::IsAPoint => 0.0,
+                Single::IsAll => to - from,
+            };
+            Self { start: 0.5 * from + 0.5 * to, step }
         } else {
-            Self { start: from, step: (to - from) / f64::from(samples - 1) }
+            Self { start: from, step: (to - from) / f64::from(pixels - 1) }
         }
     }
 
@@ -46,12 +50,27 @@ impl Axis {
     }
 }
 
+/// What a pixel is that is the only one of its row or column: where pixels are points, the middle; where they have an
+/// extent, all of the window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Single {
+    IsAPoint,
+    IsAll,
+}
+
+impl Single {
+    /// As the scene is drawn.
+    pub(crate) fn of(scene: &Scene) -> Self {
+        if scene.samples.most() > 1 { Self::IsAll } else { Self::IsAPoint }
+    }
+}
+
 /// The samples of an image in a window from its lower left to its upper right corner: the columns from the left, the rows
 /// from the bottom.
-pub(crate) fn grid(lower_left: DVec2, upper_right: DVec2, screen: Screen) -> (Axis, Axis) {
+pub(crate) fn grid(lower_left: DVec2, upper_right: DVec2, screen: Screen, single: Single) -> (Axis, Axis) {
     (
-        Axis::between(lower_left.x, upper_right.x, screen.width()),
-        Axis::between(lower_left.y, upper_right.y, screen.height()),
+        Axis::between(lower_left.x, upper_right.x, screen.width(), single),
+        Axis::between(lower_left.y, upper_right.y, screen.height(), single),
     )
 }
 
@@ -74,7 +93,7 @@ fn half_angle_slope(degrees: f64) -> f64 {
 /// The ray of column `i` from the left and row `j` from the bottom, which may be fractions: its origin, and its direction
 /// of length 1.
 pub fn pixel_ray(scene: &Scene, i: f64, j: f64) -> (DVec3, DVec3) {
-    let Ray { origin, direction } = Rays::new(&scene.camera, scene.screen).ray(i, j);
+    let Ray { origin, direction } = Rays::new(&scene.camera, scene.screen, Single::of(scene)).ray(i, j);
     (origin, direction)
 }
 
@@ -92,7 +111,7 @@ pub(crate) enum Rays {
 }
 
 impl Rays {
-    pub(crate) fn new(camera: &Camera, screen: Screen) -> Self {
+    pub(crate) fn new(camera: &Camera, screen: Screen, single: Single) -> Self {
         let pinhole = match camera {
             Camera::Orthographic => return Self::Parallel,
             Camera::Look(look) => {
@@ -108,7 +127,7 @@ impl Rays {
         let (a, b, distance) = (pinhole.lower_left(), pinhole.upper_right(), pinhole.distance());
         let scale = below_inverse(a.abs().max(b.abs()).max_element().max(distance));
         let (a, b, distance) = (a * scale, b * scale, (distance * scale).max(f64::MIN_POSITIVE));
-        let (x, y) = grid(a, b, screen);
+        let (x, y) = grid(a, b, screen, single);
         Self::Pinhole {
             eye: pinhole.eye(),
             corner: x.start * u + y.start * v - distance * w,
@@ -152,7 +171,8 @@ mod tests {
     #[test]
     fn samples_sit_on_the_corners_of_the_window() {
         let screen = Screen::new(3, 2).unwrap();
-        let rays = Rays::new(&pinhole(DVec2::new(-1.0, -2.0), DVec2::new(1.0, 2.0)), screen);
+        let rays =
+            Rays::new(&pinhole(DVec2::new(-1.0, -2.0), DVec2::new(1.0, 2.0)), screen, Single::IsAPoint);
         assert_eq!(rays.ray(0.0, 0.0).direction, unit(DVec3::new(-1.0, -2.0, -1.0)));
         assert_eq!(rays.ray(2.0, 1.0).direction, unit(DVec3::new(1.0, 2.0, -1.0)));
         assert_eq!(rays.ray(1.0, 1.0).direction, unit(DVec3::new(0.0, 2.0, -1.0)));
@@ -161,17 +181,18 @@ mod tests {
     #[test]
     fn between_two_pixels_lie_fractions() {
         let screen = Screen::new(3, 2).unwrap();
-        let rays = Rays::new(&pinhole(DVec2::new(-1.0, -2.0), DVec2::new(1.0, 2.0)), screen);
+        let rays =
+            Rays::new(&pinhole(DVec2::new(-1.0, -2.0), DVec2::new(1.0, 2.0)), screen, Single::IsAPoint);
         assert_eq!(rays.ray(1.5, 0.25).direction, unit(DVec3::new(0.5, -1.0, -1.0)));
         assert_eq!(rays.ray(-0.5, 1.5).direction, unit(DVec3::new(-1.5, 4.0, -1.0)));
-        let parallel = Rays::new(&Camera::Orthographic, screen);
+        let parallel = Rays::new(&Camera::Orthographic, screen, Single::IsAPoint);
         assert_eq!(parallel.ray(1.5, 0.25).origin, DVec3::new(1.5, 0.25, 0.0));
     }
 
     #[test]
     fn rays_of_a_look_go_through_square_pixels() {
         let look = Look::new(DVec3::Z, DVec3::ZERO, 90.0, None).unwrap();
-        let rays = Rays::new(&Camera::Look(look), Screen::new(4, 2).unwrap());
+        let rays = Rays::new(&Camera::Look(look), Screen::new(4, 2).unwrap(), Single::IsAPoint);
         let check = |i: f64, j: f64, x: f64, y: f64| {
             let expected = unit(DVec3::new(x, y, -1.0));
             assert!((rays.ray(i, j).direction - expected).length() < 1e-15, "{i} {j}");
@@ -188,8 +209,11 @@ mod tests {
 
     #[test]
     fn a_single_sample_is_the_middle() {
-        let rays =
-            Rays::new(&pinhole(DVec2::new(1.0, 3.0), DVec2::new(2.0, 5.0)), Screen::new(1, 1).unwrap());
+        let rays = Rays::new(
+            &pinhole(DVec2::new(1.0, 3.0), DVec2::new(2.0, 5.0)),
+            Screen::new(1, 1).unwrap(),
+            Single::IsAPoint,
+        );
         assert_eq!(rays.ray(0.0, 0.0).direction, unit(DVec3::new(1.5, 4.0, -1.0)));
     }
 
@@ -199,7 +223,7 @@ mod tests {
         for (distance, half, expected) in [(1e-300, 1e300, DVec2::ONE), (1e300, 1e-300, DVec2::ZERO)] {
             let half = DVec2::splat(half);
             let camera = Pinhole::new(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, distance, -half, half).unwrap();
-            let rays = Rays::new(&Camera::Pinhole(camera), screen);
+            let rays = Rays::new(&Camera::Pinhole(camera), screen, Single::IsAPoint);
             assert_eq!(rays.ray(1.0, 1.0).direction, DVec3::NEG_Z);
             let corner = rays.ray(2.0, 2.0).direction;
             assert!((corner.truncate() - expected.normalize_or_zero()).length() < 1e-15, "{corner}");
@@ -209,7 +233,8 @@ mod tests {
     #[test]
     fn swapped_corners_mirror_the_image() {
         let screen = Screen::new(2, 2).unwrap();
-        let rays = Rays::new(&pinhole(DVec2::new(1.0, -1.0), DVec2::new(-1.0, 1.0)), screen);
+        let rays =
+            Rays::new(&pinhole(DVec2::new(1.0, -1.0), DVec2::new(-1.0, 1.0)), screen, Single::IsAPoint);
         assert!(rays.ray(0.0, 0.0).direction.x > 0.0 && rays.ray(1.0, 0.0).direction.x < 0.0);
     }
 }

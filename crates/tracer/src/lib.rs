@@ -17,14 +17,17 @@
 //! ```
 
 mod camera;
+mod exposure;
 mod fast;
 #[cfg(feature = "accuracy")]
 mod nans;
 mod parallel;
 pub mod reference;
+mod sampling;
 mod scale;
 
 pub use camera::pixel_ray;
+pub use exposure::Exposure;
 pub use fast::{Drawing, probe};
 #[cfg(feature = "accuracy")]
 pub use nans::take as take_nans;
@@ -115,6 +118,14 @@ pub fn precision(scene: &Scene) -> Precision {
 /// When the rendering was cancelled or the image cannot be held in memory.
 pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     Drawing::new(scene, options)?.draw()
+}
+
+/// Draws a scene that may move while the shutter is open, on the current rayon pool.
+///
+/// # Errors
+/// Those of [`render`].
+pub fn render_exposed(exposure: Exposure, options: &RenderOptions) -> Result<RgbImage, RenderError> {
+    Drawing::exposed(exposure, options)?.draw()
 }
 
 /// As [`render`] in single precision, by textbook formulas without any regard for rounding: what robustness is measured

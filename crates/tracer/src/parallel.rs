@@ -31,6 +31,26 @@ pub(crate) fn bands<T>(
     scratch: impl Fn() -> T + Send + Sync,
     draw: impl Fn(&mut T, u32, &mut [u8]) + Sync,
 ) -> Result<RgbImage, RenderError> {
+    let mut rows_drawn = Ok(());
+    let image = image(screen, |buffer| {
+        let band = (screen.width() as usize).saturating_mul(rows as usize).saturating_mul(CHANNELS);
+        rows_drawn =
+            buffer.par_chunks_mut(band).enumerate().try_for_each_init(scratch, |scratch, (index, band)| {
+                if options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+                    return Err(RenderError::Cancelled);
+                }
+                draw(scratch, index as u32 * rows, band);
+                Ok(())
+            });
+    })?;
+    rows_drawn.map(|()| image)
+}
+
+/// An image whose bytes `draw` fills.
+///
+/// # Errors
+/// When it cannot be held in memory.
+pub(crate) fn image(screen: Screen, draw: impl FnOnce(&mut [u8])) -> Result<RgbImage, RenderError> {
     let (width, height) = (screen.width(), screen.height());
     let too_large = || RenderError::TooLarge { width, height };
     let pixels = usize::try_from(screen.pixels()).map_err(|_| too_large())?;
@@ -38,13 +58,6 @@ pub(crate) fn bands<T>(
     let mut buffer = Vec::new();
     buffer.try_reserve_exact(bytes).map_err(|_| too_large())?;
     buffer.resize(bytes, 0);
-    let band = (width as usize).saturating_mul(rows as usize).saturating_mul(CHANNELS);
-    buffer.par_chunks_mut(band).enumerate().try_for_each_init(scratch, |scratch, (index, band)| {
-        if options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
-            return Err(RenderError::Cancelled);
-        }
-        draw(scratch, index as u32 * rows, band);
-        Ok(())
-    })?;
+    draw(&mut buffer);
     RgbImage::from_raw(width, height, buffer).ok_or_else(too_large)
 }

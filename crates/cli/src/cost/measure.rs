@@ -9,7 +9,7 @@ use rayfold_scene::{Limits, Screen};
 use crate::console::Console;
 use crate::input::Input;
 use crate::plan::{Plan, Wishes};
-use crate::render::draw_scene;
+use crate::render::draw;
 use crate::render::target::Format;
 use crate::wording::{Size, number};
 
@@ -50,18 +50,17 @@ pub(super) fn measure(input: &[PathBuf], memory_mb: f64, console: &Console) -> a
     };
     let (frames, size) = (plan.len(), plan.one_size()?);
     let step = frames.div_ceil(SAMPLES).max(1);
-    let scenes = plan.jobs().step_by(usize::try_from(step)?).map(|job| plan.scene(&job));
-    let scenes = scenes.collect::<anyhow::Result<Vec<_>>>()?;
+    let jobs: Vec<_> = plan.jobs().step_by(usize::try_from(step)?).collect();
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let one_thread = one_thread.context("cannot start a thread")?;
     let (seconds, bytes) = one_thread.install(|| {
         let (mut seconds, mut bytes) = (0.0, 0);
-        for scene in &scenes {
+        for job in &jobs {
             // The shorter of two tries: whatever else the machine does makes it longer, never shorter.
             let mut shortest = f64::INFINITY;
             for _ in 0..TRIES {
                 let start = Instant::now();
-                let file = Format::Png.encode(&draw_scene(scene, plan.precision)?)?;
+                let file = Format::Png.encode(&draw(&plan, job)?)?;
                 shortest = shortest.min(start.elapsed().as_secs_f64());
                 bytes += file.len();
             }
@@ -69,13 +68,13 @@ pub(super) fn measure(input: &[PathBuf], memory_mb: f64, console: &Console) -> a
         }
         anyhow::Ok((seconds, bytes / TRIES))
     })?;
-    let drawing_ms = 1e3 * seconds / scenes.len() as f64;
-    let bytes = bytes as f64 / scenes.len() as f64;
+    let drawing_ms = 1e3 * seconds / jobs.len() as f64;
+    let bytes = bytes as f64 / jobs.len() as f64;
     let waiting_ms = waiting_ms(frames as f64);
     console.note(format_args!(
         "drawn here on one thread: {} of {frames}, {drawing_ms:.1} ms each, a PNG of {} each; requests and pauses add \
          {waiting_ms:.0} ms",
-        number(scenes.len() as u64, "frame"),
+        number(jobs.len() as u64, "frame"),
         Size(bytes as u64)
     ));
     let ms = drawing_ms * PROCESSOR_MB / memory_mb + waiting_ms;

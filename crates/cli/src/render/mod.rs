@@ -10,7 +10,7 @@ use anyhow::Context;
 use clap::ValueEnum;
 use image::RgbImage;
 use rayfold_gif::Plays;
-use rayfold_scene::{AnimationSettings, Camera, Limits, Scene, Screen};
+use rayfold_scene::{AnimationSettings, Camera, Limits, Samples, Screen};
 use rayfold_tracer::{Precision, RenderOptions};
 
 use crate::ahead;
@@ -75,6 +75,9 @@ pub(crate) struct Args {
     /// Draw frame N, or frames A to B, counted from 1
     #[arg(long, value_name = "N|A..B", value_parser = parse_frames)]
     frame: Option<Frames>,
+    /// Draw at most N rays a pixel, fewer where the error is below E levels [default: 1], instead of what Samples says
+    #[arg(long, value_name = "N[,E]", value_parser = values::samples)]
+    samples: Option<Samples>,
     /// Leave frames that are there already, whole and of the right size: goes on where Ctrl-C stopped. Files of scripts
     /// that have changed since are left, too
     #[arg(long, conflicts_with = "watch")]
@@ -166,8 +169,12 @@ fn check(args: &Args, target: &Target) -> Result<(), Usage> {
 }
 
 fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<()> {
-    let wishes =
-        Wishes { size: args.size, frames: args.frame.unwrap_or_default(), precision: args.precision.into() };
+    let wishes = Wishes {
+        size: args.size,
+        samples: args.samples,
+        frames: args.frame.unwrap_or_default(),
+        precision: args.precision.into(),
+    };
     match target {
         Target::Animation(_, Place::File(path)) | Target::Image(path, _) => probe(path)?,
         Target::Animation(_, Place::StandardOutput) => {}
@@ -331,19 +338,16 @@ fn is_drawn(path: &Path, format: Format, screen: Screen) -> bool {
     image.is_some_and(|image| image.dimensions() == (screen.width(), screen.height()))
 }
 
-fn draw(plan: &Plan, job: &Job) -> anyhow::Result<RgbImage> {
-    draw_scene(&plan.scene(job)?, plan.precision)
-        .with_context(|| format!("cannot render frame {} ({})", job.number, plan.name(job)))
-}
-
-/// Draws a scene, unless the run was told to stop.
+/// Draws a frame, unless the run was told to stop.
 ///
 /// # Errors
 /// When it was, and those of the renderer.
-pub(crate) fn draw_scene(scene: &Scene, precision: Precision) -> anyhow::Result<RgbImage> {
+pub(crate) fn draw(plan: &Plan, job: &Job) -> anyhow::Result<RgbImage> {
     anyhow::ensure!(!interrupt::stopping(), "interrupted");
-    let options = RenderOptions { cancel: Some(interrupt::flag()), precision, ..Default::default() };
-    Ok(rayfold_tracer::render(scene, &options)?)
+    let options =
+        RenderOptions { cancel: Some(interrupt::flag()), precision: plan.precision, ..Default::default() };
+    plan.expose(job, |exposure| rayfold_tracer::render_exposed(exposure, &options))?
+        .with_context(|| format!("cannot render frame {} ({})", job.number, plan.name(job)))
 }
 
 fn parse_frames(text: &str) -> Result<Frames, String> {

@@ -78,6 +78,11 @@ impl Look {
         0.5 * self.target - 0.5 * self.eye
     }
 
+    /// From the eye to the target, in world units.
+    pub fn distance(&self) -> f64 {
+        2.0 * self.gaze().length()
+    }
+
     /// View-up, of any length.
     pub fn up(&self) -> DVec3 {
         let gaze = self.gaze();

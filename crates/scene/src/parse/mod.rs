@@ -216,7 +216,6 @@ impl<'a> Parser<'a> {
             Act::Background => self.background(s),
             Act::Lens => self.lens(s),
             Act::Samples => {
-                self.picture.samples_set(s);
                 self.set(s, |recorder, samples| recorder.samples = samples);
             }
             Act::Shutter => self.set(s, |recorder, shutter| recorder.shutter = shutter),

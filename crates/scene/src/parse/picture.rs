@@ -21,8 +21,6 @@ pub(super) struct Picture<'a> {
     has_camera: bool,
     /// A lens with a radius that no picture was drawn with.
     lens: Option<(Line<'a>, Range<usize>)>,
-    /// More than one ray a pixel, which no picture was asked for yet.
-    samples: Option<(Line<'a>, Range<usize>)>,
 }
 
 impl<'a> Picture<'a> {
@@ -61,19 +59,12 @@ impl<'a> Picture<'a> {
         self.lens = (!is_point).then(|| s.place());
     }
 
-    pub(super) fn samples_set(&mut self, s: &Statement<'a>) {
-        self.samples = (s.values[0] > 1.0).then(|| s.place());
-    }
-
     /// What is odd about the picture that is drawn now, each thing once.
     pub(super) fn check(&mut self, screen: Screen, report: &mut Report<'a>) {
         if (self.is_orthographic || !self.has_camera)
             && let Some((line, span)) = self.lens.take()
         {
             report.warning(line, span, wording::lens_without_effect);
-        }
-        if let Some((line, span)) = self.samples.take() {
-            report.warning(line, span, wording::samples_not_drawn);
         }
         if std::mem::replace(&mut self.is_compared, true) {
             return;

@@ -429,11 +429,6 @@ pub(super) fn lens_without_effect() -> Fault {
         .expected("expected a `Look` or `Camera` beside this")
 }
 
-pub(super) fn samples_not_drawn() -> Fault {
-    Fault::new(Code::NotDrawnYet, "this version draws one ray a pixel, whatever is asked for")
-        .expected("expected `Samples 1`, or edges, shadows, lens and motion will be sharp")
-}
-
 /// `better` is a window that would not.
 pub(super) fn squashed(screen: Screen, better: [f64; 4]) -> Fault {
     let better: Vec<_> = better.iter().map(|x| short(*x)).collect();

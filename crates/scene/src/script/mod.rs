@@ -188,6 +188,14 @@ impl Script {
         Some(self.scene(shot, time).map_err(|faults| faults.0[0]))
     }
 
+    /// Frame `k`, counted from 0, so many frames after the middle of its exposure (before it, if negative): within half of
+    /// the shutter's share. Where several numbers do not keep together what they must at that very moment, the frame as it is
+    /// in the middle. `None` beyond the last frame.
+    pub fn frame_after(&self, k: usize, frames: f64) -> Option<Scene> {
+        let (shot, number) = self.shot_of(k)?;
+        self.scene(shot, number + frames).or_else(|_| self.scene(shot, number)).ok()
+    }
+
     /// The scenes of all frames in order, each made when the iterator comes to it.
     pub fn frames(&self) -> impl DoubleEndedIterator<Item = Scene> + ExactSizeIterator + '_ {
         (0..self.frame_count()).map(|k| {

@@ -12,14 +12,16 @@ use rayfold_scene::{Camera, Lamp, Light, Object, Scene, Screen};
 
 use super::bodies;
 use super::bounds::{Bounds, join};
+use super::lens::Lens;
 use super::lights::lamp::Place;
 use super::lights::sun::Direction;
 use super::placed::Placed;
 use super::shapes::{Shape, Solid, reach};
 use super::tree::{Branches, group};
 use crate::RenderError;
-use crate::camera::{Axis, grid, look_grid};
+use crate::camera::{Axis, Single, grid, look_grid};
 use crate::parallel::map;
+use crate::sampling::places::spread;
 use crate::scale::below_inverse;
 
 /// Where the rays of the pixels come from.
@@ -44,6 +46,8 @@ pub(super) struct Geometry {
     pub(super) bodies: Vec<bodies::Solid>,
     pub(super) suns: Vec<Direction>,
     pub(super) lamps: Vec<Place>,
+    /// Where rays start, if not at the eye alone: in pictures of several samples a pixel.
+    pub(super) lens: Option<Lens>,
     /// Whether surfaces have more than coefficients.
     pub(super) is_finished: bool,
     /// A length of the scene times this is a length in here.
@@ -68,8 +72,11 @@ impl Geometry {
         let has_bodies = scene.objects.iter().any(is_body);
         let of_bodies =
             scene.objects.iter().filter(|_| has_bodies).map(|object| bodies::reach(object, center));
-        let of_lamps = lamps(scene).map(|lamp| (lamp.position() - center).abs().max_element());
-        let reach = of_bodies.chain(of_lamps).fold(reach, f64::max);
+        let of_lamps =
+            lamps(scene).map(|lamp| (lamp.position() - center).abs().max_element() + lamp.radius());
+        let lens = Lens::of(scene);
+        let of_lens = lens.map(|lens| lens.radius);
+        let reach = of_bodies.chain(of_lamps).chain(of_lens).fold(reach, f64::max);
         let reach = match scene.camera {
             Camera::Pinhole(_) | Camera::Look(_) => reach,
             Camera::Orthographic => reach.max(center.max_element()),
@@ -90,9 +97,11 @@ impl Geometry {
             orders.filter_map(|(object, order)| bodies::body(object, order, center, scale)).collect();
         let lamps = lamps(scene).map(|lamp| Place::new(lamp, center, scale)).collect();
         let suns = scene.lights.iter().filter_map(|light| match light {
-            Light::Directional(light) => {
-                Some(Direction { towards: -unit(light.direction()), color: light.color() })
-            }
+            Light::Directional(light) => Some(Direction {
+                towards: -unit(light.direction()),
+                color: light.color(),
+                spread: spread(light.angle()),
+            }),
             Light::Lamp(_) => None,
         });
         Ok(Self {
@@ -102,6 +111,7 @@ impl Geometry {
             bodies,
             suns: suns.collect(),
             lamps,
+            lens: lens.map(|lens| lens.scaled(scale)),
             is_finished,
             scale,
             center,
@@ -150,7 +160,7 @@ fn view(scene: &Scene, scale: f64) -> View {
             let (right, up, back) = pinhole.basis();
             let from = pinhole.lower_left() / pinhole.distance();
             let to = pinhole.upper_right() / pinhole.distance();
-            let (x, y) = grid(from, to, scene.screen);
+            let (x, y) = grid(from, to, scene.screen, Single::of(scene));
             View::Pinhole { right, up, back, x, y }
         }
         Camera::Look(look) => {

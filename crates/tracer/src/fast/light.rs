@@ -19,12 +19,12 @@ use super::search::{nearest, unoccluded};
 /// What can stand in the way of each sun.
 #[derive(Default)]
 pub(super) struct InTheWay {
-    of: Vec<Obstacles>,
+    pub(super) of: Vec<Obstacles>,
     seen: Seen,
 }
 
 #[derive(Default)]
-struct Obstacles {
+pub(super) struct Obstacles {
     /// In a scene without a tree.
     masks: Masks,
     /// In one with a tree, if it is not too long.
@@ -35,7 +35,7 @@ struct Obstacles {
 impl Obstacles {
     /// Where to look for them, but for the spheres whose bits are not among the `others`.
     #[inline(always)]
-    fn candidates(&self, others: u64, kinds: ByKind<bool>) -> Candidates<'_> {
+    pub(super) fn candidates(&self, others: u64, kinds: ByKind<bool>) -> Candidates<'_> {
         let list = self.is_listed.then_some(&self.list);
         Candidates { masks: self.masks.and_spheres(others), list, kinds }
     }
@@ -199,7 +199,7 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>
 
 /// The box of the points that wait for light; there is at least one.
 #[inline(always)]
-fn region<S: Simd, E: Real>(simd: S, hits: &Hits<E>) -> ([E; 3], [E; 3]) {
+pub(super) fn region<S: Simd, E: Real>(simd: S, hits: &Hits<E>) -> ([E; 3], [E; 3]) {
     let far = constant::<S, E>(simd, E::FAR);
     let near = constant::<S, E>(simd, -E::FAR);
     let mut low = Vec3::<S, E>::new(far, far, far);

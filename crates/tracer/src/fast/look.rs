@@ -87,7 +87,7 @@ pub(super) fn aim_along_axis<S: Simd, E: Real>(
     simd.vectorize(
         #[inline(always)]
         || {
-            let (zero, one) = (E::narrow(0.0), E::narrow(1.0));
+            let one = E::narrow(1.0);
             each_packet::<S, E>(
                 simd,
                 (tile, band),
@@ -95,7 +95,7 @@ pub(super) fn aim_along_axis<S: Simd, E: Real>(
                 |at, i, j| {
                     let end = at + Lanes::<S, E>::LEN;
                     rays.origin(simd, i, j).store(&mut queue.origin, at);
-                    Vec3::<S, E>::splat(simd, [zero, zero, E::narrow(-1.0)]).store(&mut queue.direction, at);
+                    rays.direction(simd).store(&mut queue.direction, at);
                     Vec3::<S, E>::splat(simd, [one; 3]).store(&mut queue.weight, at);
                     lanes::<S, E>(simd, at, usize::MAX).store_slice(&mut queue.pixel.0[at..end]);
                     queue.count = end;
@@ -105,9 +105,9 @@ pub(super) fn aim_along_axis<S: Simd, E: Real>(
     );
 }
 
-/// What the rays of a queue meet.
+/// What the rays of a queue meet; `EYE` says that they start at the origin of the coordinates, and count for 1.
 #[inline(never)]
-pub(super) fn look<S: Simd, E: Real, F: Features<E>>(
+pub(super) fn look<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
     candidates: Candidates,
@@ -129,17 +129,15 @@ pub(super) fn look<S: Simd, E: Real, F: Features<E>>(
             }
             queue.pixel.0[last + 1..end].fill(E::narrow(-1.0));
             for at in (0..queue.count).step_by(Lanes::<S, E>::LEN) {
-                let ray = Ray {
-                    origin: Vec3::load(simd, &queue.origin, at),
-                    direction: Vec3::load(simd, &queue.direction, at),
-                };
-                let found = nearest::<S, E, F, false>(simd, scene, ray, candidates);
+                let origin = if EYE { Vec3::zero(simd) } else { Vec3::load(simd, &queue.origin, at) };
+                let ray = Ray { origin, direction: Vec3::load(simd, &queue.direction, at) };
+                let found = nearest::<S, E, F, EYE>(simd, scene, ray, candidates);
                 hits.add(
                     simd,
                     at,
                     found,
                     #[inline(always)]
-                    || weigh::<S, E, false>(simd, background, queue, at),
+                    || weigh::<S, E, EYE>(simd, background, queue, at),
                 );
             }
         },

@@ -18,6 +18,7 @@ mod features;
 mod finish;
 mod geometry;
 mod kind;
+mod lens;
 mod light;
 mod lights;
 mod lists;
@@ -33,6 +34,7 @@ pub mod probe;
 mod rays;
 mod real;
 mod rounding;
+mod sampled;
 mod search;
 mod shape;
 mod shapes;
@@ -57,13 +59,15 @@ use self::features::{Fitted, Kernel};
 use self::geometry::Geometry;
 use self::prepare::Prepared;
 use self::real::Real;
+use self::rounding::MARGIN;
+use self::sampled::Sampled;
 use self::shape::Robust;
 use self::shapes::{Formulas, Shape};
 use self::tile::Scratch;
 use self::tone::levels;
-use self::window::Window;
+use self::window::{Grid, Window};
 use crate::parallel::{CHANNELS, bands};
-use crate::{Precision, RenderError, RenderOptions};
+use crate::{Exposure, Precision, RenderError, RenderOptions};
 
 /// Columns and rows of a tile.
 const SIDE: (u32, u32) = (16, 16);
@@ -80,8 +84,10 @@ pub struct Drawing<'a>(Backend<'a>);
 enum Backend<'a> {
     Single(Setup<'a, f32>),
     Double(Setup<'a, f64>),
+    SampledSingle(Sampled<'a, f32>),
+    SampledDouble(Sampled<'a, f64>),
     /// Numbers that the kernels cannot hold are left to the tracer that takes them one by one.
-    Reference(&'a Scene, &'a RenderOptions<'a>),
+    Reference(Exposure<'a>, &'a RenderOptions<'a>),
 }
 
 impl<'a> Drawing<'a> {
@@ -90,13 +96,27 @@ impl<'a> Drawing<'a> {
     /// # Errors
     /// When this build leaves out what the scene needs.
     pub fn new(scene: &'a Scene, options: &'a RenderOptions) -> Result<Self, RenderError> {
+        Self::exposed(Exposure::still(scene), options)
+    }
+
+    /// Prepares a scene that may move while the shutter is open, on the current rayon pool.
+    ///
+    /// # Errors
+    /// When this build leaves out what the scene needs.
+    pub fn exposed(exposure: Exposure<'a>, options: &'a RenderOptions) -> Result<Self, RenderError> {
+        let scene = exposure.scene();
+        if scene.samples.most() > 1 {
+            return Ok(Self(
+                sampled_backend(exposure, options)?.unwrap_or(Backend::Reference(exposure, options)),
+            ));
+        }
         let drawable = has_kernels(options) && supported::is_drawn_by_kernels(scene);
         let geometry = if drawable { Geometry::new(scene, options.tree).ok() } else { None };
         let precision = |geometry| Some((geometry, precision::resolve(options, geometry, scene)?));
         Ok(Self(match geometry.as_ref().and_then(precision) {
             Some((geometry, Precision::F64)) => Backend::Double(Setup::new(scene, geometry, options)?),
             Some((geometry, _)) => Backend::Single(Setup::new(scene, geometry, options)?),
-            None => Backend::Reference(scene, options),
+            None => Backend::Reference(exposure, options),
         }))
     }
 
@@ -105,12 +125,45 @@ impl<'a> Drawing<'a> {
     /// # Errors
     /// Those of [`crate::render`].
     pub fn draw(&self) -> Result<RgbImage, RenderError> {
+        self.draw_progressively(|_| ())
+    }
+
+    /// The same; `each` gets the picture after each pass over the image but the last. Each is an estimate of the whole picture,
+    /// the next one with more samples; with one sample a pixel there are none.
+    ///
+    /// # Errors
+    /// Those of [`crate::render`].
+    pub fn draw_progressively(&self, each: impl FnMut(RgbImage)) -> Result<RgbImage, RenderError> {
         match &self.0 {
             Backend::Single(setup) => setup.draw::<Robust>(),
             Backend::Double(setup) => setup.draw::<Robust>(),
-            Backend::Reference(scene, options) => crate::reference::render(scene, options),
+            Backend::SampledSingle(sampled) => sampled.draw(each),
+            Backend::SampledDouble(sampled) => sampled.draw(each),
+            Backend::Reference(exposure, options) => crate::reference::render_exposed(*exposure, options),
         }
     }
+}
+
+/// For pictures of several samples a pixel; none if there are no kernels for the scene.
+fn sampled_backend<'a>(
+    exposure: Exposure<'a>,
+    options: &'a RenderOptions,
+) -> Result<Option<Backend<'a>>, RenderError> {
+    let scene = exposure.scene();
+    let moments = exposure.moments();
+    if !has_kernels(options) || !moments.iter().all(supported::is_drawn_by_kernels) {
+        return Ok(None);
+    }
+    let geometries = moments.iter().map(|moment| Geometry::new(moment, options.tree));
+    let Ok(geometries) = geometries.collect::<Result<Vec<_>, _>>() else { return Ok(None) };
+    let precisions = geometries.iter().zip(&moments);
+    let precisions = precisions.map(|(geometry, moment)| precision::resolve(options, geometry, moment));
+    let Some(precisions) = precisions.collect::<Option<Vec<_>>>() else { return Ok(None) };
+    Ok(Some(if precisions.contains(&Precision::F64) {
+        Backend::SampledDouble(Sampled::new(scene, &moments, &geometries, options)?)
+    } else {
+        Backend::SampledSingle(Sampled::new(scene, &moments, &geometries, options)?)
+    }))
 }
 
 /// Whether there are kernels for the instructions; the first 64-bit processors of the x86 line have none of use.
@@ -163,13 +216,14 @@ impl<'a, E: Real> Setup<'a, E> {
         let size = (scene.screen.width(), scene.screen.height());
         let many = geometry.solids.len() > MANY;
         let side = options.tile.unwrap_or(if many { SMALL_SIDE } else { SIDE });
-        let prepared = Prepared::<E>::new(scene, geometry, options.tree, side)?;
+        let grid = Grid { size, side, margin: MARGIN, lens: None };
+        let prepared = Prepared::<E>::new(scene, geometry, options.tree, &grid)?;
         let mut shapes: Vec<Shape> = match &prepared.tree {
             Some(_) => vec![Shape::of_box(geometry.whole())],
             None => geometry.solids.iter().map(|solid| solid.shape).collect(),
         };
         shapes.sort_by_key(|shape| shape.kind().number());
-        let window = Window::new(geometry.view, &shapes, size, side, E::ROUNDOFF);
+        let window = Window::new(geometry.view, &shapes, &grid, E::ROUNDOFF);
         Ok(Self { scene, options, prepared, window, side })
     }
 

@@ -22,6 +22,7 @@ use super::shapes::{Obstacles, Shape, Shapes, Solid, Sorted};
 use super::sights::Sights;
 use super::sky::Sky;
 use super::tree::{Tree, stump};
+use super::window::Grid;
 use crate::RenderError;
 use crate::parallel::map;
 
@@ -83,7 +84,7 @@ pub(super) struct Prepared<E> {
 }
 
 impl<E: Real> Prepared<E> {
-    /// What masks cannot hold is one leaf if `tree` says that there shall be none. Tiles have the size of `side`.
+    /// What masks cannot hold is one leaf if `tree` says that there shall be none.
     ///
     /// # Errors
     /// When the build leaves out what the scene has.
@@ -91,9 +92,8 @@ impl<E: Real> Prepared<E> {
         scene: &Scene,
         geometry: &Geometry,
         tree: Option<bool>,
-        side: (u32, u32),
+        grid: &Grid,
     ) -> Result<Self, RenderError> {
-        let size = (scene.screen.width(), scene.screen.height());
         let stump = (geometry.branches.is_some() && tree == Some(false)).then(|| stump(&geometry.solids));
         let stump = stump.map(|(solids, branches)| (Arc::new(solids), branches));
         let (solids, branches) = match &stump {
@@ -133,12 +133,12 @@ impl<E: Real> Prepared<E> {
         needs.check()?;
         let standing = Standing { solids, sorted: &sorted, row };
         let sights = (search == Search::Lists)
-            .then(|| Sights::new(&geometry.view, standing.shapes(), row, size, side, E::ROUNDOFF))
+            .then(|| Sights::new(&geometry.view, standing.shapes(), row, grid, E::ROUNDOFF))
             .flatten();
         let suns = geometry.suns.iter().map(|sun| standing.lit_by(sun, search)).collect();
         let shapes = Shapes::new(solids, sorted);
         let alone = match (&solids[..], &geometry.view) {
-            ([solid], View::Pinhole { .. }) => {
+            ([solid], View::Pinhole { .. }) if grid.lens.is_none() => {
                 !needs.mirrors && shapes.is_seen_from_outside(solid.shape.kind(), 0)
             }
             _ => count == 0,

@@ -14,10 +14,12 @@ use super::packet::Ray;
 use super::precision::resolve;
 use super::prepare::Prepared;
 use super::real::{Lanes, Real, Vec3};
+use super::rounding::MARGIN;
 use super::search::nearest;
 use super::shape::Robust;
 use super::supported::is_drawn_by_kernels;
 use super::surfaces::surface;
+use super::window::Grid;
 use crate::{Precision, RenderError, RenderOptions};
 
 /// What a ray meets first.
@@ -66,8 +68,8 @@ fn one_by_one(scene: &Scene, origin: DVec3, direction: DVec3) -> Option<Found> {
     Some(Found { object: hit.object, distance: hit.distance, normal: hit.surface.normal })
 }
 
-/// Columns and rows of a tile, where there is none.
-const TILE: (u32, u32) = (16, 16);
+/// Tiles, where there are none.
+const GRID: Grid = Grid { size: (16, 16), side: (16, 16), margin: MARGIN, lens: None };
 
 struct Batch<'a, E> {
     scene: &'a Prepared<E>,
@@ -82,7 +84,7 @@ fn probe<E: Real>(
     options: &RenderOptions,
     run: impl Fn(&Batch<E>, Level, &mut Vec<Option<Found>>),
 ) -> Result<Vec<Option<Found>>, RenderError> {
-    let prepared = Prepared::<E>::new(scene, geometry, options.tree, TILE)?;
+    let prepared = Prepared::<E>::new(scene, geometry, options.tree, &GRID)?;
     let mut out = Vec::with_capacity(rays.len());
     run(&Batch { scene: &prepared, geometry, rays }, options.level.unwrap_or_else(Level::new), &mut out);
     Ok(out)

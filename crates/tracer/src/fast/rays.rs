@@ -51,12 +51,25 @@ impl<E: Real> FromEye<E> {
     /// The direction of the rays of columns `i` and rows `j`.
     #[inline(always)]
     pub(super) fn direction<S: Simd>(&self, simd: S, i: Lanes<S, E>, j: Lanes<S, E>) -> Vec3<S, E> {
+        self.along(simd, i, j).normalize(simd)
+    }
+
+    /// The same, so long that they go as far as 1 along the gaze.
+    #[inline(always)]
+    pub(super) fn along<S: Simd>(&self, simd: S, i: Lanes<S, E>, j: Lanes<S, E>) -> Vec3<S, E> {
         let along = Vec3::splat(simd, self.right).scale_add(i, Vec3::splat(simd, self.corner));
-        Vec3::splat(simd, self.up).scale_add(j, along).normalize(simd)
+        Vec3::splat(simd, self.up).scale_add(j, along)
     }
 }
 
 impl<E: Real> AlongAxis<E> {
+    /// That of all.
+    #[inline(always)]
+    pub(super) fn direction<S: Simd>(&self, simd: S) -> Vec3<S, E> {
+        let zero = E::narrow(0.0);
+        Vec3::splat(simd, [zero, zero, E::narrow(-1.0)])
+    }
+
     /// Where the rays of columns `i` and rows `j` start.
     #[inline(always)]
     pub(super) fn origin<S: Simd>(&self, simd: S, i: Lanes<S, E>, j: Lanes<S, E>) -> Vec3<S, E> {

@@ -8,9 +8,9 @@ use super::geometry::View;
 use super::kind::Row;
 use super::lists::{LONGEST, Lists, Rectangle};
 use super::placed::Placed;
-use super::rounding::{BOUNDS, MARGIN};
+use super::rounding::BOUNDS;
 use super::shapes::Shape;
-use super::window::axes;
+use super::window::{Grid, axes};
 use crate::camera::Axis;
 
 /// What each tile's rays can meet.
@@ -22,22 +22,25 @@ pub(super) struct Sights {
 }
 
 impl Sights {
-    /// `shapes` stand in this row; sizes are in pixels. None where lists would be long.
+    /// `shapes` stand in this row. None where lists would be long, and where rays start at no one place.
     pub(super) fn new<'a>(
         view: &View,
         shapes: impl Iterator<Item = &'a Shape>,
         row: Row,
-        (width, height): (u32, u32),
-        side: (u32, u32),
+        grid: &Grid,
         roundoff: f64,
     ) -> Option<Self> {
+        let Grid { size: (width, height), side, margin, lens } = *grid;
+        if lens.is_some() {
+            return None;
+        }
         let (columns, rows) = (width.div_ceil(side.0) as usize, height.div_ceil(side.1) as usize);
         let (x, y) = axes(view);
         let tiles = |span: Option<(f64, f64)>, Axis { start, step }: Axis, pixels: u32, side: u32| {
             let last = f64::from(pixels - 1);
             let (from, to) = span.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
             let (a, b) = ((from - start) / step, (to - start) / step);
-            let (from, to) = (a.min(b) - MARGIN, a.max(b) + MARGIN);
+            let (from, to) = (a.min(b) - margin, a.max(b) + margin);
             // Also where a bound is not a number.
             if from > last || to < 0.0 {
                 return None;

@@ -21,19 +21,20 @@ use super::look::{aim_along_axis, look, look_at_bodies, look_from_eye};
 use super::prepare::Prepared;
 use super::rays::Rays;
 use super::real::{Lanes, Real};
+use super::sampled::light::{SoftLight, light_up_softly};
 use super::sky::show_sky;
 use super::surfaces::{ambient, reflect, surfaces};
 
 /// Memory of a worker, used again for each of its tiles; what is in it does not matter.
 pub(super) struct Scratch<E> {
-    queue: Queue<E>,
-    hits: Hits<E>,
+    pub(super) queue: Queue<E>,
+    pub(super) hits: Hits<E>,
     /// The rays that mirrors send on.
-    next: Queue<E>,
+    pub(super) next: Queue<E>,
     /// The sum of what the bounces add to each pixel.
     pixels: Columns<E>,
-    in_the_way: InTheWay,
-    sights: Picked,
+    pub(super) in_the_way: InTheWay,
+    pub(super) sights: Picked,
 }
 
 impl<E: Real> Scratch<E> {
@@ -61,9 +62,8 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     if tile.candidates == 0 && scene.is_plain() {
         return fill(tile, band);
     }
-    let Scratch { queue, hits, next, pixels, in_the_way, sights } = scratch;
+    let Scratch { queue, hits, next, pixels: _, in_the_way, sights } = &mut *scratch;
     let tree = BUILT.tree && scene.tree.is_some();
-    let all = scene.all();
     let candidates = match &scene.sights {
         Some(all) if BUILT.tree && all.gather(tile.place.0, tile.place.1, sights) => {
             if sights.is_empty() && scene.is_plain() {
@@ -71,7 +71,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             }
             Candidates::listed(sights)
         }
-        _ if tree => all,
+        _ if tree => scene.all(),
         _ => Candidates::masked(scene.masks(tile.candidates)),
     };
     let background = band.background();
@@ -84,43 +84,55 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             fitted!(N, seen, tree, C T D => {
                 look_from_eye::<S, E, Variant<N::By, C, T, D>>(simd, scene, image, rays, candidates, queue, hits)
             });
-            let met = Met {
-                kinds: seen,
-                background,
-                queue,
-                sides: (tile.width, tile.height),
-                next: Some(&mut *next),
-            };
+            let count = rays_of::<S, E>((tile.width, tile.height));
+            let met = Met { kinds: seen, background, queue, count, next: Some(&mut *next), soft: None };
             shade::<S, E, N, true>(simd, scene, met, hits, in_the_way);
         }
         Rays::Parallel(rays) => {
             aim_along_axis::<S, E>(simd, (tile, band), rays, queue);
             fitted!(N, seen, tree, C T D => {
-                look::<S, E, Variant<N::By, C, T, D>>(simd, scene, candidates, background, queue, hits)
+                look::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, candidates, background, queue, hits)
             });
-            let met = Met {
-                kinds: seen,
-                background,
-                queue,
-                sides: (tile.width, tile.height),
-                next: Some(&mut *next),
-            };
+            let count = queue.count;
+            let met = Met { kinds: seen, background, queue, count, next: Some(&mut *next), soft: None };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
         }
     }
-    if BUILT.mirrors && next.count > 0 {
+    scratch.follow::<S, N>(simd, scene, tile.bounces, None);
+    let hits = &scratch.hits;
+    match band.tone {
+        Tone::Plain => write_pixels::<S, E>(simd, tile, &hits.color, band),
+        Tone::Srgb => write_encoded::<S, E>(tile, &hits.color, band),
+    }
+}
+
+impl<E: Real> Scratch<E> {
+    /// Follows the rays that mirrors have sent on, and adds what they see to the colours of the hits before.
+    #[inline(always)]
+    pub(super) fn follow<S: Simd, N: Kernel<E>>(
+        &mut self,
+        simd: S,
+        scene: &Prepared<E>,
+        bounces: u32,
+        soft: Option<SoftLight<E>>,
+    ) {
+        let Self { queue, hits, next, pixels, in_the_way, sights: _ } = self;
+        if !BUILT.mirrors || next.count == 0 {
+            return;
+        }
+        let (all, tree) = (scene.all(), BUILT.tree && scene.tree.is_some());
         core::mem::swap(&mut hits.color, pixels);
         let (mut queue, mut next) = (queue, next);
-        for bounce in 1..=tile.bounces {
+        for bounce in 1..=bounces {
             core::mem::swap(&mut queue, &mut next);
             next.count = 0;
-            let after = (bounce < tile.bounces).then_some(&mut *next);
+            let after = (bounce < bounces).then_some(&mut *next);
             hits.packets.clear();
             fitted!(N, all.kinds, tree, C T D => {
-                look::<S, E, Variant<N::By, C, T, D>>(simd, scene, all, scene.background, queue, hits)
+                look::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, all, scene.background, queue, hits)
             });
             let (kinds, background) = (all.kinds, scene.background);
-            let met = Met { kinds, background, queue, sides: (tile.width, tile.height), next: after };
+            let met = Met { kinds, background, queue, count: queue.count, next: after, soft };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
             for ray in 0..queue.count {
                 let pixel = queue.pixel.0[ray].to_index();
@@ -134,34 +146,32 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
         }
         core::mem::swap(&mut hits.color, pixels);
     }
-    match band.tone {
-        Tone::Plain => write_pixels::<S, E>(simd, tile, &hits.color, band),
-        Tone::Srgb => write_encoded::<S, E>(tile, &hits.color, band),
-    }
 }
 
 /// Rays that have met something.
-struct Met<'a, E> {
+pub(super) struct Met<'a, E> {
     /// The kinds of what they can have met.
-    kinds: ByKind<bool>,
-    background: [E; 3],
-    queue: &'a Queue<E>,
-    /// Columns and rows of the tile.
-    sides: (u32, u32),
+    pub(super) kinds: ByKind<bool>,
+    pub(super) background: [E; 3],
+    pub(super) queue: &'a Queue<E>,
+    /// How many there are.
+    pub(super) count: usize,
     /// Where mirrors send them on to, if they do.
-    next: Option<&'a mut Queue<E>>,
+    pub(super) next: Option<&'a mut Queue<E>>,
+    /// Lights of which each ray has a point of its own.
+    pub(super) soft: Option<SoftLight<'a, E>>,
 }
 
 /// Draws what rays have met: surfaces, their light, and the rays that mirrors send on.
 #[inline(always)]
-fn shade<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
+pub(super) fn shade<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
     met: Met<E>,
     hits: &mut Hits<E>,
     in_the_way: &mut InTheWay,
 ) {
-    if scene.is_plain() {
+    if scene.is_plain() && met.soft.is_none() {
         shade_plain::<S, E, N, EYE>(simd, scene, met, hits, in_the_way);
     } else {
         shade_more::<S, E, N, EYE>(simd, scene, met, hits, in_the_way);
@@ -178,11 +188,11 @@ fn shade_more<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     hits: &mut Hits<E>,
     in_the_way: &mut InTheWay,
 ) {
-    let queue = met.queue;
-    let count = if EYE { rays_of::<S, E>(met.sides) } else { queue.count };
-    match &scene.beyond {
-        Some(beyond) => shade_beyond::<S, E, N, EYE>(simd, scene, (beyond, count), met, hits, in_the_way),
-        None => shade_plain::<S, E, N, EYE>(simd, scene, met, hits, in_the_way),
+    let (queue, count) = (met.queue, met.count);
+    match (&scene.beyond, met.soft) {
+        (_, Some(soft)) => shade_softly::<S, E, N, EYE>(simd, scene, soft, met, hits, in_the_way),
+        (Some(beyond), None) => shade_beyond::<S, E, N, EYE>(simd, scene, beyond, met, hits, in_the_way),
+        (None, None) => shade_plain::<S, E, N, EYE>(simd, scene, met, hits, in_the_way),
     }
     if let Some(sky) = &scene.sky {
         show_sky::<S, E, EYE>(simd, sky, count, queue, hits);
@@ -194,8 +204,8 @@ fn shade_more<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
 fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
-    (beyond, count): (&Beyond<E>, usize),
-    Met { kinds: _, background, queue, sides: _, next }: Met<E>,
+    beyond: &Beyond<E>,
+    Met { kinds: _, background, queue, count, next, soft: _ }: Met<E>,
     hits: &mut Hits<E>,
     in_the_way: &mut InTheWay,
 ) {
@@ -217,12 +227,43 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     }
 }
 
+/// In pictures whose lights have an extent.
+#[inline(always)]
+fn shade_softly<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    soft: SoftLight<E>,
+    Met { kinds: _, background, queue, count, next, soft: _ }: Met<E>,
+    hits: &mut Hits<E>,
+    in_the_way: &mut InTheWay,
+) {
+    if let Some(beyond) = &scene.beyond {
+        look_at_bodies::<S, E, EYE>(simd, &beyond.bodies, count, queue, hits);
+    }
+    if hits.packets.is_empty() {
+        return;
+    }
+    surfaces::<S, E, Anything<N::By>, EYE, true, true>(simd, scene, background, queue, hits);
+    let finishes = scene.beyond.as_ref().and_then(|beyond| beyond.finishes.as_ref());
+    let painted = finishes.filter(|finishes| finishes.has_patterns);
+    if let Some(finishes) = painted {
+        finishes.paint::<E, EYE>(queue, hits, Lanes::<S, E>::LEN);
+    }
+    in_the_way.find(simd, scene, hits);
+    light_up_softly::<S, E, Anything<N::By>, EYE>(simd, scene, soft, queue, hits, in_the_way);
+    match next {
+        Some(next) if painted.is_some() => reflect::<S, E, EYE, true>(simd, scene, queue, hits, next),
+        Some(next) => reflect::<S, E, EYE, false>(simd, scene, queue, hits, next),
+        None => {}
+    }
+}
+
 /// In those that have nothing else.
 #[inline(always)]
 fn shade_plain<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
-    Met { kinds, background, queue, sides: _, next }: Met<E>,
+    Met { kinds, background, queue, count: _, next, soft: _ }: Met<E>,
     hits: &mut Hits<E>,
     in_the_way: &mut InTheWay,
 ) {

@@ -7,10 +7,24 @@
 use glam::DVec3;
 
 use super::geometry::View;
+use super::lens::Lens;
 use super::placed::Placed;
-use super::rounding::{BOUNDS, MARGIN};
+use super::rounding::BOUNDS;
 use super::shapes::Shape;
 use crate::camera::Axis;
+
+/// How an image is cut into tiles, and what a tile's rays are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grid {
+    /// Columns and rows of the image.
+    pub(super) size: (u32, u32),
+    /// The same of a tile.
+    pub(super) side: (u32, u32),
+    /// How far from a pixel's middle its rays go, in pixels.
+    pub(super) margin: f64,
+    /// Where rays start that do not start at the eye.
+    pub(super) lens: Option<Lens>,
+}
 
 /// A sphere as the eye sees it.
 #[derive(Clone, Copy, Debug)]
@@ -39,15 +53,9 @@ struct Span {
 }
 
 impl Window {
-    /// `shapes` in the order of the bits, at most 64; `width` and `height` are the pixels of the image, `side` those
-    /// of a tile. `roundoff` is that of the kernels. Rows of tiles count from the top.
-    pub(super) fn new(
-        view: View,
-        shapes: &[Shape],
-        (width, height): (u32, u32),
-        side: (u32, u32),
-        roundoff: f64,
-    ) -> Self {
+    /// `shapes` in the order of the bits, at most 64. `roundoff` is that of the kernels. Rows of tiles count from the top.
+    pub(super) fn new(view: View, shapes: &[Shape], grid: &Grid, roundoff: f64) -> Self {
+        let Grid { size: (width, height), side, margin, lens } = *grid;
         let slack = |shape: &Shape| BOUNDS * roundoff * shape.magnitude();
         // Behind the eye nothing is seen.
         let ahead = match view {
@@ -55,12 +63,14 @@ impl Window {
             View::Parallel { .. } => DVec3::NEG_Z,
         };
         let visible = mask(shapes, |shape| shape.support(ahead) >= -2.0 * slack(shape));
+        // How far from the eye's own a lens's ray can be, where a shape is.
+        let astray = |shape: &Shape| lens.map_or(0.0, |lens| lens.astray(shape, ahead));
         let span = |from: f64, to: f64, axis: fn(&View) -> DVec3| {
             let (from, to) = (from.min(to), from.max(to));
             let (along, back) = (axis(&view), back(&view));
             let candidates = mask(shapes, |shape| {
                 let beyond = |normal: DVec3, distance: f64| {
-                    shape.support(normal) >= distance - slack(shape) * (1.0 + normal.length())
+                    shape.support(normal) >= distance - slack(shape) * (1.0 + normal.length()) - astray(shape)
                 };
                 match back {
                     Some(back) => beyond(along + from * back, 0.0) && beyond(-along - to * back, 0.0),
@@ -74,15 +84,15 @@ impl Window {
             (0..pixels).step_by(side as usize).map(move |i| (i, (i + side).min(pixels) - 1))
         };
         let columns = tiles(width, side.0).map(|(first, last)| {
-            span(x.at(f64::from(first) - MARGIN), x.at(f64::from(last) + MARGIN), right)
+            span(x.at(f64::from(first) - margin), x.at(f64::from(last) + margin), right)
         });
         let rows = tiles(height, side.1).map(|(first, last)| {
             let (first, last) = (height - 1 - first, height - 1 - last);
-            span(y.at(f64::from(first) + MARGIN), y.at(f64::from(last) - MARGIN), up)
+            span(y.at(f64::from(first) + margin), y.at(f64::from(last) - margin), up)
         });
         let caps = match view {
-            View::Pinhole { .. } => caps(shapes, slack),
-            View::Parallel { .. } => vec![],
+            View::Pinhole { .. } if lens.is_none() => caps(shapes, slack),
+            View::Pinhole { .. } | View::Parallel { .. } => vec![],
         };
         Self { columns: columns.collect(), rows: rows.collect(), caps, view }
     }

@@ -22,13 +22,11 @@ pub(super) struct Arriving {
     lamp: Option<DVec3>,
 }
 
-/// `None` for a lamp at the hit itself.
-pub(super) fn arriving(light: &Light, surface: &Surface) -> Option<Arriving> {
+/// From a `point` of the light: for a sun a unit vector towards it, for a lamp a place. `None` for a lamp at the hit itself.
+pub(super) fn arriving(light: &Light, point: DVec3, surface: &Surface) -> Option<Arriving> {
     match light {
-        Light::Directional(sun) => {
-            Some(Arriving { towards: -unit(sun.direction()), color: sun.color(), lamp: None })
-        }
-        Light::Lamp(lamp) => from_lamp(lamp, lamp.position(), surface),
+        Light::Directional(sun) => Some(Arriving { towards: point, color: sun.color(), lamp: None }),
+        Light::Lamp(lamp) => from_lamp(lamp, point, surface),
     }
 }
 

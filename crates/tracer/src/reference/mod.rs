@@ -19,6 +19,7 @@ mod glass;
 mod light;
 mod noise;
 mod pattern;
+mod sampled;
 mod shading;
 mod shapes;
 mod tone;
@@ -30,6 +31,9 @@ use rayfold_scene::{Object, Scene};
 
 pub(crate) use light::highlight;
 pub(crate) use pattern::coefficients;
+pub(crate) use sampled::render_exposed;
+#[cfg(feature = "accuracy")]
+pub use sampled::{Estimate, estimate};
 pub use shapes::Surface;
 pub(crate) use shapes::{normal_and_width, power, triangle_normal};
 pub(crate) use tone::levels;
@@ -51,13 +55,14 @@ pub struct Hit {
     pub surface: Surface,
 }
 
-/// Draws a scene with the plain tracer.
+/// Draws a scene with the plain tracer, a single ray a pixel.
 ///
 /// # Errors
 /// Those of [`crate::render`].
 pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     let world = World::new(scene);
-    let shader = Shader { world: &world, cancel: options.cancel };
+    let lights = world.middles();
+    let shader = Shader { world: &world, lights: &lights, cancel: options.cancel };
     let image = bands(
         scene.screen,
         1,
@@ -80,7 +85,7 @@ pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, Render
 pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
     let world = World::new(scene);
     let ray = world.rays.ray(f64::from(i), f64::from(j));
-    Shader { world: &world, cancel: None }.color(ray, scene.depth.bounces())
+    Shader { world: &world, lights: &world.middles(), cancel: None }.color(ray, scene.depth.bounces())
 }
 
 /// The nearest hit of a ray; of hits at the same distance one without glass, and of those that of the object which comes

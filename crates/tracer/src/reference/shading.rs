@@ -20,6 +20,8 @@ const FAINT_LINEAR: f64 = 1.0 / 65536.0;
 /// Follows rays.
 pub(super) struct Shader<'a> {
     pub(super) world: &'a World<'a>,
+    /// The point of each light, as [`arriving`] takes it.
+    pub(super) lights: &'a [DVec3],
     pub(super) cancel: Option<&'a AtomicBool>,
 }
 
@@ -56,8 +58,8 @@ impl Shader<'_> {
 
         let mut color = coefficients.ambient();
         let shine = object.material().finish().and_then(|finish| finish.shine);
-        for light in world.lights.iter() {
-            let Some(arriving) = arriving(light, &hit.surface) else { continue };
+        for (light, point) in world.lights.iter().zip(self.lights) {
+            let Some(arriving) = arriving(light, *point, &hit.surface) else { continue };
             let cosine = normal.dot(arriving.towards);
             if cosine <= 0.0 {
                 continue;
@@ -149,7 +151,8 @@ mod tests {
     /// What a ray sees that goes straight down from a height of 5.
     fn down(scene: &Scene, x: f64) -> f64 {
         let ray = Ray { origin: DVec3::new(x, 5.0, 0.0), direction: DVec3::NEG_Y };
-        Shader { world: &World::new(scene), cancel: None }.color(ray, scene.depth.bounces()).x
+        let world = World::new(scene);
+        Shader { world: &world, lights: &world.middles(), cancel: None }.color(ray, scene.depth.bounces()).x
     }
 
     fn lamp(position: DVec3, reach: f64) -> Option<Lamp> {

@@ -3,11 +3,12 @@
 use std::borrow::Cow;
 
 use glam::DVec3;
+use rayfold_scene::model::unit;
 use rayfold_scene::{Camera, Glass, Lamp, Light, Object, Scene};
 
 use super::Hit;
 use super::shapes::{self, Surface};
-use crate::camera::{Ray, Rays};
+use crate::camera::{Ray, Rays, Single};
 
 /// What rays are sent through.
 pub(super) struct World<'a> {
@@ -27,7 +28,7 @@ impl<'a> World<'a> {
     /// With the eye at the origin: what is seen then has coordinates as small as it is near, wherever all of it lies. As it
     /// is, where it cannot be moved, or where rounding would take the eye through a surface.
     pub(super) fn new(scene: &'a Scene) -> Self {
-        let rays = Rays::new(&scene.camera, scene.screen);
+        let rays = Rays::new(&scene.camera, scene.screen, Single::of(scene));
         let has_groups = scene.objects.iter().any(|object| matches!(object, Object::Instance(_)));
         let objects: Cow<[Object]> = if has_groups {
             scene.objects.iter().map(|object| shapes::in_world(object).into_owned()).collect()
@@ -66,6 +67,15 @@ impl<'a> World<'a> {
             center: eye,
             ..*self
         })
+    }
+
+    /// The middle of each light: for a sun the unit vector towards it, for a lamp its place.
+    pub(super) fn middles(&self) -> Vec<DVec3> {
+        let middle = |light: &Light| match light {
+            Light::Directional(sun) => -unit(sun.direction()),
+            Light::Lamp(lamp) => lamp.position(),
+        };
+        self.lights.iter().map(middle).collect()
     }
 
     pub(super) fn nearest(&self, ray: Ray) -> Option<Hit> {

@@ -10,8 +10,10 @@ use crate::fast::real::{Lanes, Real, Vec3, constant, splat};
 /// A lamp in the kernels' coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::fast) struct Place {
-    position: DVec3,
+    pub(in crate::fast) position: DVec3,
     color: DVec3,
+    /// Of its ball.
+    pub(in crate::fast) radius: f64,
     /// The distance at which its colour arrives; 0 where it does at all.
     reach: f64,
 }
@@ -20,7 +22,7 @@ impl Place {
     /// Moved so that `center` is the origin, and then scaled.
     pub(in crate::fast) fn new(lamp: &rayfold_scene::Lamp, center: DVec3, scale: f64) -> Self {
         let position = (lamp.position() - center) * scale;
-        Self { position, color: lamp.color(), reach: lamp.reach() * scale }
+        Self { position, color: lamp.color(), radius: lamp.radius() * scale, reach: lamp.reach() * scale }
     }
 }
 
@@ -61,14 +63,30 @@ impl<E: Real> Lamp<E> {
     /// From where rays leave a surface to the lamp. From the lamp's own place they lead back into the surface.
     #[inline(always)]
     pub(in crate::fast) fn rays<S: Simd>(&self, simd: S, start: Vec3<S, E>) -> Rays<S, E> {
+        let middle = Vec3::splat(simd, self.position);
+        self.rays_to(simd, start, middle)
+    }
+
+    /// The same to points of its ball, one for each ray; how much arrives depends on the distance of its middle.
+    #[inline(always)]
+    pub(in crate::fast) fn rays_to<S: Simd>(
+        &self,
+        simd: S,
+        start: Vec3<S, E>,
+        point: Vec3<S, E>,
+    ) -> Rays<S, E> {
         let one = constant::<S, E>(simd, 1.0);
-        let to = Vec3::splat(simd, self.position).sub(start);
+        let to = point.sub(start);
         let square = to.dot(to);
         let distance = square.sqrt();
         let direction = to.scale(one / distance);
         let far = distance * constant::<S, E>(simd, 1.0 - AT_THE_LAMP * E::ROUNDOFF);
         let part = match self.reach {
-            Some(reach) => (splat::<S, E>(simd, reach) / square).min(constant::<S, E>(simd, E::FAR)),
+            Some(reach) => {
+                let to_middle = Vec3::splat(simd, self.position).sub(start);
+                let square = to_middle.dot(to_middle);
+                (splat::<S, E>(simd, reach) / square).min(constant::<S, E>(simd, E::FAR))
+            }
             None => one,
         };
         Rays { ray: Ray { origin: start, direction }, far, part }

@@ -11,11 +11,13 @@ use crate::fast::placed::Placed;
 use crate::fast::real::{Lanes, Real, Vec3, constant};
 use crate::fast::rounding::{BEAM, BOUNDS};
 
-/// A sun in the kernels' coordinates: the unit vector towards it, and its colour.
+/// A sun in the kernels' coordinates: the unit vector towards its middle, its colour, and its extent.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::fast) struct Direction {
     pub(in crate::fast) towards: DVec3,
     pub(in crate::fast) color: DVec3,
+    /// 1 - cos of half the angle that it spans.
+    pub(in crate::fast) spread: f64,
 }
 
 /// A sun as the kernels read it.

@@ -1,0 +1,311 @@
+//! Light from suns and lamps that have an extent: each ray of the camera has a point of each, for all its bounces.
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+use glam::DVec3;
+use rayfold_scene::{Light, Scene};
+
+use super::hulls::{Cone, Hulls, Region};
+use crate::fast::bounce::{Column, Columns, Hits, Queue, columns};
+use crate::fast::candidates::Candidates;
+use crate::fast::features::Features;
+use crate::fast::finish::{Finishes, Lit};
+use crate::fast::geometry::Geometry;
+use crate::fast::light::{InTheWay, region};
+use crate::fast::lights::lamp::Rays;
+use crate::fast::packet::Ray;
+use crate::fast::prepare::Prepared;
+use crate::fast::real::{Lanes, Mask, Real, Vec3, constant};
+use crate::fast::search::{nearest, unoccluded};
+use crate::fast::shapes::Shape;
+use crate::sampling::places::{in_ball, in_cone};
+use crate::sampling::{Dimensions, Points};
+
+/// The extents of a scene's lights.
+#[derive(Debug)]
+pub(in crate::fast) struct Extents<E> {
+    /// For each sun, which of the [`LightPoints`] are its own, if it has any.
+    suns: Vec<Option<(usize, SoftSun)>>,
+    /// The same for each lamp.
+    lamps: Vec<Option<(usize, Ball)>>,
+    /// Of few objects: what they are known to lie in.
+    hulls: Option<Hulls>,
+    dimensions: Vec<usize>,
+    numbers: core::marker::PhantomData<E>,
+}
+
+#[derive(Debug)]
+struct SoftSun {
+    /// The cone's axes, the last towards the middle.
+    axes: [DVec3; 3],
+    spread: f64,
+    cone: Cone,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Ball {
+    middle: DVec3,
+    radius: f64,
+}
+
+/// Lights of which each ray has a point of its own, for the rays of a tile.
+#[derive(Clone, Copy)]
+pub(in crate::fast) struct SoftLight<'a, E> {
+    pub(super) extents: &'a Extents<E>,
+    pub(super) points: &'a LightPoints<E>,
+}
+
+/// The points of a tile's camera rays: for a sun the unit vector towards it, for a lamp a place.
+#[derive(Default)]
+pub(super) struct LightPoints<E> {
+    of: Vec<Columns<E>>,
+}
+
+impl<E: Real> Extents<E> {
+    /// None where all lights are points.
+    pub(super) fn new(
+        scene: &Scene,
+        geometry: &Geometry,
+        shapes: Option<&[Shape]>,
+        dimensions: &Dimensions,
+    ) -> Option<Self> {
+        let (mut suns, mut lamps, mut firsts) = (vec![], vec![], vec![]);
+        for (k, light) in scene.lights.iter().enumerate() {
+            let own = dimensions.lights.get(k).copied().flatten().map(|first| {
+                firsts.push(first);
+                firsts.len() - 1
+            });
+            match light {
+                Light::Directional(_) => {
+                    let sun = &geometry.suns[suns.len()];
+                    let (x, y) = sun.towards.any_orthonormal_pair();
+                    let cone = Cone::new(sun.towards, sun.spread);
+                    let axes = [x, y, sun.towards];
+                    suns.push(own.map(|own| (own, SoftSun { axes, spread: sun.spread, cone })));
+                }
+                Light::Lamp(_) => {
+                    let lamp = &geometry.lamps[lamps.len()];
+                    let ball = Ball { middle: lamp.position, radius: lamp.radius };
+                    lamps.push(own.map(|own| (own, ball)));
+                }
+            }
+        }
+        let hulls = shapes.map(|shapes| Hulls::new::<E>(shapes.iter()));
+        let numbers = core::marker::PhantomData;
+        (!firsts.is_empty()).then_some(Self { suns, lamps, hulls, dimensions: firsts, numbers })
+    }
+
+    /// The points of rays of these samples of pixels.
+    #[inline(always)]
+    pub(super) fn place(
+        &self,
+        points: &Points,
+        pixel_seeds: &[u32],
+        samples: &[u32],
+        coordinates: &mut [[f64; 256]; 3],
+        into: &mut LightPoints<E>,
+    ) {
+        into.of.resize_with(self.dimensions.len(), columns);
+        let count = samples.len();
+        for (own, sun) in self.suns.iter().flatten() {
+            let first = self.dimensions[*own];
+            let [u, v, _] = &mut *coordinates;
+            points.coordinates(first, pixel_seeds, samples, &mut u[..count]);
+            points.coordinates(first + 1, pixel_seeds, samples, &mut v[..count]);
+            let [x, y, z] = sun.axes;
+            for k in 0..count {
+                let at = in_cone(u[k], v[k], sun.spread);
+                put(&mut into.of[*own], k, at.x * x + at.y * y + at.z * z);
+            }
+        }
+        for (own, ball) in self.lamps.iter().flatten() {
+            let first = self.dimensions[*own];
+            let [u, v, w] = &mut *coordinates;
+            points.coordinates(first, pixel_seeds, samples, &mut u[..count]);
+            points.coordinates(first + 1, pixel_seeds, samples, &mut v[..count]);
+            points.coordinates(first + 2, pixel_seeds, samples, &mut w[..count]);
+            for k in 0..count {
+                put(&mut into.of[*own], k, ball.middle + ball.radius * in_ball(u[k], v[k], w[k]));
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn put<E: Real>(columns: &mut Columns<E>, k: usize, v: DVec3) {
+    columns[0].0[k] = E::narrow(v.x);
+    columns[1].0[k] = E::narrow(v.y);
+    columns[2].0[k] = E::narrow(v.z);
+}
+
+impl<E: Real> LightPoints<E> {
+    /// The points of a packet's camera rays.
+    #[inline(always)]
+    fn of<S: Simd, const EYE: bool>(&self, simd: S, own: usize, slots: &Column<E>, at: usize) -> Vec3<S, E> {
+        let columns = &self.of[own];
+        if EYE {
+            return Vec3::load(simd, columns, at);
+        }
+        let mut gathered = [[E::narrow(0.0); 16]; 3];
+        for lane in 0..Lanes::<S, E>::LEN {
+            let slot = slots.0[at + lane];
+            // Lanes that only repeat another have none.
+            let slot = if slot.widen() < 0.0 { 0 } else { slot.to_index() };
+            for (gathered, column) in gathered.iter_mut().zip(columns) {
+                gathered[lane] = column.0[slot];
+            }
+        }
+        Vec3::load(simd, &gathered, 0)
+    }
+}
+
+/// Adds the light of suns and lamps that reaches the hits past objects and bodies.
+#[inline(never)]
+pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    soft: SoftLight<E>,
+    queue: &Queue<E>,
+    hits: &mut Hits<E>,
+    obstacles: &InTheWay,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let SoftLight { extents, points } = soft;
+            let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
+            let far = constant::<S, E>(simd, E::FAR);
+            let (low, high) = region(simd, hits);
+            let from = Region::new(low, high);
+            let beyond = scene.beyond.as_ref();
+            let lamps = beyond.map_or(&[][..], |beyond| &beyond.lamps[..]);
+            let all = |mask: u64| match &extents.hulls {
+                Some(_) => Candidates::masked(scene.masks(mask)),
+                None => scene.all(),
+            };
+            let towards_sun = |sun: &SoftSun| match &extents.hulls {
+                Some(hulls) => hulls.towards(&from, &sun.cone),
+                None => u64::MAX,
+            };
+            let to_lamp = |ball: &Ball| match &extents.hulls {
+                Some(hulls) => hulls.between(&from, ball.middle, ball.radius),
+                None => u64::MAX,
+            };
+            let sun_masks: Vec<u64> =
+                extents.suns.iter().map(|sun| sun.as_ref().map_or(0, |(_, sun)| towards_sun(sun))).collect();
+            let lamp_masks: Vec<u64> = extents
+                .lamps
+                .iter()
+                .map(|lamp| lamp.as_ref().map_or(u64::MAX, |(_, ball)| to_lamp(ball)))
+                .collect();
+            for &(at, others) in &hits.packets {
+                let normal = Vec3::load(simd, &hits.normal, at);
+                let start = Vec3::load(simd, &hits.start, at);
+                let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
+                let seen = Ray { origin: start, direction: Vec3::load(simd, &queue.direction, at) };
+                let mut gloss = beyond.and_then(|beyond| beyond.finishes.as_ref()).map(Finishes::gloss);
+                let mut sum = Vec3::zero(simd);
+                for (index, light) in scene.suns.iter().enumerate() {
+                    let (towards, lit) = match &extents.suns[index] {
+                        None => {
+                            let towards = light.sun.towards(simd);
+                            let lit = normal.dot(towards).simd_gt(zero);
+                            if lit.any_true() {
+                                let candidates = obstacles.of[index].candidates(others, F::KINDS);
+                                (towards, unoccluded::<S, E, F>(simd, scene, light, start, lit, candidates))
+                            } else {
+                                (towards, lit)
+                            }
+                        }
+                        Some((own, _)) => {
+                            let towards = points.of::<S, EYE>(simd, *own, &queue.pixel, at);
+                            let lit = normal.dot(towards).simd_gt(zero);
+                            let mut candidates = all(sun_masks[index]);
+                            candidates.masks = candidates.masks.and_spheres(others);
+                            let ray = Ray { origin: start, direction: towards };
+                            (towards, unmet::<S, E, F>(simd, scene, ray, far, lit, candidates))
+                        }
+                    };
+                    let mut lit = lit;
+                    if let Some(beyond) = beyond
+                        && lit.any_true()
+                    {
+                        let ray = Ray { origin: start, direction: towards };
+                        lit = beyond.bodies.unoccluded(simd, ray, far, lit);
+                    }
+                    let cosine = normal.dot(towards);
+                    sum = Vec3::splat(simd, light.sun.color).scale_add(lit.select(cosine, zero), sum);
+                    if let Some(gloss) = &mut gloss {
+                        let lit = Lit { lanes: lit, towards, part: one };
+                        gloss.add(lit, light.sun.color, (seen, normal), orders);
+                    }
+                }
+                for (index, lamp) in lamps.iter().enumerate() {
+                    let Rays { ray, far, part } = match &extents.lamps[index] {
+                        None => lamp.rays(simd, start),
+                        Some((own, _)) => {
+                            let point = points.of::<S, EYE>(simd, *own, &queue.pixel, at);
+                            lamp.rays_to(simd, start, point)
+                        }
+                    };
+                    let cosine = normal.dot(ray.direction);
+                    let mut lit = cosine.simd_gt(zero);
+                    if let Some(beyond) = beyond
+                        && lit.any_true()
+                    {
+                        lit = beyond.bodies.unoccluded(simd, ray, far, lit);
+                    }
+                    let mut candidates = all(lamp_masks[index]);
+                    candidates.masks = candidates.masks.and_spheres(others);
+                    lit = unmet::<S, E, F>(simd, scene, ray, far, lit, candidates);
+                    sum = Vec3::splat(simd, lamp.color).scale_add(lit.select(cosine * part, zero), sum);
+                    if let Some(gloss) = &mut gloss {
+                        let lit = Lit { lanes: lit, towards: ray.direction, part };
+                        gloss.add(lit, lamp.color, (seen, normal), orders);
+                    }
+                }
+                let diffuse = Vec3::load(simd, &hits.diffuse, at);
+                let color = Vec3::load(simd, &hits.color, at);
+                let lit = Vec3::<S, E>::new(
+                    diffuse.x.mul_add(sum.x, color.x),
+                    diffuse.y.mul_add(sum.y, color.y),
+                    diffuse.z.mul_add(sum.z, color.z),
+                );
+                let lit = match gloss {
+                    Some(gloss) if gloss.is_seen => {
+                        let sum = gloss.sum::<S, E>(simd);
+                        let weight = if EYE {
+                            Vec3::splat(simd, [E::narrow(1.0); 3])
+                        } else {
+                            Vec3::load(simd, &queue.weight, at)
+                        };
+                        Vec3::<S, E>::new(
+                            sum.x.mul_add(weight.x, lit.x),
+                            sum.y.mul_add(weight.y, lit.y),
+                            sum.z.mul_add(weight.z, lit.z),
+                        )
+                    }
+                    Some(_) | None => lit,
+                };
+                lit.store(&mut hits.color, at);
+            }
+        },
+    );
+}
+
+/// Which of the rays that `lit` names meet nothing nearer than `far`.
+#[inline(always)]
+fn unmet<S: Simd, E: Real, F: Features<E>>(
+    simd: S,
+    scene: &Prepared<E>,
+    ray: Ray<S, E>,
+    far: Lanes<S, E>,
+    lit: Mask<S, E>,
+    candidates: Candidates,
+) -> Mask<S, E> {
+    if !lit.any_true() || !candidates.kinds.any() {
+        return lit;
+    }
+    let met = nearest::<S, E, F, false>(simd, scene, ray, candidates);
+    lit & !met.distance.simd_lt(far)
+}

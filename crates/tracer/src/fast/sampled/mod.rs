@@ -1,0 +1,214 @@
+//! Pictures whose pixels are means: of points of their squares, of the lens, of the lights, and of moments.
+//!
+//! Passes over the image give more samples to the pixels whose means are not yet known well ([`Film`]). In a pass, a tile's
+//! samples are sorted by moment, and drawn as many at a time as a tile's memory holds, by the steps that draw single rays;
+//! `light` is the one step that knows lights with an extent.
+
+mod hulls;
+pub(super) mod light;
+mod tile;
+
+use fearless_simd::{Level, Simd};
+use image::RgbImage;
+use rayfold_scene::{Scene, Tone};
+use rayon::prelude::*;
+use std::sync::atomic::Ordering;
+
+use self::light::Extents;
+use self::tile::{Pass, SampledTile, Workspace};
+use super::dispatch::on;
+#[cfg(target_arch = "x86_64")]
+use super::features::Unfitted;
+use super::features::{Fitted, Kernel};
+use super::geometry::Geometry;
+use super::lens::Aperture;
+use super::prepare::Prepared;
+use super::real::Real;
+use super::shape::Robust;
+use super::shapes::Shape;
+use super::window::{Grid, Window};
+use crate::parallel::{CHANNELS, image};
+use crate::sampling::film::{Film, Pixel};
+use crate::sampling::{Dimensions, Points};
+use crate::{RenderError, RenderOptions};
+
+/// Samples that a pass adds to a pixel at most: their points are kept.
+const PASS: u32 = 256;
+
+/// Columns and rows of a tile.
+pub(super) const SIDE: (u32, u32) = (16, 16);
+
+/// The half of a pixel, and a little for rounding: how far rays go from its middle.
+pub(super) const MARGIN: f64 = 0.5 + super::rounding::MARGIN;
+
+/// A scene at a moment, ready to be drawn.
+#[derive(Debug)]
+struct Moment<E> {
+    prepared: Prepared<E>,
+    window: Window,
+    extents: Option<Extents<E>>,
+    lens: Option<Aperture<E>>,
+}
+
+/// A scene at all its moments.
+#[derive(Debug)]
+pub(super) struct Sampled<'a, E> {
+    /// In the middle.
+    scene: &'a Scene,
+    options: &'a RenderOptions<'a>,
+    dimensions: Dimensions,
+    moments: Vec<Moment<E>>,
+    side: (u32, u32),
+}
+
+impl<'a, E: Real> Sampled<'a, E> {
+    /// `moments` are the scene from the first opening of the shutter to the last closing, each with its geometry; just the scene
+    /// where nothing moves.
+    pub(super) fn new(
+        scene: &'a Scene,
+        moments: &[Scene],
+        geometries: &[Geometry],
+        options: &'a RenderOptions<'a>,
+    ) -> Result<Self, RenderError> {
+        let side = options.tile.unwrap_or(SIDE);
+        let dimensions = Dimensions::new(moments);
+        let moments = moments
+            .par_iter()
+            .zip(geometries)
+            .map(|(scene, geometry)| Moment::new(scene, geometry, options, side, &dimensions))
+            .collect::<Result<_, _>>()?;
+        Ok(Self { scene, options, dimensions, moments, side })
+    }
+
+    /// Draws all passes; `each` sees the picture so far after each but the last, an estimate without bias of its own.
+    pub(super) fn draw(&self, mut each: impl FnMut(RgbImage)) -> Result<RgbImage, RenderError> {
+        let scene = self.scene;
+        let size = (scene.screen.width(), scene.screen.height());
+        let too_large = || RenderError::TooLarge { width: size.0, height: size.1 };
+        let mut film = Film::new(size, scene.samples, scene.tone).ok_or_else(too_large)?;
+        let mut passes = 0;
+        while let Some(goals) = film.next_pass(PASS) {
+            if passes > 0 {
+                each(self.develop(&film)?);
+            }
+            passes += 1;
+            self.pass(&mut film, &goals)?;
+        }
+        self.develop(&film)
+    }
+
+    /// Gives each pixel the samples that it lacks.
+    fn pass(&self, film: &mut Film, goals: &[u32]) -> Result<(), RenderError> {
+        let first = film.pixels.iter().zip(goals).filter(|(pixel, goal)| pixel.count() < **goal);
+        let (first, end) = first
+            .fold((u32::MAX, 0), |(first, end), (pixel, &goal)| (first.min(pixel.count()), end.max(goal)));
+        let points = Points::new(&self.dimensions, first, end);
+        let level = self.options.level.unwrap_or_else(Level::new);
+        let band = film.width * self.side.1 as usize;
+        film.pixels.par_chunks_mut(band).zip(goals.par_chunks(band)).enumerate().try_for_each_init(
+            || Box::new(Workspace::new()),
+            |workspace, (row, (pixels, goals))| {
+                if self.options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+                    return Err(RenderError::Cancelled);
+                }
+                let job = Job { of: self, points: &points, row };
+                draw::<E>(&job, level, (pixels, goals), workspace);
+                Ok(())
+            },
+        )
+    }
+
+    fn develop(&self, film: &Film) -> Result<RgbImage, RenderError> {
+        let tone: Tone = self.scene.tone;
+        image(self.scene.screen, |bytes| {
+            bytes.par_chunks_exact_mut(CHANNELS).zip(&film.pixels).for_each(|(bytes, pixel)| {
+                bytes.copy_from_slice(&super::tone::levels(pixel.mean(), tone));
+            });
+        })
+    }
+}
+
+impl<E: Real> Moment<E> {
+    fn new(
+        scene: &Scene,
+        geometry: &Geometry,
+        options: &RenderOptions,
+        side: (u32, u32),
+        dimensions: &Dimensions,
+    ) -> Result<Self, RenderError> {
+        let size = (scene.screen.width(), scene.screen.height());
+        let grid = Grid { size, side, margin: MARGIN, lens: geometry.lens };
+        let prepared = Prepared::<E>::new(scene, geometry, options.tree, &grid)?;
+        let mut shapes: Vec<Shape> = match &prepared.tree {
+            Some(_) => vec![Shape::of_box(geometry.whole())],
+            None => geometry.solids.iter().map(|solid| solid.shape).collect(),
+        };
+        shapes.sort_by_key(|shape| shape.kind().number());
+        let window = Window::new(geometry.view, &shapes, &grid, E::ROUNDOFF);
+        let few = prepared.tree.is_none().then_some(&shapes[..]);
+        let extents = Extents::new(scene, geometry, few, dimensions);
+        Ok(Self { prepared, window, extents, lens: Aperture::new(geometry) })
+    }
+}
+
+/// A row of tiles to draw.
+struct Job<'a, E> {
+    of: &'a Sampled<'a, E>,
+    points: &'a Points,
+    /// Of tiles, from the top.
+    row: usize,
+}
+
+impl<E: Real> Job<'_, E> {
+    #[inline(always)]
+    fn draw<S: Simd, N: Kernel<E>>(
+        &self,
+        simd: S,
+        (pixels, goals): (&mut [Pixel], &[u32]),
+        workspace: &mut Workspace<E>,
+    ) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let Sampled { scene, options, dimensions, moments, side } = self.of;
+                let (width, height) = (scene.screen.width(), scene.screen.height());
+                let pass = Pass {
+                    moments,
+                    points: self.points,
+                    dimensions,
+                    bounces: options.bounces(scene),
+                    height,
+                };
+                let rows = (pixels.len() / width as usize) as u32;
+                for (column, left) in (0..width).step_by(side.0 as usize).enumerate() {
+                    let tile = SampledTile {
+                        place: (column, self.row),
+                        left,
+                        top: self.row as u32 * side.1,
+                        width: side.0.min(width - left),
+                        height: rows,
+                        stride: width as usize,
+                    };
+                    tile::draw::<S, E, N>(simd, &pass, &tile, (pixels, goals), workspace);
+                }
+            },
+        );
+    }
+}
+
+/// Draws with the best kernel for the instructions.
+#[cfg(target_arch = "x86_64")]
+fn draw<E: Real>(job: &Job<E>, level: Level, film: (&mut [Pixel], &[u32]), workspace: &mut Workspace<E>) {
+    if let Some(simd) = level.as_avx512() {
+        job.draw::<_, Fitted<Robust>>(simd, film, workspace);
+    } else if let Some(simd) = level.as_avx2() {
+        job.draw::<_, Fitted<Robust>>(simd, film, workspace);
+    } else {
+        on!(narrow level, simd => job.draw::<_, Unfitted<Robust>>(simd, film, workspace));
+    }
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn draw<E: Real>(job: &Job<E>, level: Level, film: (&mut [Pixel], &[u32]), workspace: &mut Workspace<E>) {
+    on!(level, simd => job.draw::<_, Fitted<Robust>>(simd, film, workspace));
+}

@@ -1,0 +1,312 @@
+//! The samples of a tile's pixels in a pass: where their rays go, and what comes of them.
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+
+use super::Moment;
+use super::light::{LightPoints, SoftLight};
+use crate::fast::bounce::{Column, Hits, Queue};
+use crate::fast::candidates::Candidates;
+use crate::fast::features::{BUILT, Kernel, Variant, fitted};
+use crate::fast::look::look;
+use crate::fast::rays::Rays;
+use crate::fast::real::{Lanes, Real, Vec3, constant};
+use crate::fast::tile::{Met, Scratch, shade};
+use crate::sampling::film::Pixel;
+use crate::sampling::places::on_disc;
+use crate::sampling::{Dimensions, Points, pixel_seed};
+
+/// Where a pixel shows no object.
+const NOTHING: u32 = u32::MAX;
+
+/// Samples that are drawn at once.
+const ROOM: usize = 256;
+
+/// Columns and rows of the blocks in which a tile's pixels are taken, so that those of a packet lie side by side.
+const BLOCK: u32 = 4;
+
+/// What all tiles of a pass have in common.
+pub(super) struct Pass<'a, E> {
+    pub(super) moments: &'a [Moment<E>],
+    pub(super) points: &'a Points,
+    pub(super) dimensions: &'a Dimensions,
+    pub(super) bounces: u32,
+    /// Rows of the image.
+    pub(super) height: u32,
+}
+
+/// A tile of the image, its first row at the top.
+pub(super) struct SampledTile {
+    /// Columns and rows of tiles before it.
+    pub(super) place: (usize, usize),
+    pub(super) left: u32,
+    pub(super) top: u32,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    /// Pixels of a row of the image.
+    pub(super) stride: usize,
+}
+
+/// A ray to be drawn.
+#[derive(Clone, Copy, Debug, Default)]
+struct Item {
+    moment: u32,
+    /// Of the pixels of the tile's rows.
+    pixel: u32,
+    sample: u32,
+}
+
+/// Memory of a worker, used again for each of its tiles.
+pub(super) struct Workspace<E> {
+    scratch: Scratch<E>,
+    items: Vec<Item>,
+    lights: LightPoints<E>,
+    seeds: [u32; ROOM],
+    samples: [u32; ROOM],
+    columns: [f64; ROOM],
+    rows: [f64; ROOM],
+    coordinates: [[f64; ROOM]; 3],
+    /// What the rays from the camera meet.
+    objects: [u32; ROOM],
+}
+
+impl<E: Real> Workspace<E> {
+    pub(super) fn new() -> Self {
+        Self {
+            scratch: Scratch::new(),
+            items: vec![],
+            lights: LightPoints::default(),
+            seeds: [0; ROOM],
+            samples: [0; ROOM],
+            columns: [0.0; ROOM],
+            rows: [0.0; ROOM],
+            coordinates: [[0.0; ROOM]; 3],
+            objects: [NOTHING; ROOM],
+        }
+    }
+}
+
+/// Draws the samples that a tile's pixels lack; `pixels` and their goals are those of the tile's rows.
+#[inline(always)]
+pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
+    simd: S,
+    pass: &Pass<E>,
+    tile: &SampledTile,
+    (pixels, goals): (&mut [Pixel], &[u32]),
+    workspace: &mut Workspace<E>,
+) {
+    let mut items = core::mem::take(&mut workspace.items);
+    items.clear();
+    let still = if let [moment] = pass.moments { Some(moment) } else { None };
+    if let Some(moment) = still
+        && moment.shows_nothing(tile)
+    {
+        let color = moment.prepared.background.map(Real::widen);
+        tile.each_pixel(|place| {
+            let (pixel, goal) = (&mut pixels[place], goals[place]);
+            pixel.add_equal(color, goal.saturating_sub(pixel.count()));
+        });
+    } else {
+        tile.each_pixel(|place| {
+            for sample in pixels[place].count()..goals[place] {
+                items.push(Item { moment: 0, pixel: place as u32, sample });
+            }
+        });
+        if let Some(time) = pass.dimensions.time {
+            set_moments(pass, tile, time, &mut items);
+        }
+        for of_moment in items.chunk_by(|a, b| a.moment == b.moment) {
+            let moment = &pass.moments[of_moment[0].moment as usize];
+            for batch in of_moment.chunks(ROOM) {
+                draw_batch::<S, E, N>(simd, pass, (tile, moment), batch, workspace);
+                for (ray, item) in batch.iter().enumerate() {
+                    let hits = &workspace.scratch.hits;
+                    let pixel = &mut pixels[item.pixel as usize];
+                    if item.sample == 0 {
+                        pixel.note(workspace.objects[ray]);
+                    }
+                    pixel.add([0, 1, 2].map(|channel: usize| hits.color[channel].0[ray].widen()));
+                }
+            }
+        }
+    }
+    workspace.items = items;
+}
+
+impl SampledTile {
+    /// Its pixels' places in its rows, block by block.
+    #[inline(always)]
+    fn each_pixel(&self, mut each: impl FnMut(usize)) {
+        for top in (0..self.height).step_by(BLOCK as usize) {
+            for left in (0..self.width).step_by(BLOCK as usize) {
+                for row in top..(top + BLOCK).min(self.height) {
+                    for column in left..(left + BLOCK).min(self.width) {
+                        each(row as usize * self.stride + (self.left + column) as usize);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Column and row of the image; both count from the upper left corner.
+    #[inline(always)]
+    fn pixel(&self, place: u32) -> (u32, u32) {
+        (place % self.stride as u32, self.top + place / self.stride as u32)
+    }
+}
+
+impl<E: Real> Moment<E> {
+    /// Whether a tile surely shows nothing but a background of one colour.
+    #[inline(always)]
+    fn shows_nothing(&self, tile: &SampledTile) -> bool {
+        self.prepared.is_plain() && self.window.candidates(tile.place.0, tile.place.1) == 0
+    }
+}
+
+/// Gives each ray its moment, and sorts by that.
+#[inline(never)]
+fn set_moments<E: Real>(pass: &Pass<E>, tile: &SampledTile, time: usize, items: &mut [Item]) {
+    let count = pass.moments.len() as f64;
+    let mut coordinates = [0.0; ROOM];
+    for batch in items.chunks_mut(ROOM) {
+        let (mut seeds, mut samples) = ([0; ROOM], [0; ROOM]);
+        for (k, item) in batch.iter().enumerate() {
+            let (column, row) = tile.pixel(item.pixel);
+            seeds[k] = pixel_seed(column, row);
+            samples[k] = item.sample;
+        }
+        let rays = batch.len();
+        pass.points.coordinates(time, &seeds[..rays], &samples[..rays], &mut coordinates[..rays]);
+        for (item, time) in batch.iter_mut().zip(coordinates) {
+            item.moment = (time * count) as u32;
+        }
+    }
+    items.sort_unstable_by_key(|item| (item.moment, item.pixel, item.sample));
+}
+
+/// Draws at most [`ROOM`] rays of one moment; their colours are those of the hits then.
+#[inline(always)]
+fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
+    simd: S,
+    pass: &Pass<E>,
+    (tile, moment): (&SampledTile, &Moment<E>),
+    batch: &[Item],
+    workspace: &mut Workspace<E>,
+) {
+    let Workspace { scratch, lights, seeds, samples, columns, rows, coordinates, objects, items: _ } =
+        workspace;
+    let count = batch.len();
+    for (k, item) in batch.iter().enumerate() {
+        let (column, row) = tile.pixel(item.pixel);
+        seeds[k] = pixel_seed(column, row);
+        samples[k] = item.sample;
+        columns[k] = f64::from(column);
+        rows[k] = f64::from(pass.height - 1 - row);
+    }
+    let (seeds, samples) = (&seeds[..count], &samples[..count]);
+    let [u, v, _] = coordinates;
+    pass.points.coordinates(0, seeds, samples, &mut u[..count]);
+    pass.points.coordinates(1, seeds, samples, &mut v[..count]);
+    for k in 0..count {
+        columns[k] += u[k] - 0.5;
+        rows[k] += v[k] - 0.5;
+    }
+    let lens = pass.dimensions.lens.zip(moment.lens.as_ref());
+    if let Some((first, lens)) = lens {
+        pass.points.coordinates(first, seeds, samples, &mut u[..count]);
+        pass.points.coordinates(first + 1, seeds, samples, &mut v[..count]);
+        for k in 0..count {
+            let at = on_disc(u[k], v[k]) * lens.radius;
+            (u[k], v[k]) = (at.x, at.y);
+        }
+    }
+    let scene = &moment.prepared;
+    let queue = &mut scratch.queue;
+    for k in 0..count {
+        queue.pixel.0[k] = E::narrow(k as f64);
+        // Columns that are filled anew just below.
+        queue.weight[0].0[k] = E::narrow(columns[k]);
+        queue.weight[1].0[k] = E::narrow(rows[k]);
+    }
+    if lens.is_some() {
+        for k in 0..count {
+            queue.origin[0].0[k] = E::narrow(u[k]);
+            queue.origin[1].0[k] = E::narrow(v[k]);
+        }
+    }
+    queue.count = count;
+    let soft = moment.extents.as_ref().map(|extents| {
+        extents.place(pass.points, seeds, samples, coordinates, lights);
+        SoftLight { extents, points: lights }
+    });
+    aim::<S, E>(simd, moment, &mut scratch.queue);
+    let Scratch { queue, hits, next, in_the_way, sights, .. } = &mut *scratch;
+    let tree = BUILT.tree && scene.tree.is_some();
+    let candidates = match &scene.sights {
+        Some(all) if BUILT.tree && all.gather(tile.place.0, tile.place.1, sights) => {
+            Candidates::listed(sights)
+        }
+        _ if tree => scene.all(),
+        _ => Candidates::masked(scene.masks(moment.window.candidates(tile.place.0, tile.place.1))),
+    };
+    next.count = 0;
+    hits.packets.clear();
+    let (kinds, background) = (candidates.kinds, scene.background);
+    if matches!(scene.rays, Rays::Pinhole(_)) && lens.is_none() {
+        fitted!(N, kinds, tree, C T D => {
+            look::<S, E, Variant<N::By, C, T, D>, true>(simd, scene, candidates, background, queue, hits)
+        });
+        let met = Met { kinds, background, queue, count, next: Some(&mut *next), soft };
+        shade::<S, E, N, true>(simd, scene, met, hits, in_the_way);
+    } else {
+        fitted!(N, kinds, tree, C T D => {
+            look::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, candidates, background, queue, hits)
+        });
+        let met = Met { kinds, background, queue, count, next: Some(&mut *next), soft };
+        shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
+    }
+    if batch.iter().any(|item| item.sample == 0) {
+        note_objects(hits, Lanes::<S, E>::LEN, objects);
+    }
+    scratch.follow::<S, N>(simd, scene, pass.bounces, soft);
+}
+
+/// The rays of a batch: their columns and rows wait in the first two columns of the weights, their points of the lens in those
+/// of the origins.
+#[inline(never)]
+fn aim<S: Simd, E: Real>(simd: S, moment: &Moment<E>, queue: &mut Queue<E>) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let one = constant::<S, E>(simd, 1.0);
+            for at in (0..queue.count).step_by(Lanes::<S, E>::LEN) {
+                let end = at + Lanes::<S, E>::LEN;
+                let load = |column: &Column<E>| Lanes::<S, E>::from_slice(simd, &column.0[at..end]);
+                let (i, j) = (load(&queue.weight[0]), load(&queue.weight[1]));
+                let (origin, direction) = match (&moment.prepared.rays, &moment.lens) {
+                    (Rays::Pinhole(rays), None) => (Vec3::zero(simd), rays.along(simd, i, j)),
+                    (Rays::Pinhole(rays), Some(lens)) => {
+                        let (x, y) = (load(&queue.origin[0]), load(&queue.origin[1]));
+                        lens.ray(simd, rays.along(simd, i, j), x, y)
+                    }
+                    (Rays::Parallel(rays), _) => (rays.origin(simd, i, j), rays.direction(simd)),
+                };
+                origin.store(&mut queue.origin, at);
+                direction.normalize(simd).store(&mut queue.direction, at);
+                Vec3::<S, E>::new(one, one, one).store(&mut queue.weight, at);
+            }
+        },
+    );
+}
+
+/// Notes what each ray of a batch has met.
+fn note_objects<E: Real>(hits: &Hits<E>, lanes: usize, objects: &mut [u32; ROOM]) {
+    objects.fill(NOTHING);
+    for &(at, _) in &hits.packets {
+        for ray in at..(at + lanes).min(ROOM) {
+            if hits.distance.0[ray].widen() < E::FAR {
+                objects[ray] = hits.order.0[ray].to_index() as u32;
+            }
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! Pixels that are means, in the words of the language: points of the square, of the lens, of the lights, and moments.
+
+use glam::DVec3;
+use image::RgbImage;
+use rayfold_scene::{Camera, Light, Scene};
+
+use super::shading::Shader;
+use super::tone;
+use super::world::World;
+use crate::camera::Ray;
+use crate::parallel::{CHANNELS, bands};
+use crate::sampling::places::{in_ball, in_cone, on_disc, spread};
+use crate::sampling::{Dimensions, coordinate, pixel_seed};
+use crate::{Exposure, RenderError, RenderOptions};
+
+/// A scene at a moment.
+struct Moment<'a> {
+    world: World<'a>,
+    dimensions: &'a Dimensions,
+    bounces: u32,
+}
+
+/// Draws a scene by the same samples as the kernels, all that it may have in every pixel.
+///
+/// # Errors
+/// Those of [`crate::render`].
+pub(crate) fn render_exposed(exposure: Exposure, options: &RenderOptions) -> Result<RgbImage, RenderError> {
+    let scene = exposure.scene();
+    let samples = scene.samples.most();
+    if samples == 1 {
+        return super::render(scene, options);
+    }
+    let scenes = exposure.moments();
+    let dimensions = Dimensions::new(&scenes);
+    let bounces = options.bounces(scene);
+    let moments =
+        scenes.iter().map(|scene| Moment { world: World::new(scene), dimensions: &dimensions, bounces });
+    let moments: Vec<Moment> = moments.collect();
+    let image = bands(
+        scene.screen,
+        1,
+        options,
+        || (),
+        |(), row, band| {
+            for (pixel, column) in band.chunks_exact_mut(CHANNELS).zip(0u32..) {
+                let seed = pixel_seed(column, row);
+                let mut sum = DVec3::ZERO;
+                for sample in 0..samples {
+                    let number = |dimension| coordinate(seed, sample, dimension);
+                    let time = dimensions.time.map_or(0.0, number) * moments.len() as f64;
+                    let moment = &moments[time as usize];
+                    sum += moment.color(scene, (column, row), number, options);
+                }
+                pixel.copy_from_slice(&tone::toned(scene.tone, sum / f64::from(samples)));
+            }
+        },
+    )?;
+    let is_cancelled = options.cancel.is_some_and(|flag| flag.load(std::sync::atomic::Ordering::Relaxed));
+    if is_cancelled { Err(RenderError::Cancelled) } else { Ok(image) }
+}
+
+impl Moment<'_> {
+    /// The colour of a sample of a pixel, clamped; rows count from the top. `number` gives its coordinates.
+    fn color(
+        &self,
+        scene: &Scene,
+        (column, row): (u32, u32),
+        number: impl Fn(usize) -> f64,
+        options: &RenderOptions,
+    ) -> DVec3 {
+        let i = f64::from(column) + number(0) - 0.5;
+        let j = f64::from(scene.screen.height() - 1 - row) + number(1) - 0.5;
+        let ray = self.ray(i, j, &number);
+        let lights = self.light_points(&number);
+        let shader = Shader { world: &self.world, lights: &lights, cancel: options.cancel };
+        let color = shader.color(ray, self.bounces);
+        // What is not a number is black.
+        DVec3::select(color.cmpgt(DVec3::ZERO), color.min(DVec3::ONE), DVec3::ZERO)
+    }
+
+    /// From a point of the lens through where the eye's own ray is in focus.
+    fn ray(&self, i: f64, j: f64, number: impl Fn(usize) -> f64) -> Ray {
+        let World { scene, rays, .. } = &self.world;
+        let ray = rays.ray(i, j);
+        let Some(first) = self.dimensions.lens else { return ray };
+        let ((u, v, w), own) = match &scene.camera {
+            Camera::Orthographic => return ray,
+            Camera::Pinhole(pinhole) => (pinhole.basis(), pinhole.distance()),
+            Camera::Look(look) => (look.basis(), look.distance()),
+        };
+        let distance = scene.lens.distance().unwrap_or(own);
+        let at = scene.lens.radius() * on_disc(number(first), number(first + 1));
+        let offset = at.x * u + at.y * v;
+        // As far as 1 along the gaze.
+        let along = ray.direction / -ray.direction.dot(w);
+        Ray { origin: ray.origin + offset, direction: (along - offset / distance).normalize() }
+    }
+
+    fn light_points(&self, number: impl Fn(usize) -> f64) -> Vec<DVec3> {
+        let middles = self.world.middles();
+        let lights = self.world.lights.iter().zip(middles).zip(&self.dimensions.lights);
+        let point = |((light, middle), first): ((&Light, DVec3), &Option<usize>)| {
+            let &Some(first) = first else { return middle };
+            match light {
+                Light::Directional(sun) => {
+                    let (x, y) = middle.any_orthonormal_pair();
+                    let at = in_cone(number(first), number(first + 1), spread(sun.angle()));
+                    at.x * x + at.y * y + at.z * middle
+                }
+                Light::Lamp(lamp) => {
+                    middle + lamp.radius() * in_ball(number(first), number(first + 1), number(first + 2))
+                }
+            }
+        };
+        lights.map(point).collect()
+    }
+}
+
+/// What a picture is, before it is rounded: the means of independent samples.
+#[cfg(feature = "accuracy")]
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    /// Row by row from the top, in 0..1, before [`rayfold_scene::Tone`].
+    pub means: Vec<DVec3>,
+    /// Their standard errors.
+    pub errors: Vec<DVec3>,
+}
+
+/// Estimates a picture by independent random samples, as many in every pixel: what sampled pictures are judged by. All pixels
+/// share the moment of a sample.
+#[cfg(feature = "accuracy")]
+pub fn estimate(exposure: Exposure, samples: u32, seed: u64) -> Estimate {
+    use rayon::prelude::*;
+
+    let scene = exposure.scene();
+    let (width, height) = (scene.screen.width(), scene.screen.height());
+    let mut sums = vec![(DVec3::ZERO, DVec3::ZERO); width as usize * height as usize];
+    let mut all = vec![exposure.at(0.0), exposure.at(1.0)];
+    if exposure.motion().is_none() {
+        all.truncate(1);
+    }
+    let dimensions = Dimensions::new(&all);
+    let options = RenderOptions::default();
+    let bounces = options.bounces(scene);
+    // A scene that does not move is prepared once.
+    let batch = if exposure.motion().is_some() { 1 } else { samples };
+    for first in (0..samples).step_by(batch as usize) {
+        let time = independent(seed, u64::MAX, first.into(), 0);
+        let of_moment = exposure.at(time);
+        let moment = Moment { world: World::new(&of_moment), dimensions: &dimensions, bounces };
+        sums.par_iter_mut().enumerate().for_each(|(place, sum)| {
+            let place = place as u64;
+            let pixel = ((place % u64::from(width)) as u32, (place / u64::from(width)) as u32);
+            for sample in first..first + batch {
+                let number = |dimension| independent(seed, place, sample.into(), dimension);
+                let color = moment.color(scene, pixel, number, &options);
+                *sum = (sum.0 + color, sum.1 + color * color);
+            }
+        });
+    }
+    let count = f64::from(samples);
+    let means: Vec<DVec3> = sums.iter().map(|sum| sum.0 / count).collect();
+    let errors = sums.iter().zip(&means).map(|(sum, mean)| {
+        let variance = (sum.1 / count - mean * mean).max(DVec3::ZERO);
+        DVec3::from_array((variance / (count - 1.0)).to_array().map(f64::sqrt))
+    });
+    Estimate { errors: errors.collect(), means }
+}
+
+/// A number above 0 and below 1: the SplitMix64 hash of Steele, Lea and Flood (2014).
+#[cfg(feature = "accuracy")]
+fn independent(seed: u64, place: u64, sample: u64, dimension: usize) -> f64 {
+    let mixed = |mut x: u64| {
+        x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        x ^ (x >> 31)
+    };
+    let hash = mixed(mixed(mixed(mixed(seed) ^ place) ^ sample) ^ dimension as u64);
+    ((hash >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+}

@@ -1,0 +1,217 @@
+//! Where the rays of a pixel go when a pixel is a mean: which point of its square, of the lens, of the lights, and when.
+//!
+//! Each of these takes one to three dimensions of a [sequence](sobol) that fills the cube of all of them evenly, another
+//! arrangement for each pixel, so that neighbours err independently. A point depends on column, row, and number of the sample
+//! alone: what stands still from frame to frame does not flicker. [`places`] maps numbers to places, [`film`] sums
+//! up and says where more rays are due. Nothing here knows how rays are traced.
+
+pub(crate) mod film;
+pub(crate) mod places;
+mod sobol;
+
+use rayfold_scene::{Camera, Light, Scene};
+
+/// Dimensions of the pixel's square, which come first: every picture has them.
+const SQUARE: usize = 2;
+
+/// Which dimensions stand for what; what a scene does not have takes none, so that those of low numbers, which are the
+/// most even, are put to use.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Dimensions {
+    /// The first of three (a lamp) or two (a sun) for each light that has an extent, in the order of the script.
+    pub(crate) lights: Vec<Option<usize>>,
+    /// The first of two.
+    pub(crate) lens: Option<usize>,
+    pub(crate) time: Option<usize>,
+    /// How many there are.
+    count: usize,
+}
+
+impl Dimensions {
+    /// Those of scenes that are the same one at several moments; it has a time if there is more than one.
+    pub(crate) fn new(moments: &[Scene]) -> Self {
+        let lights = moments.iter().map(|scene| scene.lights.len()).max().unwrap_or(0);
+        let mut count = SQUARE;
+        let mut take = |of_these: usize| (of_these > 0).then(|| (count, count += of_these).0);
+        let lights = (0..lights)
+            .map(|k| take(moments.iter().map(|m| m.lights.get(k).map_or(0, extent)).max().unwrap_or(0)))
+            .collect();
+        let has_lens = moments.iter().any(has_lens);
+        let lens = take(if has_lens { 2 } else { 0 });
+        let time = take(usize::from(moments.len() > 1));
+        Self { lights, lens, time, count }
+    }
+}
+
+/// Dimensions of a point of a light.
+fn extent(light: &Light) -> usize {
+    match light {
+        Light::Directional(sun) if sun.angle() > 0.0 => 2,
+        Light::Lamp(lamp) if lamp.radius() > 0.0 => 3,
+        Light::Directional(_) | Light::Lamp(_) => 0,
+    }
+}
+
+/// Whether rays start in more than one point of a lens.
+pub(crate) fn has_lens(scene: &Scene) -> bool {
+    scene.lens.radius() > 0.0 && scene.camera != Camera::Orthographic
+}
+
+/// What a pixel's points are made from.
+#[inline(always)]
+pub(crate) const fn pixel_seed(column: u32, row: u32) -> u32 {
+    sobol::mixed(column ^ sobol::mixed(row ^ 0x9e37_79b9))
+}
+
+/// The coordinate of a sample along a dimension, above 0 and below 1.
+pub(crate) fn coordinate(pixel_seed: u32, sample: u32, dimension: usize) -> f64 {
+    unit(sobol::scrambled(reversed(pixel_seed, sample, dimension), seed(pixel_seed, dimension)))
+}
+
+/// Dimensions without numbers of their own use those of others, the samples in another order.
+fn reversed(pixel_seed: u32, sample: u32, dimension: usize) -> u32 {
+    let set = (dimension / sobol::OWN) as u32;
+    let sample = if set == 0 {
+        sample
+    } else {
+        let seed = sobol::mixed(pixel_seed.wrapping_add(set.wrapping_mul(0x85eb_ca6b)));
+        sobol::scrambled(sample.reverse_bits(), seed).reverse_bits()
+    };
+    sobol::reversed(sample, dimension % sobol::OWN)
+}
+
+#[inline(always)]
+const fn seed(pixel_seed: u32, dimension: usize) -> u32 {
+    sobol::mixed(pixel_seed.wrapping_add((dimension as u32 + 1).wrapping_mul(0x9e37_79b9)))
+}
+
+/// The middle of the cell that 32 bits in reverse order name.
+#[inline(always)]
+const fn unit(reversed: u32) -> f64 {
+    (reversed.reverse_bits() as f64 + 0.5) * (1.0 / 4_294_967_296.0)
+}
+
+/// The points of samples, before they are scrambled: the same for all pixels.
+#[derive(Debug)]
+pub(crate) struct Points {
+    first: u32,
+    /// A row for each dimension.
+    rows: Vec<Vec<u32>>,
+}
+
+impl Points {
+    /// Those of the samples from `first` on, up to `end`.
+    pub(crate) fn new(dimensions: &Dimensions, first: u32, end: u32) -> Self {
+        let own = dimensions.count.min(sobol::OWN);
+        let row = |dimension| (first..end).map(|sample| sobol::reversed(sample, dimension)).collect();
+        Self { first, rows: (0..own).map(row).collect() }
+    }
+
+    /// The coordinates of samples of pixels along a dimension: those of [`coordinate`].
+    #[inline(always)]
+    pub(crate) fn coordinates(
+        &self,
+        dimension: usize,
+        pixel_seeds: &[u32],
+        samples: &[u32],
+        into: &mut [f64],
+    ) {
+        match self.rows.get(dimension) {
+            Some(row) => {
+                for ((into, &pixel), &sample) in into.iter_mut().zip(pixel_seeds).zip(samples) {
+                    let point = row[(sample - self.first) as usize];
+                    *into = unit(sobol::scrambled(point, seed(pixel, dimension)));
+                }
+            }
+            None => {
+                for ((into, &pixel), &sample) in into.iter_mut().zip(pixel_seeds).zip(samples) {
+                    *into = coordinate(pixel, sample, dimension);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use rayfold_scene::{DirectionalLight, Lamp, Lens, Screen};
+
+    use super::*;
+
+    fn scene(lens: f64, lights: Vec<Light>) -> Scene {
+        let eye = rayfold_scene::Look::new(DVec3::Z, DVec3::ZERO, 40.0, None).unwrap();
+        let mut scene = Scene::new(Screen::new(1, 1).unwrap(), Camera::Look(eye));
+        scene.lens = Lens::new(lens, None).unwrap();
+        scene.lights = lights.into();
+        scene
+    }
+
+    fn sun(angle: f64) -> Light {
+        DirectionalLight::new(DVec3::ONE, DVec3::NEG_Y).unwrap().spanning(angle).unwrap().into()
+    }
+
+    fn lamp(radius: f64) -> Light {
+        Lamp::new(DVec3::ONE, DVec3::Y, radius, 0.0).unwrap().into()
+    }
+
+    #[test]
+    fn only_what_a_scene_has_takes_dimensions() {
+        let still = Dimensions::new(&[scene(0.0, vec![sun(0.0), lamp(1.0), sun(2.0)])]);
+        assert_eq!((still.lights, still.lens, still.time), (vec![None, Some(2), Some(5)], None, None));
+        let moments = [scene(0.0, vec![lamp(0.0)]), scene(0.5, vec![lamp(0.25)])];
+        let moving = Dimensions::new(&moments);
+        assert_eq!((moving.lights, moving.lens, moving.time), (vec![Some(2)], Some(5), Some(7)));
+        assert_eq!(moving.count, 8);
+        let mut parallel = scene(0.5, vec![]);
+        parallel.camera = Camera::Orthographic;
+        assert_eq!(Dimensions::new(&[parallel]).lens, None);
+    }
+
+    #[test]
+    fn many_pixels_at_once_have_the_points_that_each_has() {
+        let dimensions = Dimensions { lights: vec![], lens: None, time: None, count: 50 };
+        let points = Points::new(&dimensions, 5, 40);
+        let seeds: Vec<u32> = (0..35).map(|k| pixel_seed(k, 7 * k)).collect();
+        let samples: Vec<u32> = (5..40).collect();
+        for dimension in [0, 1, 20, 21, 49] {
+            let mut coordinates = [0.0; 35];
+            points.coordinates(dimension, &seeds, &samples, &mut coordinates);
+            for ((x, &seed), &sample) in coordinates.iter().zip(&seeds).zip(&samples) {
+                assert_eq!(*x, coordinate(seed, sample, dimension));
+                assert!(*x > 0.0 && *x < 1.0);
+            }
+        }
+    }
+
+    #[test]
+    fn dimensions_without_numbers_of_their_own_fill_their_cells_too() {
+        for dimension in [21, 40, 43] {
+            let mut cells: Vec<u32> = (0..64).map(|k| (coordinate(99, k, dimension) * 64.0) as u32).collect();
+            cells.sort_unstable();
+            assert_eq!(cells, (0..64).collect::<Vec<_>>(), "{dimension}");
+        }
+    }
+
+    /// The error of the mean of a discontinuous function falls faster than that of independent points: slope -1/2 would
+    /// be a wrong shuffle.
+    #[test]
+    fn errors_of_edges_fall_with_the_slope_of_nets() {
+        let error = |samples: u32| {
+            let squares: f64 = (0..2000)
+                .map(|pixel| {
+                    let seed = pixel_seed(pixel, 3);
+                    let below = (0..samples)
+                        .filter(|&k| coordinate(seed, k, 0) + 0.618 * coordinate(seed, k, 1) < 0.75)
+                        .count();
+                    // The area below the line: a trapezium, whose upper end is at the right edge.
+                    let area = 0.75 - 0.5 * 0.618;
+                    (below as f64 / f64::from(samples) - area).powi(2)
+                })
+                .sum();
+            (squares / 2000.0).sqrt()
+        };
+        let slope = (error(256) / error(16)).log2() / 4.0;
+        assert!((-0.85..-0.68).contains(&slope), "{slope}");
+    }
+}
