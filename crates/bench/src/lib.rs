@@ -21,6 +21,7 @@ pub mod parsing;
 #[cfg(feature = "bucket")]
 pub mod pipeline;
 mod plot;
+pub mod sampling;
 pub mod scenes;
 #[cfg(feature = "bucket")]
 pub mod simulate;

@@ -1,7 +1,7 @@
 //! The program that measures: a subcommand a report.
 
 use clap::{Parser, Subcommand};
-use rayfold_bench::{accuracy, fingerprints, gif, measure, needs, parsing, speed};
+use rayfold_bench::{accuracy, fingerprints, gif, measure, needs, parsing, sampling, speed};
 #[cfg(feature = "bucket")]
 use rayfold_bench::{cold_start, pipeline, simulate};
 
@@ -36,6 +36,8 @@ enum Measurement {
     Measure(measure::Args),
     /// Instructions that scenes execute for parts of the tracer that they do not use (needs valgrind)
     Needs(needs::Args),
+    /// Error against time of pictures of several samples a pixel
+    Sampling(sampling::Args),
     /// Processor time against the work asked for, and beside POV-Ray and Embree where they are
     Speed(speed::Args),
 }
@@ -54,6 +56,7 @@ fn main() -> anyhow::Result<()> {
         Measurement::Fingerprints(args) => fingerprints::run(&args),
         Measurement::Measure(args) => measure::run(&args),
         Measurement::Needs(args) => needs::run(&args),
+        Measurement::Sampling(args) => sampling::run(&args),
         Measurement::Speed(args) => speed::run(&args),
     }
 }

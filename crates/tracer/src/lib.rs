@@ -28,6 +28,8 @@ mod scale;
 
 pub use camera::pixel_ray;
 pub use exposure::Exposure;
+#[cfg(feature = "accuracy")]
+pub use fast::Means;
 pub use fast::{Drawing, probe};
 #[cfg(feature = "accuracy")]
 pub use nans::take as take_nans;
@@ -37,6 +39,7 @@ use std::sync::atomic::AtomicBool;
 pub use fearless_simd::Level;
 use image::RgbImage;
 use rayfold_scene::Scene;
+pub use sampling::Sampler;
 
 /// Raised whenever any scene's pixels change, so that a picture can be known to be out of date.
 pub const PIXEL_VERSION: u32 = 1;
@@ -74,6 +77,8 @@ pub struct RenderOptions<'a> {
     pub tree: Option<bool>,
     /// How many mirrorings and refractions are followed: the scene's own depth when not set.
     pub bounces: Option<u32>,
+    /// How samples are arranged.
+    pub sampler: Sampler,
 }
 
 impl RenderOptions<'_> {

@@ -144,6 +144,34 @@ impl<'a> Drawing<'a> {
     }
 }
 
+/// A picture before it becomes levels.
+#[cfg(feature = "accuracy")]
+#[derive(Clone, Debug)]
+pub struct Means {
+    /// Row by row from the top, in 0..1, before [`rayfold_scene::Tone`].
+    pub means: Vec<glam::DVec3>,
+    /// Rays from the camera, pixel by pixel.
+    pub counts: Vec<u32>,
+}
+
+#[cfg(feature = "accuracy")]
+impl Drawing<'_> {
+    /// The picture before it becomes levels; none if it is not drawn by sampling kernels.
+    ///
+    /// # Errors
+    /// Those of [`crate::render`].
+    pub fn draw_means(&self) -> Result<Option<Means>, RenderError> {
+        let film = match &self.0 {
+            Backend::SampledSingle(sampled) => sampled.expose(|_| Ok(()))?,
+            Backend::SampledDouble(sampled) => sampled.expose(|_| Ok(()))?,
+            Backend::Single(_) | Backend::Double(_) | Backend::Reference(..) => return Ok(None),
+        };
+        let means = film.pixels.iter().map(crate::sampling::film::Pixel::mean).collect();
+        let counts = film.pixels.iter().map(crate::sampling::film::Pixel::count).collect();
+        Ok(Some(Means { means, counts }))
+    }
+}
+
 /// For pictures of several samples a pixel; none if there are no kernels for the scene.
 fn sampled_backend<'a>(
     exposure: Exposure<'a>,

@@ -31,9 +31,8 @@ use rayfold_scene::{Object, Scene};
 
 pub(crate) use light::highlight;
 pub(crate) use pattern::coefficients;
-pub(crate) use sampled::render_exposed;
-#[cfg(feature = "accuracy")]
-pub use sampled::{Estimate, estimate};
+pub use sampled::{Estimate, estimate, render_exposed};
+
 pub use shapes::Surface;
 pub(crate) use shapes::{normal_and_width, power, triangle_normal};
 pub(crate) use tone::levels;

@@ -24,7 +24,7 @@ struct Moment<'a> {
 ///
 /// # Errors
 /// Those of [`crate::render`].
-pub(crate) fn render_exposed(exposure: Exposure, options: &RenderOptions) -> Result<RgbImage, RenderError> {
+pub fn render_exposed(exposure: Exposure, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     let scene = exposure.scene();
     let samples = scene.samples.most();
     if samples == 1 {
@@ -117,7 +117,6 @@ impl Moment<'_> {
 }
 
 /// What a picture is, before it is rounded: the means of independent samples.
-#[cfg(feature = "accuracy")]
 #[derive(Clone, Debug)]
 pub struct Estimate {
     /// Row by row from the top, in 0..1, before [`rayfold_scene::Tone`].
@@ -128,7 +127,6 @@ pub struct Estimate {
 
 /// Estimates a picture by independent random samples, as many in every pixel: what sampled pictures are judged by. All pixels
 /// share the moment of a sample.
-#[cfg(feature = "accuracy")]
 pub fn estimate(exposure: Exposure, samples: u32, seed: u64) -> Estimate {
     use rayon::prelude::*;
 
@@ -168,7 +166,6 @@ pub fn estimate(exposure: Exposure, samples: u32, seed: u64) -> Estimate {
 }
 
 /// A number above 0 and below 1: the SplitMix64 hash of Steele, Lea and Flood (2014).
-#[cfg(feature = "accuracy")]
 fn independent(seed: u64, place: u64, sample: u64, dimension: usize) -> f64 {
     let mixed = |mut x: u64| {
         x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);

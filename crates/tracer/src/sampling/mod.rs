@@ -68,6 +68,16 @@ pub(crate) fn coordinate(pixel_seed: u32, sample: u32, dimension: usize) -> f64 
     unit(sobol::scrambled(reversed(pixel_seed, sample, dimension), seed(pixel_seed, dimension)))
 }
 
+fn in_pairs(pixel_seed: u32, sample: u32, dimension: usize) -> f64 {
+    let order = seed(pixel_seed, 0x1000 + dimension / 2);
+    let sample = sobol::scrambled(sample.reverse_bits(), order).reverse_bits();
+    unit(sobol::scrambled(sobol::reversed(sample, dimension % 2), seed(pixel_seed, dimension)))
+}
+
+fn independent(pixel_seed: u32, sample: u32, dimension: usize) -> f64 {
+    unit(sobol::mixed(seed(pixel_seed, dimension) ^ sobol::mixed(sample.wrapping_add(0x51ed_270b))))
+}
+
 /// Dimensions without numbers of their own use those of others, the samples in another order.
 fn reversed(pixel_seed: u32, sample: u32, dimension: usize) -> u32 {
     let set = (dimension / sobol::OWN) as u32;
@@ -91,9 +101,25 @@ const fn unit(reversed: u32) -> f64 {
     (reversed.reverse_bits() as f64 + 0.5) * (1.0 / 4_294_967_296.0)
 }
 
+/// How the points of samples are arranged; but for measurements the default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sampler {
+    /// Sobol's sequence in all dimensions, scrambled as Owen does.
+    #[default]
+    Sobol,
+    /// Its first two dimensions for each pair of dimensions, in another order for each.
+    Pairs,
+    /// Each for itself.
+    Independent,
+}
+
+/// Samples whose coordinates are asked for at once, at most.
+pub(crate) const BATCH: usize = 256;
+
 /// The points of samples, before they are scrambled: the same for all pixels.
 #[derive(Debug)]
 pub(crate) struct Points {
+    sampler: Sampler,
     first: u32,
     /// A row for each dimension.
     rows: Vec<Vec<u32>>,
@@ -101,13 +127,13 @@ pub(crate) struct Points {
 
 impl Points {
     /// Those of the samples from `first` on, up to `end`.
-    pub(crate) fn new(dimensions: &Dimensions, first: u32, end: u32) -> Self {
+    pub(crate) fn new(dimensions: &Dimensions, sampler: Sampler, first: u32, end: u32) -> Self {
         let own = dimensions.count.min(sobol::OWN);
         let row = |dimension| (first..end).map(|sample| sobol::reversed(sample, dimension)).collect();
-        Self { first, rows: (0..own).map(row).collect() }
+        Self { sampler, first, rows: (0..own).map(row).collect() }
     }
 
-    /// The coordinates of samples of pixels along a dimension: those of [`coordinate`].
+    /// The coordinates of at most [`BATCH`] samples of pixels along a dimension: those of [`coordinate`].
     #[inline(always)]
     pub(crate) fn coordinates(
         &self,
@@ -116,16 +142,24 @@ impl Points {
         samples: &[u32],
         into: &mut [f64],
     ) {
-        match self.rows.get(dimension) {
+        match self.rows.get(dimension).filter(|_| self.sampler == Sampler::Sobol) {
             Some(row) => {
-                for ((into, &pixel), &sample) in into.iter_mut().zip(pixel_seeds).zip(samples) {
-                    let point = row[(sample - self.first) as usize];
+                // In two loops, of which the second has no branch and is done in packets.
+                let mut points = [0; BATCH];
+                for (point, &sample) in points.iter_mut().zip(samples) {
+                    *point = row[(sample - self.first) as usize];
+                }
+                for ((into, &pixel), &point) in into.iter_mut().zip(pixel_seeds).zip(&points) {
                     *into = unit(sobol::scrambled(point, seed(pixel, dimension)));
                 }
             }
             None => {
                 for ((into, &pixel), &sample) in into.iter_mut().zip(pixel_seeds).zip(samples) {
-                    *into = coordinate(pixel, sample, dimension);
+                    *into = match self.sampler {
+                        Sampler::Sobol => coordinate(pixel, sample, dimension),
+                        Sampler::Pairs => in_pairs(pixel, sample, dimension),
+                        Sampler::Independent => independent(pixel, sample, dimension),
+                    };
                 }
             }
         }
@@ -171,7 +205,7 @@ mod tests {
     #[test]
     fn many_pixels_at_once_have_the_points_that_each_has() {
         let dimensions = Dimensions { lights: vec![], lens: None, time: None, count: 50 };
-        let points = Points::new(&dimensions, 5, 40);
+        let points = Points::new(&dimensions, Sampler::Sobol, 5, 40);
         let seeds: Vec<u32> = (0..35).map(|k| pixel_seed(k, 7 * k)).collect();
         let samples: Vec<u32> = (5..40).collect();
         for dimension in [0, 1, 20, 21, 49] {

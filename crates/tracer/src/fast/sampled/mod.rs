@@ -28,7 +28,7 @@ use super::shape::Robust;
 use super::shapes::Shape;
 use super::window::{Grid, Window};
 use crate::parallel::{CHANNELS, image};
-use crate::sampling::film::{Film, Pixel};
+use crate::sampling::film::{Film, Goals, Pixel};
 use crate::sampling::{Dimensions, Points};
 use crate::{RenderError, RenderOptions};
 
@@ -80,39 +80,49 @@ impl<'a, E: Real> Sampled<'a, E> {
         Ok(Self { scene, options, dimensions, moments, side })
     }
 
-    /// Draws all passes; `each` sees the picture so far after each but the last, an estimate without bias of its own.
+    /// Draws all passes; `each` sees the picture so far after each but the last.
     pub(super) fn draw(&self, mut each: impl FnMut(RgbImage)) -> Result<RgbImage, RenderError> {
+        let film = self.expose(|film| {
+            each(self.develop(film)?);
+            Ok(())
+        })?;
+        self.develop(&film)
+    }
+
+    /// The same, before it becomes levels.
+    pub(super) fn expose(
+        &self,
+        mut each: impl FnMut(&Film) -> Result<(), RenderError>,
+    ) -> Result<Film, RenderError> {
         let scene = self.scene;
         let size = (scene.screen.width(), scene.screen.height());
         let too_large = || RenderError::TooLarge { width: size.0, height: size.1 };
         let mut film = Film::new(size, scene.samples, scene.tone).ok_or_else(too_large)?;
         let mut passes = 0;
-        while let Some(goals) = film.next_pass(PASS) {
+        while let Some(span) = film.plan(PASS) {
             if passes > 0 {
-                each(self.develop(&film)?);
+                each(&film)?;
             }
             passes += 1;
-            self.pass(&mut film, &goals)?;
+            self.pass(&mut film, span)?;
         }
-        self.develop(&film)
+        Ok(film)
     }
 
     /// Gives each pixel the samples that it lacks.
-    fn pass(&self, film: &mut Film, goals: &[u32]) -> Result<(), RenderError> {
-        let first = film.pixels.iter().zip(goals).filter(|(pixel, goal)| pixel.count() < **goal);
-        let (first, end) = first
-            .fold((u32::MAX, 0), |(first, end), (pixel, &goal)| (first.min(pixel.count()), end.max(goal)));
-        let points = Points::new(&self.dimensions, first, end);
+    fn pass(&self, film: &mut Film, (first, end): (u32, u32)) -> Result<(), RenderError> {
+        let points = Points::new(&self.dimensions, self.options.sampler, first, end);
         let level = self.options.level.unwrap_or_else(Level::new);
         let band = film.width * self.side.1 as usize;
-        film.pixels.par_chunks_mut(band).zip(goals.par_chunks(band)).enumerate().try_for_each_init(
+        let (pixels, goals) = film.split();
+        pixels.par_chunks_mut(band).zip(goals.counts.par_chunks(band)).enumerate().try_for_each_init(
             || Box::new(Workspace::new()),
-            |workspace, (row, (pixels, goals))| {
+            |workspace, (row, (pixels, counts))| {
                 if self.options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
                     return Err(RenderError::Cancelled);
                 }
-                let job = Job { of: self, points: &points, row };
-                draw::<E>(&job, level, (pixels, goals), workspace);
+                let job = Job { of: self, points: &points, goals, row };
+                draw::<E>(&job, level, (pixels, counts), workspace);
                 Ok(())
             },
         )
@@ -155,6 +165,7 @@ impl<E: Real> Moment<E> {
 struct Job<'a, E> {
     of: &'a Sampled<'a, E>,
     points: &'a Points,
+    goals: &'a Goals,
     /// Of tiles, from the top.
     row: usize,
 }
@@ -189,7 +200,9 @@ impl<E: Real> Job<'_, E> {
                         height: rows,
                         stride: width as usize,
                     };
-                    tile::draw::<S, E, N>(simd, &pass, &tile, (pixels, goals), workspace);
+                    if self.goals.any(tile.columns(), tile.rows()) {
+                        tile::draw::<S, E, N>(simd, &pass, &tile, (pixels, goals), workspace);
+                    }
                 }
             },
         );

@@ -1,5 +1,7 @@
 //! The samples of a tile's pixels in a pass: where their rays go, and what comes of them.
 
+use std::ops::Range;
+
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
@@ -12,15 +14,16 @@ use crate::fast::look::look;
 use crate::fast::rays::Rays;
 use crate::fast::real::{Lanes, Real, Vec3, constant};
 use crate::fast::tile::{Met, Scratch, shade};
-use crate::sampling::film::Pixel;
+use crate::parallel::CHANNELS;
+use crate::sampling::film::{Pixel, quantised};
 use crate::sampling::places::on_disc;
-use crate::sampling::{Dimensions, Points, pixel_seed};
+use crate::sampling::{BATCH, Dimensions, Points, pixel_seed};
 
 /// Where a pixel shows no object.
 const NOTHING: u32 = u32::MAX;
 
 /// Samples that are drawn at once.
-const ROOM: usize = 256;
+const ROOM: usize = BATCH;
 
 /// Columns and rows of the blocks in which a tile's pixels are taken, so that those of a packet lie side by side.
 const BLOCK: u32 = 4;
@@ -119,14 +122,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             let moment = &pass.moments[of_moment[0].moment as usize];
             for batch in of_moment.chunks(ROOM) {
                 draw_batch::<S, E, N>(simd, pass, (tile, moment), batch, workspace);
-                for (ray, item) in batch.iter().enumerate() {
-                    let hits = &workspace.scratch.hits;
-                    let pixel = &mut pixels[item.pixel as usize];
-                    if item.sample == 0 {
-                        pixel.note(workspace.objects[ray]);
-                    }
-                    pixel.add([0, 1, 2].map(|channel: usize| hits.color[channel].0[ray].widen()));
-                }
+                add_up::<S, E>(simd, batch, workspace, pixels);
             }
         }
     }
@@ -134,6 +130,16 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
 }
 
 impl SampledTile {
+    /// Of the image.
+    pub(super) fn columns(&self) -> Range<usize> {
+        self.left as usize..(self.left + self.width) as usize
+    }
+
+    /// The same, from the top.
+    pub(super) fn rows(&self) -> Range<usize> {
+        self.top as usize..(self.top + self.height) as usize
+    }
+
     /// Its pixels' places in its rows, block by block.
     #[inline(always)]
     fn each_pixel(&self, mut each: impl FnMut(usize)) {
@@ -193,52 +199,10 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     batch: &[Item],
     workspace: &mut Workspace<E>,
 ) {
-    let Workspace { scratch, lights, seeds, samples, columns, rows, coordinates, objects, items: _ } =
-        workspace;
-    let count = batch.len();
-    for (k, item) in batch.iter().enumerate() {
-        let (column, row) = tile.pixel(item.pixel);
-        seeds[k] = pixel_seed(column, row);
-        samples[k] = item.sample;
-        columns[k] = f64::from(column);
-        rows[k] = f64::from(pass.height - 1 - row);
-    }
-    let (seeds, samples) = (&seeds[..count], &samples[..count]);
-    let [u, v, _] = coordinates;
-    pass.points.coordinates(0, seeds, samples, &mut u[..count]);
-    pass.points.coordinates(1, seeds, samples, &mut v[..count]);
-    for k in 0..count {
-        columns[k] += u[k] - 0.5;
-        rows[k] += v[k] - 0.5;
-    }
-    let lens = pass.dimensions.lens.zip(moment.lens.as_ref());
-    if let Some((first, lens)) = lens {
-        pass.points.coordinates(first, seeds, samples, &mut u[..count]);
-        pass.points.coordinates(first + 1, seeds, samples, &mut v[..count]);
-        for k in 0..count {
-            let at = on_disc(u[k], v[k]) * lens.radius;
-            (u[k], v[k]) = (at.x, at.y);
-        }
-    }
-    let scene = &moment.prepared;
-    let queue = &mut scratch.queue;
-    for k in 0..count {
-        queue.pixel.0[k] = E::narrow(k as f64);
-        // Columns that are filled anew just below.
-        queue.weight[0].0[k] = E::narrow(columns[k]);
-        queue.weight[1].0[k] = E::narrow(rows[k]);
-    }
-    if lens.is_some() {
-        for k in 0..count {
-            queue.origin[0].0[k] = E::narrow(u[k]);
-            queue.origin[1].0[k] = E::narrow(v[k]);
-        }
-    }
-    queue.count = count;
-    let soft = moment.extents.as_ref().map(|extents| {
-        extents.place(pass.points, seeds, samples, coordinates, lights);
-        SoftLight { extents, points: lights }
-    });
+    place::<S, E>(simd, pass, (tile, moment), batch, workspace);
+    let Workspace { scratch, lights, objects, .. } = workspace;
+    let (scene, count) = (&moment.prepared, batch.len());
+    let soft = moment.extents.as_ref().map(|extents| SoftLight { extents, points: lights });
     aim::<S, E>(simd, moment, &mut scratch.queue);
     let Scratch { queue, hits, next, in_the_way, sights, .. } = &mut *scratch;
     let tree = BUILT.tree && scene.tree.is_some();
@@ -252,7 +216,7 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     next.count = 0;
     hits.packets.clear();
     let (kinds, background) = (candidates.kinds, scene.background);
-    if matches!(scene.rays, Rays::Pinhole(_)) && lens.is_none() {
+    if matches!(scene.rays, Rays::Pinhole(_)) && moment.lens.is_none() {
         fitted!(N, kinds, tree, C T D => {
             look::<S, E, Variant<N::By, C, T, D>, true>(simd, scene, candidates, background, queue, hits)
         });
@@ -269,6 +233,85 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
         note_objects(hits, Lanes::<S, E>::LEN, objects);
     }
     scratch.follow::<S, N>(simd, scene, pass.bounces, soft);
+}
+
+/// Adds the colours of a batch to its pixels.
+#[inline(never)]
+fn add_up<S: Simd, E: Real>(simd: S, batch: &[Item], workspace: &Workspace<E>, pixels: &mut [Pixel]) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let mut levels = [[0; ROOM]; CHANNELS];
+            for (levels, column) in levels.iter_mut().zip(&workspace.scratch.hits.color) {
+                for (level, color) in levels.iter_mut().zip(&column.0[..batch.len()]) {
+                    *level = quantised(color.widen());
+                }
+            }
+            let mut from = 0;
+            for of_pixel in batch.chunk_by(|a, b| a.pixel == b.pixel) {
+                let to = from + of_pixel.len();
+                let pixel = &mut pixels[of_pixel[0].pixel as usize];
+                if of_pixel[0].sample == 0 {
+                    pixel.note(workspace.objects[from]);
+                }
+                pixel.add(levels.each_ref().map(|levels| &levels[from..to]));
+                from = to;
+            }
+        },
+    );
+}
+
+/// Where the rays of a batch go: columns and rows of the image, points of the lens and of the lights.
+#[inline(never)]
+fn place<S: Simd, E: Real>(
+    simd: S,
+    pass: &Pass<E>,
+    (tile, moment): (&SampledTile, &Moment<E>),
+    batch: &[Item],
+    workspace: &mut Workspace<E>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let Workspace { scratch, lights, seeds, samples, columns, rows, coordinates, .. } = workspace;
+            let count = batch.len();
+            for (k, item) in batch.iter().enumerate() {
+                let (column, row) = tile.pixel(item.pixel);
+                (columns[k], rows[k]) = (f64::from(column), f64::from(pass.height - 1 - row));
+                seeds[k] = pixel_seed(column, row);
+                samples[k] = item.sample;
+            }
+            let (seeds, samples) = (&seeds[..count], &samples[..count]);
+            let [u, v, _] = coordinates;
+            pass.points.coordinates(0, seeds, samples, &mut u[..count]);
+            pass.points.coordinates(1, seeds, samples, &mut v[..count]);
+            let queue = &mut scratch.queue;
+            queue.count = count;
+            // The first columns of the weights, which are filled anew by `aim`.
+            let [i, j, _] = &mut queue.weight;
+            for (i, (column, u)) in i.0.iter_mut().zip(columns.iter().zip(&*u)).take(count) {
+                *i = E::narrow(column + (u - 0.5));
+            }
+            for (j, (row, v)) in j.0.iter_mut().zip(rows.iter().zip(&*v)).take(count) {
+                *j = E::narrow(row + (v - 0.5));
+            }
+            for (slot, pixel) in queue.pixel.0.iter_mut().enumerate().take(count) {
+                *pixel = E::narrow(slot as f64);
+            }
+            if let Some((first, lens)) = pass.dimensions.lens.zip(moment.lens.as_ref()) {
+                pass.points.coordinates(first, seeds, samples, &mut u[..count]);
+                pass.points.coordinates(first + 1, seeds, samples, &mut v[..count]);
+                let [x, y, _] = &mut queue.origin;
+                for k in 0..count {
+                    let at = on_disc(u[k], v[k]) * lens.radius;
+                    (x.0[k], y.0[k]) = (E::narrow(at.x), E::narrow(at.y));
+                }
+            }
+            if let Some(extents) = &moment.extents {
+                extents.place(pass.points, seeds, samples, coordinates, lights);
+            }
+        },
+    );
 }
 
 /// The rays of a batch: their columns and rows wait in the first two columns of the weights, their points of the lens in those

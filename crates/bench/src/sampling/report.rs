@@ -1,0 +1,152 @@
+//! The page, its table and its plots.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::Result;
+
+use super::scenes::EFFECTS;
+use super::{Agreement, Drawn};
+use crate::plot::{Labels, Series, log_log};
+
+const WAYS: [(&str, &str); 4] = [
+    ("adaptive", "adaptive"),
+    ("uniform", "as many everywhere"),
+    ("pairs", "pairs of dimensions"),
+    ("independent", "independent samples"),
+];
+
+pub(super) fn write(
+    folder: &Path,
+    (width, height): (u32, u32),
+    drawn: &[Drawn],
+    agreements: &[Agreement],
+    truth: u32,
+) -> Result<()> {
+    let mut table = csv::Writer::from_path(folder.join("sampling.csv"))?;
+    table.write_record([
+        "effect",
+        "way",
+        "most",
+        "error asked",
+        "ms",
+        "rays a pixel",
+        "error",
+        "off by > 4 %",
+        "error of blocks",
+    ])?;
+    for row in drawn {
+        table.write_record([
+            row.effect.to_owned(),
+            row.way.to_owned(),
+            row.asked.most().to_string(),
+            row.asked.error().to_string(),
+            format!("{:.3}", 1e3 * row.seconds),
+            format!("{:.3}", row.rays),
+            format!("{:.4}", row.error),
+            format!("{:.4}", 100.0 * row.off),
+            format!("{:.4}", row.of_blocks),
+        ])?;
+    }
+    table.flush()?;
+    let mut page = format!(
+        "# Sampling: error against time\n\n\
+         Written by `rayfold-bench sampling`; all figures are in [sampling.csv](sampling.csv). Pictures of {width} x {height}, one \
+         thread, processor time of preparing and drawing, the shortest of three runs. An error is the root mean square over pixels \
+         and channels, in levels (0..255) before rounding, from the truth: the same picture in `f64` with {truth} samples in every \
+         pixel.\n\n"
+    );
+    page.push_str(&slopes(drawn));
+    page.push_str(&rays_saved(drawn));
+    page.push_str(&agreement(agreements));
+    page.push_str("## Error against time\n\n");
+    for effect in &EFFECTS {
+        let series: Vec<Series> = WAYS
+            .iter()
+            .map(|&(way, name)| Series {
+                name: name.to_owned(),
+                points: rows(drawn, effect.name, way).map(|row| (1e3 * row.seconds, row.error)).collect(),
+                joined: true,
+            })
+            .filter(|series| !series.points.is_empty())
+            .collect();
+        if series.is_empty() {
+            continue;
+        }
+        let file = format!("sampling-{}.svg", effect.name);
+        let labels = Labels { title: effect.about, x: "processor time, ms", y: "error, levels" };
+        log_log(&folder.join(&file), &labels, &series)?;
+        writeln!(page, "![{}: {}]({file})\n", effect.name, effect.about)?;
+    }
+    std::fs::write(folder.join("sampling.md"), page.trim_end().to_owned() + "\n")?;
+    Ok(())
+}
+
+fn rows<'a>(drawn: &'a [Drawn], effect: &'a str, way: &'a str) -> impl Iterator<Item = &'a Drawn> {
+    drawn.iter().filter(move |row| row.effect == effect && row.way == way)
+}
+
+/// The exponents of error over samples, between 4 and 64 a pixel.
+fn slopes(drawn: &[Drawn]) -> String {
+    let mut text = "## Slopes\n\nError over samples a pixel, between 4 and 64, as an exponent: independent samples have -0.5.\n\n\
+                    | effect | all dimensions | pairs of dimensions | independent |\n| ------ | ------ | ------ | ------ |\n"
+        .to_owned();
+    for effect in &EFFECTS {
+        let slope = |way: &str| {
+            let at = |count: u32| rows(drawn, effect.name, way).find(|row| row.asked.most() == count);
+            let (few, many) = (at(4)?, at(64)?);
+            Some(format!("{:.2}", (many.error / few.error).ln() / 16f64.ln()))
+        };
+        if let (Some(all), Some(pairs), Some(independent)) =
+            (slope("uniform"), slope("pairs"), slope("independent"))
+        {
+            let _ = writeln!(text, "| {}: {} | {all} | {pairs} | {independent} |", effect.name, effect.about);
+        }
+    }
+    text.push('\n');
+    text
+}
+
+/// What adaptive pictures took, beside pictures of as many samples everywhere.
+fn rays_saved(drawn: &[Drawn]) -> String {
+    let mut text = "## What adaptive pictures take\n\nAsked for at most *n* rays a pixel and an error of *e* levels. *Blocks* is the \
+                    error of means of 4 x 4 pixels: noise leaves it a quarter of the error, bias more.\n\n\
+                    | effect | n, e | rays a pixel | error | share of pixels off by > 4 levels | blocks | ms | the error with n everywhere | ms |\n\
+                    | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+        .to_owned();
+    for row in drawn.iter().filter(|row| row.way == "adaptive") {
+        let all = rows(drawn, row.effect, "uniform").find(|all| all.asked.most() == row.asked.most());
+        let all = all.map_or((String::new(), String::new()), |all| {
+            (format!("{:.3}", all.error), format!("{:.1}", 1e3 * all.seconds))
+        });
+        let _ = writeln!(
+            text,
+            "| {} | {}, {} | {:.2} | {:.3} | {:.3} % | {:.3} | {:.1} | {} | {} |",
+            row.effect,
+            row.asked.most(),
+            row.asked.error(),
+            row.rays,
+            row.error,
+            100.0 * row.off,
+            row.of_blocks,
+            1e3 * row.seconds,
+            all.0,
+            all.1
+        );
+    }
+    text.push('\n');
+    text
+}
+
+fn agreement(agreements: &[Agreement]) -> String {
+    let mut text = "## Against independent samples of the plain tracer\n\nSmall pictures (48 x 36): the difference between the kernels' \
+                    truth and independent random samples of the plain tracer, in standard errors of the latter. Two estimates of \
+                    the same thing have a mean square of about 1; where samples are few it is a little more.\n\n\
+                    | effect | mean square | largest |\n| --- | --- | --- |\n"
+        .to_owned();
+    for row in agreements {
+        let _ = writeln!(text, "| {} | {:.3} | {:.2} |", row.effect, row.mean_square, row.largest);
+    }
+    text.push('\n');
+    text
+}
