@@ -11,7 +11,7 @@ use rayfold_pipeline::keys::{Part, ScriptName};
 use rayfold_pipeline::manifest::Reason;
 use rayfold_pipeline::{Drawing, Error, Renderer, Result};
 use rayfold_scene::Limits;
-use rayfold_tracer::{Exposure, RenderError, RenderOptions};
+use rayfold_tracer::{RenderError, RenderOptions};
 
 use crate::{png, pool};
 
@@ -57,12 +57,11 @@ fn draw(file: &str, script: &[u8], part: Part, limits: &Limits, cancel: &AtomicB
         (part, _) => part.map_or(1, NonZeroU64::get),
     };
     let place = usize::try_from(number - 1).unwrap_or(usize::MAX);
-    let Some(scene) = script.frame(place) else {
+    let options = RenderOptions { cancel: Some(cancel), ..Default::default() };
+    let Some(drawn) = rayfold_tracer::render_frame(&script, place, &options) else {
         return Ok(Drawing::Fault(Reason::new(format!("{file} has {count} frames, no frame {number}"))));
     };
-    let after = |frames| script.frame_after(place, frames).unwrap_or_else(|| scene.clone());
-    let options = RenderOptions { cancel: Some(cancel), ..Default::default() };
-    match rayfold_tracer::render_exposed(Exposure::moving(&scene, &after), &options) {
+    match drawn {
         Ok(image) => match png::encode(&image) {
             Ok(frame) => Ok(Drawing::Frame(frame)),
             Err(source) => Err(Error::Malformed { key: "the drawn frame".to_owned(), source: source.into() }),

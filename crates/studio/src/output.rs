@@ -7,7 +7,7 @@ use std::thread;
 
 use rayfold_gif::{Encoder, Settings};
 use rayfold_scene::{AnimationSettings, Script};
-use rayfold_tracer::{RenderOptions, render};
+use rayfold_tracer::{RenderOptions, render_frame};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
@@ -55,8 +55,11 @@ impl Job {
         let mut encoder = Encoder::new(&mut gif, settings).map_err(|error| failed(&error))?;
         let options = RenderOptions { cancel: Some(cancel), ..RenderOptions::default() };
         told(OutputState::Running { done: 0, of });
-        for (done, scene) in self.scripts.iter().flat_map(Script::frames).enumerate() {
-            let frame = render(&scene, &options).map_err(|error| failed(&error))?;
+        let frames =
+            self.scripts.iter().flat_map(|script| (0..script.frame_count()).map(move |k| (script, k)));
+        for (done, (script, k)) in frames.enumerate() {
+            let Some(frame) = render_frame(script, k, &options) else { break };
+            let frame = frame.map_err(|error| failed(&error))?;
             encoder.push(frame).map_err(|error| failed(&error))?;
             told(OutputState::Running { done: done + 1, of });
         }
@@ -114,9 +117,9 @@ impl Outputs {
 /// # Errors
 /// When it cannot be drawn.
 pub(crate) fn frame_png(script: &Script, frame: usize) -> Result<Option<Vec<u8>>, Error> {
-    let Some(scene) = script.frame(frame) else { return Ok(None) };
+    let Some(image) = render_frame(script, frame, &RenderOptions::default()) else { return Ok(None) };
     let failed = |error: &dyn std::error::Error| Error::Output(format!("cannot make the picture: {error}"));
-    let image = render(&scene, &RenderOptions::default()).map_err(|error| failed(&error))?;
+    let image = image.map_err(|error| failed(&error))?;
     let mut file = io::Cursor::new(Vec::new());
     image.write_to(&mut file, image::ImageFormat::Png).map_err(|error| failed(&error))?;
     Ok(Some(file.into_inner()))

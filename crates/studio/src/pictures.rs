@@ -2,15 +2,17 @@
 //!
 //! A request that waits is replaced by the next one. One that is being drawn at full size is given up for a newer one;
 //! while something moves it is drawn to the end, smaller where it would take too long, so that there always is a
-//! picture. No more pictures are under way than the page keeps up with.
+//! picture, and with one ray a pixel, whatever the script says. At rest a picture of several rays a pixel is shown after each
+//! pass over it. No more pictures are under way than the page keeps up with.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use rayfold_scene::{Camera, Scene, Screen};
-use rayfold_tracer::{RenderOptions, render};
+use image::RgbImage;
+use rayfold_scene::{Camera, Samples, Scene, Screen};
+use rayfold_tracer::{Drawing, RenderOptions};
 
 /// Pictures that the page has not shown yet, at most.
 const UNDER_WAY: u32 = 2;
@@ -123,28 +125,54 @@ impl Shared {
             let mut scene = wanted.scene;
             if wanted.moving {
                 scene.screen = smaller(scene.screen, &scene.camera, per_pixel);
+                scene.samples = Samples::default();
             }
             let start = Instant::now();
             let options = RenderOptions { cancel: Some(&self.cancel), ..RenderOptions::default() };
-            let Ok(image) = render(&scene, &options) else {
+            let drawn = Drawing::new(&scene, &options).and_then(|drawing| {
+                drawing.draw_progressively(|image| {
+                    // What the page cannot show in time is left out: a finer one follows.
+                    if self.another() {
+                        send(packed(wanted.number, &image, start.elapsed()));
+                    }
+                })
+            });
+            let Ok(image) = drawn else {
                 // Given up for a newer one, or beyond what can be drawn.
-                self.change(|desk| desk.under_way -= 1);
+                self.change(|desk| desk.under_way = desk.under_way.saturating_sub(1));
                 continue;
             };
             let took = start.elapsed();
-            per_pixel = took.as_secs_f64() / scene.screen.pixels() as f64;
-            let (width, height) = image.dimensions();
-            let micros = u32::try_from(took.as_micros()).unwrap_or(u32::MAX);
-            let mut bytes = Vec::with_capacity(HEADER + image.len() / 3 * 4);
-            for number in [wanted.number, width, height, micros] {
-                bytes.extend_from_slice(&number.to_le_bytes());
+            if wanted.moving {
+                per_pixel = took.as_secs_f64() / scene.screen.pixels() as f64;
             }
-            bytes.extend(image.as_raw().as_chunks::<3>().0.iter().flat_map(|&[r, g, b]| [r, g, b, 255]));
-            if !send(bytes) {
+            if !send(packed(wanted.number, &image, took)) {
                 return;
             }
         }
     }
+
+    /// Whether the page has room for a picture more; if so, that is under way.
+    fn another(&self) -> bool {
+        let mut is_free = false;
+        self.change(|desk| {
+            is_free = desk.under_way < UNDER_WAY;
+            desk.under_way += u32::from(is_free);
+        });
+        is_free
+    }
+}
+
+/// A picture as the page takes it.
+fn packed(number: u32, image: &RgbImage, took: Duration) -> Vec<u8> {
+    let (width, height) = image.dimensions();
+    let micros = u32::try_from(took.as_micros()).unwrap_or(u32::MAX);
+    let mut bytes = Vec::with_capacity(HEADER + image.len() / 3 * 4);
+    for number in [number, width, height, micros] {
+        bytes.extend_from_slice(&number.to_le_bytes());
+    }
+    bytes.extend(image.as_raw().as_chunks::<3>().0.iter().flat_map(|&[r, g, b]| [r, g, b, 255]));
+    bytes
 }
 
 /// A size that is drawn in time. The pixels of an orthographic camera are world units, and stay.
@@ -162,8 +190,8 @@ fn smaller(screen: Screen, camera: &Camera, per_pixel: f64) -> Screen {
 
 #[cfg(test)]
 mod tests {
+    use rayfold_tracer::render;
     use std::sync::mpsc;
-    use std::time::Duration;
 
     use super::*;
 
@@ -189,6 +217,27 @@ mod tests {
         assert_eq!((number(&picture), picture.len()), (7, HEADER + 64 * 48 * 4));
         let (pixels, _) = picture[HEADER..].as_chunks::<4>();
         assert!(pixels.iter().zip(expected.pixels()).all(|(a, b)| a[..3] == b.0 && a[3] == 255));
+        painter.close();
+    }
+
+    #[test]
+    fn at_rest_a_picture_gets_finer_and_ends_as_the_tracers() {
+        let (sender, pictures) = mpsc::channel();
+        let painter = Painter::start(move |picture| sender.send(picture).is_ok()).unwrap();
+        let mut request = wanted(9, false);
+        request.scene.samples = Samples::new(64, 1.0).unwrap();
+        let expected = render(&request.scene, &RenderOptions::default()).unwrap();
+        painter.want(request);
+        let mut seen = vec![];
+        let is_last = |picture: &Vec<u8>| {
+            let (pixels, _) = picture[HEADER..].as_chunks::<4>();
+            pixels.iter().zip(expected.pixels()).all(|(a, b)| a[..3] == b.0)
+        };
+        while !seen.last().is_some_and(is_last) {
+            seen.push(pictures.recv_timeout(Duration::from_secs(20)).unwrap());
+            painter.shown();
+        }
+        assert!(seen.len() > 1 && seen.iter().all(|picture| number(picture) == 9), "{}", seen.len());
         painter.close();
     }
 

@@ -38,7 +38,7 @@ use std::sync::atomic::AtomicBool;
 
 pub use fearless_simd::Level;
 use image::RgbImage;
-use rayfold_scene::Scene;
+use rayfold_scene::{Scene, Script};
 pub use sampling::Sampler;
 
 /// Raised whenever any scene's pixels change, so that a picture can be known to be out of date.
@@ -131,6 +131,20 @@ pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, Render
 /// Those of [`render`].
 pub fn render_exposed(exposure: Exposure, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     Drawing::exposed(exposure, options)?.draw()
+}
+
+/// Draws frame `k` of a script, counted from 0, on the current rayon pool; `None` beyond the last.
+///
+/// # Errors
+/// Those of [`render`].
+pub fn render_frame(
+    script: &Script,
+    k: usize,
+    options: &RenderOptions,
+) -> Option<Result<RgbImage, RenderError>> {
+    let scene = script.frame(k)?;
+    let after = |frames| script.frame_after(k, frames).unwrap_or_else(|| scene.clone());
+    Some(render_exposed(Exposure::moving(&scene, &after), options))
 }
 
 /// As [`render`] in single precision, by textbook formulas without any regard for rounding: what robustness is measured
