@@ -30,7 +30,7 @@ const CONTRAST: f64 = 1.5;
 const SLOPE: f64 = -0.65;
 
 /// So many times the error that is asked for a pixel may have: most others have less.
-const SPARED: f64 = 1.5;
+const SPARED: f64 = 3.0;
 
 /// What a pixel has got so far.
 #[derive(Clone, Copy, Debug, Default)]
@@ -127,6 +127,8 @@ pub(crate) struct Film {
     tone: Tone,
     /// Whose error is too large.
     unsettled: Vec<bool>,
+    /// How many samples each had when that was found out.
+    judged: Vec<u32>,
     goals: Goals,
 }
 
@@ -163,6 +165,7 @@ impl Film {
             samples,
             tone,
             unsettled: filled(count, true)?,
+            judged: filled(count, 0)?,
             goals: Goals {
                 counts: filled(count, 0)?,
                 blocks: filled(blocks_in_row * height.div_ceil(BLOCK), true)?,
@@ -193,9 +196,9 @@ impl Film {
         let next = film.each_block(&lively, |row, columns, next: &mut Next| {
             for column in columns {
                 let place = row * film.width + column;
-                let (count, goal) = (film.pixels[place].count, film.goal(row, column, most));
-                next.goals.push((place, goal));
+                let (count, goal) = (film.goals.counts[place], film.goal(row, column, most));
                 if goal > count {
+                    next.goals.push((place, goal));
                     next.first = next.first.min(count);
                     next.end = next.end.max(goal);
                 }
@@ -226,15 +229,33 @@ impl Film {
         (0..blocks.len()).filter(is_lively).collect()
     }
 
-    /// Finds out whose errors are too large.
+    /// Finds out whose errors are too large, of those that have got samples since.
     fn judge(&mut self, lively: &[usize]) {
         let film = &*self;
+        // All counts are among these: how much their samples may vary.
+        let mut limits = vec![];
+        let mut count = SECOND;
+        while count < self.samples.most() {
+            limits.push((count, film.limit(count)));
+            count = following(count).min(self.samples.most());
+        }
         let judged = film.each_block(lively, |row, columns, into: &mut Vec<(usize, bool)>| {
-            into.extend(columns.map(|column| (row * film.width + column, film.is_unsettled(row, column))));
+            for column in columns {
+                let place = row * film.width + column;
+                if film.goals.counts[place] != film.judged[place] {
+                    into.push((place, film.is_unsettled(row, column, &limits)));
+                }
+            }
         });
         for (place, is_unsettled) in judged.into_iter().flat_map(|(_, of_block)| of_block) {
             self.unsettled[place] = is_unsettled;
+            self.judged[place] = self.goals.counts[place];
         }
+    }
+
+    /// The deviation of so many samples at which their mean is as good as is asked for.
+    fn limit(&self, count: u32) -> f64 {
+        SPARED * self.samples.error() * libm::pow(f64::from(count), -SLOPE)
     }
 
     /// Something for each of some blocks, gathered from the parts of rows that lie in it.
@@ -272,10 +293,10 @@ impl Film {
     /// How many samples a pixel shall have after the next pass.
     fn goal(&self, row: usize, column: usize, most: u32) -> u32 {
         let place = row * self.width + column;
-        let count = self.pixels[place].count;
+        let count = self.goals.counts[place];
         let mut goes_on = self.unsettled[place];
         self.neighbours(row, column, |place| {
-            let other = self.pixels[place].count;
+            let other = self.goals.counts[place];
             goes_on |= self.unsettled[place] && other >= count
                 || u64::from(other) > 2 * u64::from(count.max(SECOND / 2));
         });
@@ -286,15 +307,15 @@ impl Film {
         }
     }
 
-    fn is_unsettled(&self, row: usize, column: usize) -> bool {
+    fn is_unsettled(&self, row: usize, column: usize, limits: &[(u32, f64)]) -> bool {
         let pixel = &self.pixels[row * self.width + column];
         if pixel.count >= self.samples.most() {
             return false;
         }
         if pixel.count >= SECOND {
-            // Points that fill their cube evenly err less than independent ones.
-            let error = pixel.deviation(self.tone) * libm::pow(f64::from(pixel.count), SLOPE);
-            return error > SPARED * self.samples.error();
+            let known = limits.iter().find(|(count, _)| *count == pixel.count);
+            let limit = known.map_or_else(|| self.limit(pixel.count), |(_, limit)| *limit);
+            return pixel.deviation(self.tone) > limit;
         }
         let limit = CONTRAST * self.samples.error() / 255.0;
         let mean = self.shown(pixel);
@@ -324,7 +345,7 @@ struct Next {
 
 impl Default for Next {
     fn default() -> Self {
-        Self { goals: Vec::with_capacity(BLOCK * BLOCK), first: u32::MAX, end: 0 }
+        Self { goals: vec![], first: u32::MAX, end: 0 }
     }
 }
 
