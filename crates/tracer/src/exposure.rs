@@ -3,7 +3,7 @@
 use rayfold_scene::Scene;
 
 /// The moments at which a scene that moves is drawn, for each sample that a pixel may have.
-const MOMENTS_FOR_A_SAMPLE: u32 = 4;
+const MOMENTS_FOR_A_SAMPLE: u32 = 2;
 
 /// How many there are at least and at most.
 const MOMENTS: (u32, u32) = (16, 256);

@@ -23,15 +23,15 @@ use crate::sampling::{Dimensions, Points};
 
 /// The extents of a scene's lights.
 #[derive(Debug)]
-pub(in crate::fast) struct Extents<E> {
+pub(in crate::fast) struct Extents {
     /// For each sun, which of the [`LightPoints`] are its own, if it has any.
     suns: Vec<Option<(usize, SoftSun)>>,
     /// The same for each lamp.
     lamps: Vec<Option<(usize, Ball)>>,
     /// Of few objects: what they are known to lie in.
     hulls: Option<Hulls>,
+    /// The first dimension of each of the points.
     dimensions: Vec<usize>,
-    numbers: core::marker::PhantomData<E>,
 }
 
 #[derive(Debug)]
@@ -51,7 +51,7 @@ struct Ball {
 /// Lights of which each ray has a point of its own, for the rays of a tile.
 #[derive(Clone, Copy)]
 pub(in crate::fast) struct SoftLight<'a, E> {
-    pub(super) extents: &'a Extents<E>,
+    pub(super) extents: &'a Extents,
     pub(super) points: &'a LightPoints<E>,
 }
 
@@ -61,9 +61,9 @@ pub(super) struct LightPoints<E> {
     of: Vec<Columns<E>>,
 }
 
-impl<E: Real> Extents<E> {
+impl Extents {
     /// None where all lights are points.
-    pub(super) fn new(
+    pub(super) fn new<E: Real>(
         scene: &Scene,
         geometry: &Geometry,
         shapes: Option<&[Shape]>,
@@ -91,13 +91,12 @@ impl<E: Real> Extents<E> {
             }
         }
         let hulls = shapes.map(|shapes| Hulls::new::<E>(shapes.iter()));
-        let numbers = core::marker::PhantomData;
-        (!firsts.is_empty()).then_some(Self { suns, lamps, hulls, dimensions: firsts, numbers })
+        (!firsts.is_empty()).then_some(Self { suns, lamps, hulls, dimensions: firsts })
     }
 
     /// The points of rays of these samples of pixels.
     #[inline(always)]
-    pub(super) fn place(
+    pub(super) fn place<E: Real>(
         &self,
         points: &Points,
         pixel_seeds: &[u32],

@@ -46,7 +46,7 @@ pub(super) const MARGIN: f64 = 0.5 + super::rounding::MARGIN;
 struct Moment<E> {
     prepared: Prepared<E>,
     window: Window,
-    extents: Option<Extents<E>>,
+    extents: Option<Extents>,
     lens: Option<Aperture<E>>,
 }
 
@@ -156,7 +156,7 @@ impl<E: Real> Moment<E> {
         shapes.sort_by_key(|shape| shape.kind().number());
         let window = Window::new(geometry.view, &shapes, &grid, E::ROUNDOFF);
         let few = prepared.tree.is_none().then_some(&shapes[..]);
-        let extents = Extents::new(scene, geometry, few, dimensions);
+        let extents = Extents::new::<E>(scene, geometry, few, dimensions);
         Ok(Self { prepared, window, extents, lens: Aperture::new(geometry) })
     }
 }
