@@ -12,11 +12,13 @@ mod bounds;
 mod candidates;
 mod coincidence;
 mod descent;
+mod dimming;
 mod dispatch;
 mod exact;
 mod features;
 mod finish;
 mod geometry;
+mod glass;
 mod kind;
 mod light;
 mod lights;
@@ -24,6 +26,7 @@ mod lists;
 mod look;
 #[cfg(feature = "accuracy")]
 mod naive;
+mod onwards;
 mod packet;
 mod placed;
 mod precision;
@@ -38,12 +41,15 @@ mod shape;
 mod shapes;
 mod sights;
 mod sky;
-mod supported;
 mod surfaces;
+mod ties;
 mod tile;
 mod tone;
 mod tree;
+mod waiting;
 mod window;
+
+use std::sync::atomic::Ordering;
 
 use fearless_simd::{Level, Simd};
 use image::RgbImage;
@@ -59,6 +65,7 @@ use self::prepare::Prepared;
 use self::real::Real;
 use self::shape::Robust;
 use self::shapes::{Formulas, Shape};
+use self::ties::Ranked;
 use self::tile::Scratch;
 use self::tone::levels;
 use self::window::Window;
@@ -90,12 +97,14 @@ impl<'a> Drawing<'a> {
     /// # Errors
     /// When this build leaves out what the scene needs.
     pub fn new(scene: &'a Scene, options: &'a RenderOptions) -> Result<Self, RenderError> {
-        let drawable = has_kernels(options) && supported::is_drawn_by_kernels(scene);
-        let geometry = if drawable { Geometry::new(scene, options.tree).ok() } else { None };
-        let precision = |geometry| Some((geometry, precision::resolve(options, geometry, scene)?));
+        let Ranked { scene: ranked, .. } = &Ranked::new(scene);
+        let geometry = if has_kernels(options) { Geometry::new(ranked, options.tree).ok() } else { None };
+        let precision = |geometry| Some((geometry, precision::resolve(options, geometry, ranked)?));
         Ok(Self(match geometry.as_ref().and_then(precision) {
-            Some((geometry, Precision::F64)) => Backend::Double(Setup::new(scene, geometry, options)?),
-            Some((geometry, _)) => Backend::Single(Setup::new(scene, geometry, options)?),
+            Some((geometry, Precision::F64)) => {
+                Backend::Double(Setup::new(scene, ranked, geometry, options)?)
+            }
+            Some((geometry, _)) => Backend::Single(Setup::new(scene, ranked, geometry, options)?),
             None => Backend::Reference(scene, options),
         }))
     }
@@ -126,9 +135,6 @@ fn has_kernels(_: &RenderOptions) -> bool {
 
 /// The precision that [`Precision::Auto`] stands for in a scene.
 pub(crate) fn precision(scene: &Scene) -> Precision {
-    if !supported::is_drawn_by_kernels(scene) {
-        return Precision::F64;
-    }
     let geometry = Geometry::new(scene, None).ok();
     let resolved =
         geometry.and_then(|geometry| precision::resolve(&RenderOptions::default(), &geometry, scene));
@@ -141,7 +147,8 @@ pub(crate) fn precision(scene: &Scene) -> Precision {
 /// Those of [`crate::render`].
 #[cfg(feature = "accuracy")]
 pub(crate) fn render_naive(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    Setup::<f32>::new(scene, &Geometry::new(scene, options.tree)?, options)?.draw::<naive::Naive>()
+    let Ranked { scene: ranked, .. } = &Ranked::new(scene);
+    Setup::<f32>::new(scene, ranked, &Geometry::new(ranked, options.tree)?, options)?.draw::<naive::Naive>()
 }
 
 /// What a kernel needs to draw a scene.
@@ -157,13 +164,14 @@ struct Setup<'a, E> {
 impl<'a, E: Real> Setup<'a, E> {
     fn new(
         scene: &'a Scene,
+        ranked: &Scene,
         geometry: &Geometry,
         options: &'a RenderOptions<'a>,
     ) -> Result<Self, RenderError> {
         let size = (scene.screen.width(), scene.screen.height());
         let many = geometry.solids.len() > MANY;
         let side = options.tile.unwrap_or(if many { SMALL_SIDE } else { SIDE });
-        let prepared = Prepared::<E>::new(scene, geometry, options.tree, side)?;
+        let prepared = Prepared::<E>::new(ranked, geometry, options.tree, side)?;
         let mut shapes: Vec<Shape> = match &prepared.tree {
             Some(_) => vec![Shape::of_box(geometry.whole())],
             None => geometry.solids.iter().map(|solid| solid.shape).collect(),
@@ -181,16 +189,19 @@ impl<'a, E: Real> Setup<'a, E> {
         let level = options.level.unwrap_or_else(Level::new);
         let bounces = options.bounces(scene);
         // Boxed: it is passed from band to band by value.
-        bands(
+        let image = bands(
             scene.screen,
             side.1,
             options,
-            || Box::new(Scratch::new()),
+            || Box::new(Scratch::new(options.cancel)),
             |scratch, row, bytes| {
                 let band = Band { bytes, size, background, tone: scene.tone };
                 draw::<E, By>(&Job { prepared, window, side: *side, row, bounces }, level, band, scratch);
             },
-        )
+        )?;
+        // A tile of much glass is given up halfway.
+        let is_cancelled = || options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed));
+        if prepared.has_glass() && is_cancelled() { Err(RenderError::Cancelled) } else { Ok(image) }
     }
 }
 

@@ -6,6 +6,8 @@
 //! never inlined: its registers are its own, and it is the same code whatever else a build has. Here it is decided which
 //! steps a tile takes, and in which variants ([`fitted!`]).
 
+use std::sync::atomic::AtomicBool;
+
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use rayfold_scene::Tone;
@@ -18,30 +20,36 @@ use super::features::{Anything, BUILT, Kernel, Variant, fitted};
 use super::kind::ByKind;
 use super::light::{InTheWay, light_up, light_up_beyond};
 use super::look::{aim_along_axis, look, look_at_bodies, look_from_eye};
+use super::onwards::send_on;
 use super::prepare::Prepared;
 use super::rays::Rays;
 use super::real::{Lanes, Real};
 use super::sky::show_sky;
 use super::surfaces::{ambient, reflect, surfaces};
+use super::waiting::Waiting;
 
 /// Memory of a worker, used again for each of its tiles; what is in it does not matter.
-pub(super) struct Scratch<E> {
+pub(super) struct Scratch<'a, E> {
     queue: Queue<E>,
     hits: Hits<E>,
     /// The rays that mirrors send on.
     next: Queue<E>,
+    /// The rays that mirrors and glass send on, in scenes with glass.
+    waiting: Waiting<'a, E>,
     /// The sum of what the bounces add to each pixel.
     pixels: Columns<E>,
     in_the_way: InTheWay,
     sights: Picked,
 }
 
-impl<E: Real> Scratch<E> {
-    pub(super) fn new() -> Self {
+impl<'a, E: Real> Scratch<'a, E> {
+    /// Where there is much glass a tile is given up halfway once `cancel` is raised.
+    pub(super) fn new(cancel: Option<&'a AtomicBool>) -> Self {
         Self {
             queue: Queue::new(),
             hits: Hits::new(),
             next: Queue::new(),
+            waiting: Waiting::new(cancel),
             pixels: columns(),
             in_the_way: InTheWay::default(),
             sights: Picked::default(),
@@ -61,7 +69,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     if tile.candidates == 0 && scene.is_plain() {
         return fill(tile, band);
     }
-    let Scratch { queue, hits, next, pixels, in_the_way, sights } = scratch;
+    let Scratch { queue, hits, next, waiting, pixels, in_the_way, sights } = scratch;
     let tree = BUILT.tree && scene.tree.is_some();
     let all = scene.all();
     let candidates = match &scene.sights {
@@ -77,6 +85,9 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     let background = band.background();
     next.count = 0;
     hits.packets.clear();
+    if scene.has_glass() {
+        waiting.begin(tile.bounces);
+    }
     let seen = candidates.kinds;
     match scene.rays {
         Rays::Pinhole(rays) => {
@@ -90,6 +101,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
                 queue,
                 sides: (tile.width, tile.height),
                 next: Some(&mut *next),
+                waiting: &mut *waiting,
             };
             shade::<S, E, N, true>(simd, scene, met, hits, in_the_way);
         }
@@ -104,11 +116,14 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
                 queue,
                 sides: (tile.width, tile.height),
                 next: Some(&mut *next),
+                waiting: &mut *waiting,
             };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
         }
     }
-    if BUILT.mirrors && next.count > 0 {
+    if scene.has_glass() {
+        follow::<S, E, N>(simd, scene, tile, scratch);
+    } else if BUILT.mirrors && next.count > 0 {
         core::mem::swap(&mut hits.color, pixels);
         let (mut queue, mut next) = (queue, next);
         for bounce in 1..=tile.bounces {
@@ -120,7 +135,8 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
                 look::<S, E, Variant<N::By, C, T, D>>(simd, scene, all, scene.background, queue, hits)
             });
             let (kinds, background) = (all.kinds, scene.background);
-            let met = Met { kinds, background, queue, sides: (tile.width, tile.height), next: after };
+            let sides = (tile.width, tile.height);
+            let met = Met { kinds, background, queue, sides, next: after, waiting: &mut *waiting };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
             for ray in 0..queue.count {
                 let pixel = queue.pixel.0[ray].to_index();
@@ -134,14 +150,41 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
         }
         core::mem::swap(&mut hits.color, pixels);
     }
+    let Scratch { hits, .. } = scratch;
     match band.tone {
         Tone::Plain => write_pixels::<S, E>(simd, tile, &hits.color, band),
         Tone::Srgb => write_encoded::<S, E>(tile, &hits.color, band),
     }
 }
 
+/// Adds what mirrors and glass show, in scenes with glass: the rays that wait are traced until none is left.
+#[inline(never)]
+fn follow<S: Simd, E: Real, N: Kernel<E>>(
+    simd: S,
+    scene: &Prepared<E>,
+    tile: Tile,
+    scratch: &mut Scratch<E>,
+) {
+    let Scratch { queue, hits, waiting, pixels, in_the_way, .. } = scratch;
+    let all = scene.all();
+    let tree = BUILT.tree && scene.tree.is_some();
+    core::mem::swap(&mut hits.color, pixels);
+    while waiting.take(queue) {
+        hits.packets.clear();
+        fitted!(N, all.kinds, tree, C T D => {
+            look::<S, E, Variant<N::By, C, T, D>>(simd, scene, all, scene.background, queue, hits)
+        });
+        let (kinds, background, sides) = (all.kinds, scene.background, (tile.width, tile.height));
+        let met = Met { kinds, background, queue, sides, next: None, waiting: &mut *waiting };
+        shade_more::<S, E, N, false>(simd, scene, met, hits, in_the_way);
+        waiting.add(queue, hits);
+    }
+    waiting.sum_up(pixels);
+    core::mem::swap(&mut hits.color, pixels);
+}
+
 /// Rays that have met something.
-struct Met<'a, E> {
+struct Met<'a, 'b, E> {
     /// The kinds of what they can have met.
     kinds: ByKind<bool>,
     background: [E; 3],
@@ -150,6 +193,8 @@ struct Met<'a, E> {
     sides: (u32, u32),
     /// Where mirrors send them on to, if they do.
     next: Option<&'a mut Queue<E>>,
+    /// The same in scenes with glass.
+    waiting: &'a mut Waiting<'b, E>,
 }
 
 /// Draws what rays have met: surfaces, their light, and the rays that mirrors send on.
@@ -195,7 +240,7 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
     (beyond, count): (&Beyond<E>, usize),
-    Met { kinds: _, background, queue, sides: _, next }: Met<E>,
+    Met { kinds: _, background, queue, sides: _, next, waiting }: Met<E>,
     hits: &mut Hits<E>,
     in_the_way: &mut InTheWay,
 ) {
@@ -210,6 +255,16 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     }
     in_the_way.find(simd, scene, hits);
     light_up_beyond::<S, E, Anything<N::By>, EYE>(simd, scene, beyond, queue, hits, in_the_way);
+    if let Some(glass) = beyond.glass() {
+        if !waiting.is_at_the_end() {
+            let send_on = match painted {
+                Some(_) => send_on::<S, E, Anything<N::By>, EYE, true>,
+                None => send_on::<S, E, Anything<N::By>, EYE, false>,
+            };
+            send_on(simd, scene, glass, queue, hits, waiting);
+        }
+        return;
+    }
     match next {
         Some(next) if painted.is_some() => reflect::<S, E, EYE, true>(simd, scene, queue, hits, next),
         Some(next) => reflect::<S, E, EYE, false>(simd, scene, queue, hits, next),
@@ -222,7 +277,7 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
 fn shade_plain<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
-    Met { kinds, background, queue, sides: _, next }: Met<E>,
+    Met { kinds, background, queue, sides: _, next, waiting: _ }: Met<E>,
     hits: &mut Hits<E>,
     in_the_way: &mut InTheWay,
 ) {
