@@ -95,7 +95,7 @@ fn a_mesh_of_glass_and_many_balls_are_the_references() {
     }
     let mut scene = dice.scene(objects);
     let eye = DVec3::new(2.0, 3.0, 6.0);
-    scene.camera = Camera::Look(Look::new(eye, DVec3::ZERO, 45.0, None).unwrap());
+    scene.camera = Camera::Look(Look::new(eye, DVec3::new(0.03, 0.05, 0.01), 45.0, None).unwrap());
     scene.screen = Screen::new(37, 29).unwrap();
     scene.depth = Depth::new(6).unwrap();
     dice.add_lamps(&mut scene);
