@@ -8,15 +8,18 @@
 mod dice;
 mod hold;
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use image::Rgb;
 use rayfold_scene::model::{Finish, Glass, Pattern, Shine, Weight};
 use rayfold_scene::{
-    Camera, Coefficients, Cuboid, Depth, Look, Material, Object, Plane, Scene, Screen, Sphere, Triangle,
+    Camera, Coefficients, Cuboid, Depth, DirectionalLight, Instance, Lamp, Light, Look, Material, Object,
+    Placement, Plane, Scene, Screen, Sphere, Triangle,
 };
+use rayfold_tracer::probe::nearest_hits;
 use rayfold_tracer::{RenderError, RenderOptions, reference, render};
 
 use dice::Dice;
@@ -322,6 +325,59 @@ fn the_order_of_lines_and_the_number_of_threads_change_no_byte() {
 }
 
 #[test]
+fn a_group_of_glass_is_its_copy_written_out() {
+    let grouped = "Group g\nCylinder 0.5  0 0 0  0 1 0  clear\nTorus 1 0.25  0 0 0  0 1 0  dark\nBox 1 0 0  1.5 0.5 2  clear\n\
+                   Cone 0.5 0  -1 0 0  -1 1 0  dark\nSphere 0.5  1 2 0  clear\nEnd\nUse g  1 -2 0.5  0 -90 0  2\n";
+    // (x, y, z) to (1 - 2z, -2 + 2y, 0.5 + 2x): a quarter turn about y, twice the size.
+    let written = "Cylinder 1  1 -2 0.5  1 0 0.5  clear\nTorus 2 0.5  1 -2 0.5  0 1 0  dark\nBox 1 -2 2.5  -3 -1 3.5  clear\n\
+                   Cone 1 0  1 -2 -1.5  1 0 -1.5  dark\nSphere 1  1 2 2.5  clear\n";
+    let [grouped, written] = [grouped, written].map(|objects| {
+        let floor = format!("{objects}Plane 0 -2.1 0  0.1 1 0.07  floor");
+        draw(&scripted(FROM_THE_FRONT, &floor), RenderOptions::default())
+    });
+    assert!(grouped == written);
+}
+
+#[test]
+fn a_scene_turned_by_a_right_angle_is_the_same() {
+    let mut dice = Dice::new("turned", SEED);
+    // (x, y, z) to (z, y, -x)
+    let quarter = DMat3::from_cols(DVec3::NEG_Z, DVec3::Y, DVec3::X);
+    let placement = Arc::new(Placement::new(DVec3::ZERO, quarter, 1.0).unwrap());
+    let (mut differ, mut pixels) = (0, 0);
+    for count in [1, 2, 4, 8].into_iter().cycle().take(24) {
+        let mut scene = dice.glass_scene(count);
+        let Camera::Look(look) = scene.camera else { continue };
+        let is_grouped = |object: &Object| matches!(object, Object::Instance(_));
+        let objects: Vec<Object> = scene.objects.iter().filter(|o| !is_grouped(o)).cloned().collect();
+        scene.objects = objects.into();
+        let expected = draw(&scene, RenderOptions::default());
+        let turn = |k| Instance::new(&scene.objects, k, &placement).into();
+        let lights = scene.lights.iter().map(|light| match light {
+            Light::Directional(sun) => {
+                DirectionalLight::new(sun.color(), quarter * sun.direction()).unwrap().into()
+            }
+            Light::Lamp(lamp) => {
+                let position = quarter * lamp.position();
+                Lamp::new(lamp.color(), position, lamp.radius(), lamp.reach()).unwrap().into()
+            }
+        });
+        let (eye, target, up) = (quarter * look.eye(), quarter * look.target(), quarter * look.up());
+        let turned = Scene {
+            objects: (0..scene.objects.len()).map(turn).collect(),
+            lights: lights.collect(),
+            camera: Camera::Look(Look::new(eye, target, look.field_of_view(), Some(up)).unwrap()),
+            ..scene.clone()
+        };
+        let drawn = draw(&turned, RenderOptions::default());
+        differ += off(&expected, &drawn);
+        pixels += drawn.pixels().len();
+    }
+    println!("{differ} of {pixels} pixels are off");
+    assert!(pixels > 10_000 && differ as f64 <= 4e-4 * pixels as f64, "{differ} of {pixels}");
+}
+
+#[test]
 fn of_faces_in_one_plane_that_without_glass_is_seen() {
     let flat = [
         "Plane 5 5 0.3  0 0 -7",
@@ -342,6 +398,17 @@ fn of_faces_in_one_plane_that_without_glass_is_seen() {
             }
         }
     }
+}
+
+#[test]
+fn single_rays_name_objects_by_their_place_in_the_script() {
+    let view = "Screen 3 3\nLook 0 0 9  0 0 0  50\nMaterial pane glass 1 1 1  1.5";
+    let pane_and_wall =
+        "Disc 2  0 0 1  0 0 1  pane\nDisc 5  0 0 0  0 0 1  1 0 0  0 0 0\nDisc 1  0 0 0  0 0 1  pane";
+    let rays = [DVec3::new(0.0, 0.0, 9.0), DVec3::new(3.0, 0.0, 9.0), DVec3::new(0.5, 0.0, 0.5)];
+    let rays = rays.map(|origin| (origin, DVec3::NEG_Z));
+    let found = nearest_hits(&scripted(view, pane_and_wall), &rays, &RenderOptions::default()).unwrap();
+    assert_eq!(found.into_iter().map(|hit| hit.unwrap().object).collect::<Vec<_>>(), [0, 1, 1]);
 }
 
 #[test]

@@ -13,7 +13,7 @@ use rayfold_scene::{Coefficients, Object, Scene};
 use super::bounce::{Column, Hits, Queue, ROOM};
 use super::geometry::Geometry;
 use super::packet::Ray;
-use super::real::{Mask, Real, Vec3};
+use super::real::{Lanes, Mask, Real, Vec3, constant};
 use crate::reference::{self, coefficients, highlight};
 
 /// The surfaces of a scene that has some of these.
@@ -105,6 +105,21 @@ impl Finishes {
         let flat = is_flat(object, normal);
         let surface = reference::Surface { point: world, normal, offset: 0.0, flat, within: false };
         coefficients(object, place, normal, &surface)
+    }
+
+    /// Which lanes meet a surface with highlights; `orders` are those of what they meet.
+    #[inline(always)]
+    pub(super) fn shines<S: Simd, E: Real>(&self, simd: S, orders: &[E]) -> Mask<S, E> {
+        let mut shines = [E::narrow(0.0); 16];
+        for (lane, order) in orders.iter().enumerate() {
+            let object = self.scene.objects.get(order.to_index());
+            let finish = object.and_then(|object| object.material().finish());
+            if finish.is_some_and(|finish| finish.shine.is_some()) {
+                shines[lane] = E::narrow(1.0);
+            }
+        }
+        let shines = Lanes::<S, E>::from_slice(simd, &shines[..Lanes::<S, E>::LEN]);
+        shines.simd_gt(constant::<S, E>(simd, 0.0))
     }
 
     pub(super) fn gloss(&self) -> Gloss<'_> {

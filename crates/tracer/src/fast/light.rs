@@ -138,11 +138,18 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                 let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
                 let seen = Ray { origin: start, direction: Vec3::load(simd, &queue.direction, at) };
                 let mut gloss = beyond.finishes.as_ref().map(Finishes::gloss);
+                // Most of glass scatters nothing, and needs no shadow rays.
+                let mut shows = zero.simd_eq(zero);
+                if let (Some(_), Some(finishes)) = (beyond.glass(), &beyond.finishes) {
+                    let diffuse = Vec3::<S, E>::load(simd, &hits.diffuse, at);
+                    shows = diffuse.x.simd_ne(zero) | diffuse.y.simd_ne(zero) | diffuse.z.simd_ne(zero);
+                    shows |= finishes.shines(simd, orders);
+                }
                 let mut sum = Vec3::zero(simd);
                 for (light, obstacles) in scene.suns.iter().zip(&obstacles.of) {
                     let towards = light.sun.towards(simd);
                     let cosine = normal.dot(towards);
-                    let facing = cosine.simd_gt(zero);
+                    let facing = cosine.simd_gt(zero) & shows;
                     let mut lit = facing;
                     if lit.any_true() {
                         let candidates = obstacles.candidates(others, F::KINDS);
@@ -167,7 +174,7 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                 for lamp in &beyond.lamps {
                     let Rays { ray, far, part } = lamp.rays(simd, start);
                     let cosine = normal.dot(ray.direction);
-                    let facing = cosine.simd_gt(zero);
+                    let facing = cosine.simd_gt(zero) & shows;
                     let mut lit = facing;
                     if lit.any_true() {
                         lit = beyond.bodies.unoccluded(simd, ray, far, lit);

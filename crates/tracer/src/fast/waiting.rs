@@ -8,11 +8,11 @@
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::bounce::{Columns, Hits, Queue, ROOM, columns};
+use super::bounce::{Columns, Hits, PIXELS, Queue, ROOM, columns};
 use super::real::Real;
 
 /// Rays of a full queue.
-const FULL: usize = 256;
+const FULL: usize = PIXELS;
 
 /// Rays of a bounce that wait at most: with fewer than a queue's it is given two each for those of a full one.
 const MOST: usize = 3 * FULL;
