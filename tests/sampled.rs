@@ -30,6 +30,7 @@ fn effects(size: &str) -> Vec<(&'static str, String)> {
                   Material tiles ambient .1 .1 .1 diffuse .6 .6 .6 shine .5 .5 .5 40 checker .3 dark\n\
                   Sphere .4 3 .4 2  tiles\n";
     let dark = "Material dark diffuse .1 .1 .3\n";
+    let glass = "Material pane glass .9 .95 .9 1.5 shine .4 .4 .4 60\nSphere .5 .2 .5 2.4 pane\nBox -1.6 0 1.6 -1.5 1.2 2.4 pane";
     let all = format!("Lens .1 8\nShutter .7\nTone srgb\n{dark}{bodies}{LAMP} 5\nIlight .3 .3 .3 -1 -2 0");
     let many: String = (0..90)
         .map(|k| {
@@ -58,6 +59,8 @@ fn effects(size: &str) -> Vec<(&'static str, String)> {
             ),
         ),
         ("bodies", table(size, &format!("{dark}{bodies}"), WIDE_SUN)),
+        ("glass", table(size, glass, WIDE_SUN)),
+        ("glass before a lamp", table(size, &format!("Lens .1 8\nShutter .7\n{dark}{bodies}{glass}"), LAMP)),
         ("many", table(size, &many, WIDE_SUN)),
         ("many, seen by a lens", table(size, &format!("Lens .1 8\n{many}"), LAMP)),
         ("all", table(size, &all, WIDE_SUN)),

@@ -33,7 +33,7 @@ const MOST: f64 = 0.5;
 const LEFT_OUT: i32 = 3;
 
 /// The tracer's cargo features.
-const PARTS: [Part; 6] = [
+const PARTS: [Part; 7] = [
     Part { feature: "boxes", is_used: |scene| scene.objects.iter().any(|o| matches!(o, Object::Cuboid(_))) },
     Part {
         feature: "triangles",
@@ -43,6 +43,7 @@ const PARTS: [Part; 6] = [
     Part { feature: "shadows", is_used: |scene| !scene.lights.is_empty() && !is_one_ball(scene) },
     Part { feature: "tree", is_used: |scene| scene.objects.len() > 64 },
     Part { feature: "beyond", is_used: has_more_than_version_1 },
+    Part { feature: "glass", is_used: |scene| scene.objects.iter().any(is_glass) },
 ];
 
 struct Part {
@@ -56,6 +57,10 @@ fn is_ball(object: &Object) -> bool {
 
 fn is_mirror(object: &Object) -> bool {
     object.material().mirror() != DVec3::ZERO
+}
+
+fn is_glass(object: &Object) -> bool {
+    object.material().finish().is_some_and(|finish| finish.glass.is_some())
 }
 
 /// Skies, lamps, finishes, and shapes with axes of their own.
@@ -345,7 +350,7 @@ mod tests {
     fn a_report_tells_that_all_hold() {
         let report = report(&rows(100_500)).expect("rows of each part");
         assert!(
-            report.contains("All 6 pairs hold; the most is balls without mirrors (+0.50 %)."),
+            report.contains("All 7 pairs hold; the most is balls without mirrors (+0.50 %)."),
             "{report}"
         );
         assert!(!report.contains("failed"), "{report}");
@@ -354,7 +359,7 @@ mod tests {
     #[test]
     fn a_report_tells_which_pairs_failed() {
         let report = report(&rows(100_600)).expect("rows of each part");
-        let told = "**This run failed** for 1 of 6 pairs: balls without mirrors (+0.60 %).";
+        let told = "**This run failed** for 1 of 7 pairs: balls without mirrors (+0.60 %).";
         assert!(report.contains(told), "{report}");
         assert!(!report.contains("hold"), "{report}");
     }

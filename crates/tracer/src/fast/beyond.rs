@@ -4,8 +4,10 @@
 use rayfold_scene::Scene;
 
 use super::bodies::Bodies;
+use super::features::BUILT;
 use super::finish::Finishes;
 use super::geometry::Geometry;
+use super::glass::Glass;
 use super::lights::lamp::Lamp;
 use super::real::Real;
 
@@ -15,6 +17,7 @@ pub(super) struct Beyond<E> {
     pub(super) bodies: Bodies<E>,
     pub(super) lamps: Vec<Lamp<E>>,
     pub(super) finishes: Option<Finishes>,
+    glass: Option<Glass<E>>,
 }
 
 impl<E: Real> Beyond<E> {
@@ -24,7 +27,18 @@ impl<E: Real> Beyond<E> {
             bodies: Bodies::new(&geometry.bodies),
             lamps: geometry.lamps.iter().map(Lamp::new).collect(),
             finishes: Finishes::new(scene, geometry),
+            glass: Glass::new(scene),
         })
+    }
+
+    /// Its glass, if it has any.
+    #[inline(always)]
+    pub(super) fn glass(&self) -> Option<&Glass<E>> {
+        if BUILT.glass { self.glass.as_ref() } else { None }
+    }
+
+    pub(super) fn has_glass(&self) -> bool {
+        self.glass.is_some()
     }
 }
 

@@ -7,7 +7,7 @@ use super::packet::Nearest;
 use super::real::{Lanes, Real, Vec3};
 
 /// Pixels of a tile at most.
-const PIXELS: usize = 256;
+pub(super) const PIXELS: usize = 256;
 
 /// A tile's pixels, and room for a packet that begins at the last of them.
 pub(super) const ROOM: usize = PIXELS + 16;

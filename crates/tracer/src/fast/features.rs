@@ -22,6 +22,7 @@ pub(super) struct Needs {
     pub(super) tree: bool,
     /// More than objects of these kinds, suns, and a background of one colour.
     pub(super) beyond: bool,
+    pub(super) glass: bool,
 }
 
 /// What this build has.
@@ -31,6 +32,7 @@ pub(super) const BUILT: Needs = Needs {
     shadows: cfg!(feature = "shadows"),
     tree: cfg!(feature = "tree"),
     beyond: cfg!(feature = "beyond"),
+    glass: cfg!(feature = "glass"),
 };
 
 impl Needs {
@@ -48,6 +50,7 @@ impl Needs {
             (self.shadows && !BUILT.shadows, "shadows"),
             (self.tree && !BUILT.tree, "tree"),
             (self.beyond && !BUILT.beyond, "beyond"),
+            (self.glass && !BUILT.glass, "glass"),
         ];
         let missing = missing.or(lacks.into_iter().find(|(lacks, _)| *lacks).map(|(_, feature)| feature));
         missing.map_or(Ok(()), |feature| Err(RenderError::LeftOut { feature }))

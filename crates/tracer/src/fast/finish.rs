@@ -13,7 +13,7 @@ use rayfold_scene::{Coefficients, Object, Scene};
 use super::bounce::{Column, Hits, Queue, ROOM};
 use super::geometry::Geometry;
 use super::packet::Ray;
-use super::real::{Lanes, Mask, Real, Vec3};
+use super::real::{Lanes, Mask, Real, Vec3, constant};
 use crate::reference::{self, coefficients, highlight};
 
 /// The surfaces of a scene that has some of these.
@@ -107,6 +107,21 @@ impl Finishes {
         coefficients(object, place, normal, &surface)
     }
 
+    /// Which lanes meet a surface with highlights; `orders` are those of what they meet.
+    #[inline(always)]
+    pub(super) fn shines<S: Simd, E: Real>(&self, simd: S, orders: &[E]) -> Mask<S, E> {
+        let mut shines = [E::narrow(0.0); 16];
+        for (lane, order) in orders.iter().enumerate() {
+            let object = self.scene.objects.get(order.to_index());
+            let finish = object.and_then(|object| object.material().finish());
+            if finish.is_some_and(|finish| finish.shine.is_some()) {
+                shines[lane] = E::narrow(1.0);
+            }
+        }
+        let shines = Lanes::<S, E>::from_slice(simd, &shines[..Lanes::<S, E>::LEN]);
+        shines.simd_gt(constant::<S, E>(simd, 0.0))
+    }
+
     pub(super) fn gloss(&self) -> Gloss<'_> {
         Gloss { finishes: self, sum: [DVec3::ZERO; 16], is_seen: false }
     }
@@ -140,20 +155,18 @@ pub(super) struct Lit<S: Simd, E: Real> {
     /// The unit vector towards it.
     pub(super) towards: Vec3<S, E>,
     /// What arrives of its colour.
-    pub(super) part: Lanes<S, E>,
+    pub(super) color: Vec3<S, E>,
 }
 
 impl Gloss<'_> {
-    /// Adds the highlights of a light of that colour; `ray` are the rays that see them, `orders` what they meet.
+    /// Adds the highlights of a light; `ray` are the rays that see them, `orders` what they meet.
     #[inline(never)]
     pub(super) fn add<S: Simd, E: Real>(
         &mut self,
-        Lit { lanes, towards, part }: Lit<S, E>,
-        color: [E; 3],
+        Lit { lanes, towards, color }: Lit<S, E>,
         (ray, normal): (Ray<S, E>, Vec3<S, E>),
         orders: &[E],
     ) {
-        let color = DVec3::from_array(color.map(Real::widen));
         let mut bits = lanes.to_bitmask();
         while bits != 0 {
             let lane = bits.trailing_zeros() as usize;
@@ -162,7 +175,7 @@ impl Gloss<'_> {
             let Some(shine) = material.finish().and_then(|finish| finish.shine) else { continue };
             let at = |v: Vec3<S, E>| DVec3::new(v.x[lane].widen(), v.y[lane].widen(), v.z[lane].widen());
             let seen = highlight(&shine, at(normal), at(towards), -at(ray.direction));
-            self.sum[lane] += color * part[lane].widen() * shine.color() * seen;
+            self.sum[lane] += at(color) * shine.color() * seen;
             self.is_seen = true;
         }
     }

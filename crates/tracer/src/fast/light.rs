@@ -6,6 +6,7 @@ use fearless_simd::prelude::*;
 use super::beyond::Beyond;
 use super::bounce::{Hits, Queue};
 use super::candidates::{Candidates, Found, Masks, Picked};
+use super::dimming::{Arriving, Shadow};
 use super::features::{BUILT, Features};
 use super::finish::{Finishes, Lit};
 use super::kind::ByKind;
@@ -137,29 +138,44 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                 let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
                 let seen = Ray { origin: start, direction: Vec3::load(simd, &queue.direction, at) };
                 let mut gloss = beyond.finishes.as_ref().map(Finishes::gloss);
+                // Most of glass scatters nothing, and needs no shadow rays.
+                let mut shows = zero.simd_eq(zero);
+                if let (Some(_), Some(finishes)) = (beyond.glass(), &beyond.finishes) {
+                    let diffuse = Vec3::<S, E>::load(simd, &hits.diffuse, at);
+                    shows = diffuse.x.simd_ne(zero) | diffuse.y.simd_ne(zero) | diffuse.z.simd_ne(zero);
+                    shows |= finishes.shines(simd, orders);
+                }
                 let mut sum = Vec3::zero(simd);
                 for (light, obstacles) in scene.suns.iter().zip(&obstacles.of) {
                     let towards = light.sun.towards(simd);
                     let cosine = normal.dot(towards);
-                    let mut lit = cosine.simd_gt(zero);
+                    let facing = cosine.simd_gt(zero) & shows;
+                    let mut lit = facing;
                     if lit.any_true() {
                         let candidates = obstacles.candidates(others, F::KINDS);
                         lit = unoccluded::<S, E, F>(simd, scene, light, start, lit, candidates);
                     }
+                    let ray = Ray { origin: start, direction: towards };
                     if lit.any_true() {
-                        let ray = Ray { origin: start, direction: towards };
                         lit = beyond.bodies.unoccluded(simd, ray, far, lit);
                     }
-                    sum = Vec3::splat(simd, light.sun.color).scale_add(lit.select(cosine, zero), sum);
+                    let mut arriving = Arriving { color: Vec3::splat(simd, light.sun.color), lit };
+                    if let Some(glass) = beyond.glass() {
+                        let glass = (scene, beyond, glass);
+                        let shadow = Shadow { ray, far };
+                        arriving = arriving.through_glass::<F>(simd, glass, facing & !lit, shadow);
+                    }
+                    let Arriving { color, lit } = arriving;
+                    sum = color.scale_add(lit.select(cosine, zero), sum);
                     if let Some(gloss) = &mut gloss {
-                        let lit = Lit { lanes: lit, towards, part: one };
-                        gloss.add(lit, light.sun.color, (seen, normal), orders);
+                        gloss.add(Lit { lanes: lit, towards, color }, (seen, normal), orders);
                     }
                 }
                 for lamp in &beyond.lamps {
                     let Rays { ray, far, part } = lamp.rays(simd, start);
                     let cosine = normal.dot(ray.direction);
-                    let mut lit = cosine.simd_gt(zero);
+                    let facing = cosine.simd_gt(zero) & shows;
+                    let mut lit = facing;
                     if lit.any_true() {
                         lit = beyond.bodies.unoccluded(simd, ray, far, lit);
                     }
@@ -167,10 +183,17 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                         let met = nearest::<S, E, F, false>(simd, scene, ray, scene.all());
                         lit &= !met.distance.simd_lt(far);
                     }
-                    sum = Vec3::splat(simd, lamp.color).scale_add(lit.select(cosine * part, zero), sum);
+                    let mut arriving = Arriving { color: Vec3::splat(simd, lamp.color), lit };
+                    if let Some(glass) = beyond.glass() {
+                        let glass = (scene, beyond, glass);
+                        let shadow = Shadow { ray, far };
+                        arriving = arriving.through_glass::<F>(simd, glass, facing & !lit, shadow);
+                    }
+                    let Arriving { color, lit } = arriving;
+                    sum = color.scale_add(lit.select(cosine * part, zero), sum);
                     if let Some(gloss) = &mut gloss {
-                        let lit = Lit { lanes: lit, towards: ray.direction, part };
-                        gloss.add(lit, lamp.color, (seen, normal), orders);
+                        let lit = Lit { lanes: lit, towards: ray.direction, color: color.scale(part) };
+                        gloss.add(lit, (seen, normal), orders);
                     }
                 }
                 let diffuse = Vec3::load(simd, &hits.diffuse, at);

@@ -12,11 +12,13 @@ mod bounds;
 mod candidates;
 mod coincidence;
 mod descent;
+mod dimming;
 mod dispatch;
 mod exact;
 mod features;
 mod finish;
 mod geometry;
+mod glass;
 mod kind;
 mod lens;
 mod light;
@@ -25,6 +27,7 @@ mod lists;
 mod look;
 #[cfg(feature = "accuracy")]
 mod naive;
+mod onwards;
 mod packet;
 mod placed;
 mod precision;
@@ -40,12 +43,15 @@ mod shape;
 mod shapes;
 mod sights;
 mod sky;
-mod supported;
 mod surfaces;
+mod ties;
 mod tile;
 mod tone;
 mod tree;
+mod waiting;
 mod window;
+
+use std::sync::atomic::Ordering;
 
 use fearless_simd::{Level, Simd};
 use image::RgbImage;
@@ -63,6 +69,7 @@ use self::rounding::MARGIN;
 use self::sampled::Sampled;
 use self::shape::Robust;
 use self::shapes::{Formulas, Shape};
+use self::ties::Ranked;
 use self::tile::Scratch;
 use self::tone::levels;
 use self::window::{Grid, Window};
@@ -110,12 +117,14 @@ impl<'a> Drawing<'a> {
                 sampled_backend(exposure, options)?.unwrap_or(Backend::Reference(exposure, options)),
             ));
         }
-        let drawable = has_kernels(options) && supported::is_drawn_by_kernels(scene);
-        let geometry = if drawable { Geometry::new(scene, options.tree).ok() } else { None };
-        let precision = |geometry| Some((geometry, precision::resolve(options, geometry, scene)?));
+        let Ranked { scene: ranked, .. } = &Ranked::new(scene);
+        let geometry = if has_kernels(options) { Geometry::new(ranked, options.tree).ok() } else { None };
+        let precision = |geometry| Some((geometry, precision::resolve(options, geometry, ranked)?));
         Ok(Self(match geometry.as_ref().and_then(precision) {
-            Some((geometry, Precision::F64)) => Backend::Double(Setup::new(scene, geometry, options)?),
-            Some((geometry, _)) => Backend::Single(Setup::new(scene, geometry, options)?),
+            Some((geometry, Precision::F64)) => {
+                Backend::Double(Setup::new(scene, ranked, geometry, options)?)
+            }
+            Some((geometry, _)) => Backend::Single(Setup::new(scene, ranked, geometry, options)?),
             None => Backend::Reference(exposure, options),
         }))
     }
@@ -178,10 +187,11 @@ fn sampled_backend<'a>(
     options: &'a RenderOptions,
 ) -> Result<Option<Backend<'a>>, RenderError> {
     let scene = exposure.scene();
-    let moments = exposure.moments();
-    if !has_kernels(options) || !moments.iter().all(supported::is_drawn_by_kernels) {
+    if !has_kernels(options) {
         return Ok(None);
     }
+    let moments = exposure.moments();
+    let moments: Vec<Scene> = moments.iter().map(|moment| Ranked::new(moment).scene.into_owned()).collect();
     let geometries = moments.iter().map(|moment| Geometry::new(moment, options.tree));
     let Ok(geometries) = geometries.collect::<Result<Vec<_>, _>>() else { return Ok(None) };
     let precisions = geometries.iter().zip(&moments);
@@ -207,9 +217,6 @@ fn has_kernels(_: &RenderOptions) -> bool {
 
 /// The precision that [`Precision::Auto`] stands for in a scene.
 pub(crate) fn precision(scene: &Scene) -> Precision {
-    if !supported::is_drawn_by_kernels(scene) {
-        return Precision::F64;
-    }
     let geometry = Geometry::new(scene, None).ok();
     let resolved =
         geometry.and_then(|geometry| precision::resolve(&RenderOptions::default(), &geometry, scene));
@@ -222,7 +229,8 @@ pub(crate) fn precision(scene: &Scene) -> Precision {
 /// Those of [`crate::render`].
 #[cfg(feature = "accuracy")]
 pub(crate) fn render_naive(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    Setup::<f32>::new(scene, &Geometry::new(scene, options.tree)?, options)?.draw::<naive::Naive>()
+    let Ranked { scene: ranked, .. } = &Ranked::new(scene);
+    Setup::<f32>::new(scene, ranked, &Geometry::new(ranked, options.tree)?, options)?.draw::<naive::Naive>()
 }
 
 /// What a kernel needs to draw a scene.
@@ -238,6 +246,7 @@ struct Setup<'a, E> {
 impl<'a, E: Real> Setup<'a, E> {
     fn new(
         scene: &'a Scene,
+        ranked: &Scene,
         geometry: &Geometry,
         options: &'a RenderOptions<'a>,
     ) -> Result<Self, RenderError> {
@@ -245,7 +254,7 @@ impl<'a, E: Real> Setup<'a, E> {
         let many = geometry.solids.len() > MANY;
         let side = options.tile.unwrap_or(if many { SMALL_SIDE } else { SIDE });
         let grid = Grid { size, side, margin: MARGIN, lens: None };
-        let prepared = Prepared::<E>::new(scene, geometry, options.tree, &grid)?;
+        let prepared = Prepared::<E>::new(ranked, geometry, options.tree, &grid)?;
         let mut shapes: Vec<Shape> = match &prepared.tree {
             Some(_) => vec![Shape::of_box(geometry.whole())],
             None => geometry.solids.iter().map(|solid| solid.shape).collect(),
@@ -263,16 +272,19 @@ impl<'a, E: Real> Setup<'a, E> {
         let level = options.level.unwrap_or_else(Level::new);
         let bounces = options.bounces(scene);
         // Boxed: it is passed from band to band by value.
-        bands(
+        let image = bands(
             scene.screen,
             side.1,
             options,
-            || Box::new(Scratch::new()),
+            || Box::new(Scratch::new(options.cancel)),
             |scratch, row, bytes| {
                 let band = Band { bytes, size, background, tone: scene.tone };
                 draw::<E, By>(&Job { prepared, window, side: *side, row, bounces }, level, band, scratch);
             },
-        )
+        )?;
+        // A tile of much glass is given up halfway.
+        let is_cancelled = || options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed));
+        if prepared.has_glass() && is_cancelled() { Err(RenderError::Cancelled) } else { Ok(image) }
     }
 }
 

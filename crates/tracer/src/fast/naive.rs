@@ -6,7 +6,7 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
-use super::packet::{Nearest, Ray, Slopes, Surface};
+use super::packet::{Nearest, Ray, Slopes, Surface, no_lane};
 use super::predicate::Place;
 use super::real::{Lanes, Real, Vec3, constant, splat};
 use super::shape::{Robust, Tests};
@@ -53,7 +53,9 @@ impl<E: Real> Tests<Sphere<E>, E> for Naive {
         let inverse = constant::<S, E>(simd, 1.0) / splat::<S, E>(simd, sphere.outer);
         let outward = point.sub(Vec3::splat(simd, sphere.center)).scale(inverse);
         let is_facing = EYE && sphere.is_outside_the_eye();
-        off(simd, point, if is_facing { outward } else { facing(simd, outward, ray) })
+        let surface = off(simd, point, if is_facing { outward } else { facing(simd, outward, ray) });
+        let inwards = surface.normal.dot(outward).simd_lt(constant::<S, E>(simd, 0.0));
+        Surface { within: inwards, ..surface }
     }
 }
 
@@ -160,5 +162,6 @@ fn facing<S: Simd, E: Real>(simd: S, normal: Vec3<S, E>, ray: Ray<S, E>) -> Vec3
 
 #[inline(always)]
 fn off<S: Simd, E: Real>(simd: S, point: Vec3<S, E>, normal: Vec3<S, E>) -> Surface<S, E> {
-    Surface { start: normal.scale_add(constant::<S, E>(simd, EPSILON), point), normal }
+    let offset = constant::<S, E>(simd, EPSILON);
+    Surface { start: normal.scale_add(offset, point), normal, offset, within: no_lane::<S, E>(simd) }
 }

@@ -35,6 +35,25 @@ pub(super) struct Nearest<S: Simd, E: Real> {
 pub(super) struct Surface<S: Simd, E: Real> {
     pub(super) start: Vec3<S, E>,
     pub(super) normal: Vec3<S, E>,
+    /// How far the start is off the surface.
+    pub(super) offset: Lanes<S, E>,
+    /// Which rays come there from within the object; none for what has no inside.
+    pub(super) within: Mask<S, E>,
+}
+
+impl<S: Simd, E: Real> Surface<S, E> {
+    /// The point as far off the surface on its other side.
+    #[inline(always)]
+    pub(super) fn beyond(&self, simd: S) -> Vec3<S, E> {
+        self.normal.scale_add(self.offset * constant::<S, E>(simd, -2.0), self.start)
+    }
+}
+
+/// No lane of a packet.
+#[inline(always)]
+pub(super) fn no_lane<S: Simd, E: Real>(simd: S) -> Mask<S, E> {
+    let zero = constant::<S, E>(simd, 0.0);
+    zero.simd_lt(zero)
 }
 
 impl<S: Simd, E: Real> Slopes<S, E> {

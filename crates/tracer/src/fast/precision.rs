@@ -12,6 +12,7 @@ use super::beyond::is_needed;
 use super::bodies;
 use super::coincidence::surfaces_blur;
 use super::geometry::{Geometry, View};
+use super::glass::SURFACES_OF_ONE;
 use super::placed::{Placed, Sight};
 use super::real::Real;
 use super::shapes::Solid;
@@ -105,8 +106,10 @@ struct Colors {
 
 impl Colors {
     fn of(scene: &Scene, bounces: u32) -> Self {
-        let arriving: f64 = scene.lights.iter().map(|light| light.color().abs().max_element()).sum();
+        let mut arriving: f64 = scene.lights.iter().map(|light| light.color().abs().max_element()).sum();
         let (mut ambient, mut diffuse, mut mirror, mut least) = (0f64, 0f64, 0f64, 0f64);
+        // What glass sends on besides.
+        let mut through = 0f64;
         for object in scene.objects.iter() {
             let material = object.material();
             ambient = ambient.max(material.ambient().abs().max_element());
@@ -124,7 +127,13 @@ impl Colors {
             if let Some(shine) = finish.shine {
                 diffuse = diffuse.max(shine.color().abs().max_element());
             }
+            if let Some(glass) = finish.glass {
+                let most = glass.color().abs().max_element().max(1.0);
+                through = through.max(most);
+                arriving *= most.powi(SURFACES_OF_ONE as i32);
+            }
         }
+        mirror += through;
         for light in scene.lights.iter() {
             least = least.min(light.color().min_element());
         }

@@ -121,6 +121,7 @@ impl<E: Real> Prepared<E> {
         let sky = Sky::new(scene.background);
         let beyond = Beyond::new(scene, geometry);
         needs.beyond = beyond.is_some() || sky.is_some();
+        needs.glass = beyond.as_ref().is_some_and(Beyond::has_glass);
         for (order, at) in beyond.iter().flat_map(|beyond| beyond.bodies.places()) {
             let entry = &mut entries[order];
             entry.is_body = true;
@@ -169,6 +170,12 @@ impl<E: Real> Prepared<E> {
         !self.needs.beyond || !BUILT.beyond
     }
 
+    /// Whether it has glass.
+    #[inline(always)]
+    pub(super) fn has_glass(&self) -> bool {
+        BUILT.glass && self.needs.glass
+    }
+
     /// All objects: by masks, or by all that is in the tree.
     #[inline(always)]
     pub(super) fn all(&self) -> Candidates<'static> {
@@ -200,10 +207,13 @@ fn entry<E: Real>(object: &Object) -> Entry<E> {
     }
 }
 
-/// Whether it is a mirror anywhere.
+/// Whether it sends rays on: a mirror, anywhere, or glass.
 fn mirrors(material: &Material) -> bool {
-    let other = || material.finish()?.pattern.map(|pattern| pattern.other.mirror());
-    material.mirror() != DVec3::ZERO || other().is_some_and(|mirror| mirror != DVec3::ZERO)
+    let finish = material.finish();
+    let other = || finish?.pattern.map(|pattern| pattern.other.mirror());
+    material.mirror() != DVec3::ZERO
+        || other().is_some_and(|mirror| mirror != DVec3::ZERO)
+        || finish.is_some_and(|finish| finish.glass.is_some())
 }
 
 /// The solids as they stand in a row, kind after kind.

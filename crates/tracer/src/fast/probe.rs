@@ -17,8 +17,8 @@ use super::real::{Lanes, Real, Vec3};
 use super::rounding::MARGIN;
 use super::search::nearest;
 use super::shape::Robust;
-use super::supported::is_drawn_by_kernels;
 use super::surfaces::surface;
+use super::ties::Ranked;
 use super::window::Grid;
 use crate::{Precision, RenderError, RenderOptions};
 
@@ -47,15 +47,13 @@ pub fn nearest_hits(
 ) -> Result<Vec<Option<Found>>, RenderError> {
     let one_by_one =
         || rays.iter().map(|&(origin, direction)| one_by_one(scene, origin, direction)).collect();
-    if !is_drawn_by_kernels(scene) {
-        return Ok(one_by_one());
-    }
-    let geometry = Geometry::new(scene, options.tree)?;
-    match resolve(options, &geometry, scene) {
-        Some(Precision::F64) => probe::<f64>(scene, &geometry, rays, options, |batch, level, out| {
+    let ranked = &Ranked::new(scene);
+    let geometry = Geometry::new(&ranked.scene, options.tree)?;
+    match resolve(options, &geometry, &ranked.scene) {
+        Some(Precision::F64) => probe::<f64>(ranked, &geometry, rays, options, |batch, level, out| {
             on!(level, simd => batch.nearest(simd, out));
         }),
-        Some(_) => probe::<f32>(scene, &geometry, rays, options, |batch, level, out| {
+        Some(_) => probe::<f32>(ranked, &geometry, rays, options, |batch, level, out| {
             on!(level, simd => batch.nearest(simd, out));
         }),
         None => Ok(one_by_one()),
@@ -78,15 +76,18 @@ struct Batch<'a, E> {
 }
 
 fn probe<E: Real>(
-    scene: &Scene,
+    ranked: &Ranked,
     geometry: &Geometry,
     rays: &[(DVec3, DVec3)],
     options: &RenderOptions,
     run: impl Fn(&Batch<E>, Level, &mut Vec<Option<Found>>),
 ) -> Result<Vec<Option<Found>>, RenderError> {
-    let prepared = Prepared::<E>::new(scene, geometry, options.tree, &GRID)?;
+    let prepared = Prepared::<E>::new(&ranked.scene, geometry, options.tree, &GRID)?;
     let mut out = Vec::with_capacity(rays.len());
     run(&Batch { scene: &prepared, geometry, rays }, options.level.unwrap_or_else(Level::new), &mut out);
+    for found in out.iter_mut().flatten() {
+        found.object = ranked.in_script(found.object);
+    }
     Ok(out)
 }
 

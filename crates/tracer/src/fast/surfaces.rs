@@ -41,16 +41,16 @@ pub(super) fn ambient<S: Simd, E: Real, const EYE: bool>(
 
 /// What a packet of rays meets that meet something.
 #[derive(Clone, Copy)]
-struct Met<'a, S: Simd, E: Real> {
-    found: Nearest<S, E>,
+pub(super) struct Met<'a, S: Simd, E: Real> {
+    pub(super) found: Nearest<S, E>,
     /// The same orders, for one lane at a time.
-    orders: &'a [E],
-    hit: Mask<S, E>,
+    pub(super) orders: &'a [E],
+    pub(super) hit: Mask<S, E>,
 }
 
 impl<'a, S: Simd, E: Real> Met<'a, S, E> {
     #[inline(always)]
-    fn new(simd: S, at: usize, distance: &Column<E>, order: &'a Column<E>) -> Self {
+    pub(super) fn new(simd: S, at: usize, distance: &Column<E>, order: &'a Column<E>) -> Self {
         let lanes = at..at + Lanes::<S, E>::LEN;
         let orders = &order.0[lanes.clone()];
         let distance = Lanes::<S, E>::from_slice(simd, &distance.0[lanes]);
@@ -60,7 +60,12 @@ impl<'a, S: Simd, E: Real> Met<'a, S, E> {
 
     /// The object that a lane meets, and the lanes that meet it.
     #[inline(always)]
-    fn object<'s>(&self, simd: S, scene: &'s Prepared<E>, lane: u32) -> (&'s Entry<E>, Mask<S, E>) {
+    pub(super) fn object<'s>(
+        &self,
+        simd: S,
+        scene: &'s Prepared<E>,
+        lane: u32,
+    ) -> (&'s Entry<E>, Mask<S, E>) {
         let order = self.orders[lane as usize];
         let same = self.hit & self.found.order.simd_eq(splat::<S, E>(simd, order));
         (&scene.entries[order.to_index()], same)
@@ -195,13 +200,6 @@ pub(super) fn reflect<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>(
                 }
                 let normal = Vec3::<S, E>::load(simd, &hits.normal, at);
                 let incoming = Vec3::load(simd, &queue.direction, at);
-                // The normal faces the ray; where rounding says otherwise, the ray grazes.
-                let towards = incoming.dot(normal).min(constant::<S, E>(simd, 0.0));
-                let direction = normal.scale_add(towards * constant::<S, E>(simd, -2.0), incoming);
-                // A step of Newton's method keeps its length at 1.
-                let stretch = direction
-                    .dot(direction)
-                    .mul_add(constant::<S, E>(simd, -0.5), constant::<S, E>(simd, 1.5));
                 let pixel = if EYE {
                     lanes::<S, E>(simd, at, usize::MAX)
                 } else {
@@ -212,13 +210,24 @@ pub(super) fn reflect<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>(
                     if EYE { mirrors } else { mirrors & pixel.simd_ge(constant::<S, E>(simd, 0.0)) };
                 let end = next.count;
                 compress(Vec3::load(simd, &hits.start, at), mirrors, &mut next.origin, end);
-                compress(direction.scale(stretch), mirrors, &mut next.direction, end);
+                compress(mirrored(simd, incoming, normal), mirrors, &mut next.direction, end);
                 compress(mirror, mirrors, &mut next.weight, end);
                 pixel.compress(mirrors).store_slice(&mut next.pixel.0[end..end + Lanes::<S, E>::LEN]);
                 next.count += mirrors.to_bitmask().count_ones() as usize;
             }
         },
     );
+}
+
+/// Where rays go that are mirrored.
+#[inline(always)]
+pub(super) fn mirrored<S: Simd, E: Real>(simd: S, incoming: Vec3<S, E>, normal: Vec3<S, E>) -> Vec3<S, E> {
+    // The normal faces the ray; where rounding says otherwise, the ray grazes.
+    let towards = incoming.dot(normal).min(constant::<S, E>(simd, 0.0));
+    let direction = normal.scale_add(towards * constant::<S, E>(simd, -2.0), incoming);
+    // A step of Newton's method keeps its length at 1.
+    let stretch = direction.dot(direction).mul_add(constant::<S, E>(simd, -0.5), constant::<S, E>(simd, 1.5));
+    direction.scale(stretch)
 }
 
 #[inline(always)]

@@ -6,6 +6,8 @@
 //! never inlined: its registers are its own, and it is the same code whatever else a build has. Here it is decided which
 //! steps a tile takes, and in which variants ([`fitted!`]).
 
+use std::sync::atomic::AtomicBool;
+
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use rayfold_scene::Tone;
@@ -18,31 +20,37 @@ use super::features::{Anything, BUILT, Kernel, Variant, fitted};
 use super::kind::ByKind;
 use super::light::{InTheWay, light_up, light_up_beyond};
 use super::look::{aim_along_axis, look, look_at_bodies, look_from_eye};
+use super::onwards::send_on;
 use super::prepare::Prepared;
 use super::rays::Rays;
 use super::real::{Lanes, Real};
 use super::sampled::light::{SoftLight, light_up_softly};
 use super::sky::show_sky;
 use super::surfaces::{ambient, reflect, surfaces};
+use super::waiting::Waiting;
 
 /// Memory of a worker, used again for each of its tiles; what is in it does not matter.
-pub(super) struct Scratch<E> {
+pub(super) struct Scratch<'a, E> {
     pub(super) queue: Queue<E>,
     pub(super) hits: Hits<E>,
     /// The rays that mirrors send on.
     pub(super) next: Queue<E>,
+    /// The rays that mirrors and glass send on, in scenes with glass.
+    pub(super) waiting: Waiting<'a, E>,
     /// The sum of what the bounces add to each pixel.
     pixels: Columns<E>,
     pub(super) in_the_way: InTheWay,
     pub(super) sights: Picked,
 }
 
-impl<E: Real> Scratch<E> {
-    pub(super) fn new() -> Self {
+impl<'a, E: Real> Scratch<'a, E> {
+    /// Where there is much glass a tile is given up halfway once `cancel` is raised.
+    pub(super) fn new(cancel: Option<&'a AtomicBool>) -> Self {
         Self {
             queue: Queue::new(),
             hits: Hits::new(),
             next: Queue::new(),
+            waiting: Waiting::new(cancel),
             pixels: columns(),
             in_the_way: InTheWay::default(),
             sights: Picked::default(),
@@ -62,7 +70,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     if tile.candidates == 0 && scene.is_plain() {
         return fill(tile, band);
     }
-    let Scratch { queue, hits, next, pixels: _, in_the_way, sights } = &mut *scratch;
+    let Scratch { queue, hits, next, waiting, pixels: _, in_the_way, sights } = &mut *scratch;
     let tree = BUILT.tree && scene.tree.is_some();
     let candidates = match &scene.sights {
         Some(all) if BUILT.tree && all.gather(tile.place.0, tile.place.1, sights) => {
@@ -77,6 +85,9 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     let background = band.background();
     next.count = 0;
     hits.packets.clear();
+    if scene.has_glass() {
+        waiting.begin(tile.bounces);
+    }
     let seen = candidates.kinds;
     match scene.rays {
         Rays::Pinhole(rays) => {
@@ -85,7 +96,8 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
                 look_from_eye::<S, E, Variant<N::By, C, T, D>>(simd, scene, image, rays, candidates, queue, hits)
             });
             let count = rays_of::<S, E>((tile.width, tile.height));
-            let met = Met { kinds: seen, background, queue, count, next: Some(&mut *next), soft: None };
+            let next = Some(&mut *next);
+            let met = Met { kinds: seen, background, queue, count, next, waiting, soft: None };
             shade::<S, E, N, true>(simd, scene, met, hits, in_the_way);
         }
         Rays::Parallel(rays) => {
@@ -94,7 +106,8 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
                 look::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, candidates, background, queue, hits)
             });
             let count = queue.count;
-            let met = Met { kinds: seen, background, queue, count, next: Some(&mut *next), soft: None };
+            let next = Some(&mut *next);
+            let met = Met { kinds: seen, background, queue, count, next, waiting, soft: None };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
         }
     }
@@ -106,8 +119,8 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     }
 }
 
-impl<E: Real> Scratch<E> {
-    /// Follows the rays that mirrors have sent on, and adds what they see to the colours of the hits before.
+impl<E: Real> Scratch<'_, E> {
+    /// Follows the rays that mirrors and glass have sent on, and adds what they see to the colours of the hits before.
     #[inline(always)]
     pub(super) fn follow<S: Simd, N: Kernel<E>>(
         &mut self,
@@ -116,7 +129,10 @@ impl<E: Real> Scratch<E> {
         bounces: u32,
         soft: Option<SoftLight<E>>,
     ) {
-        let Self { queue, hits, next, pixels, in_the_way, sights: _ } = self;
+        if scene.has_glass() {
+            return follow_through_glass::<S, E, N>(simd, scene, soft, self);
+        }
+        let Self { queue, hits, next, waiting, pixels, in_the_way, sights: _ } = self;
         if !BUILT.mirrors || next.count == 0 {
             return;
         }
@@ -131,8 +147,8 @@ impl<E: Real> Scratch<E> {
             fitted!(N, all.kinds, tree, C T D => {
                 look::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, all, scene.background, queue, hits)
             });
-            let (kinds, background) = (all.kinds, scene.background);
-            let met = Met { kinds, background, queue, count: queue.count, next: after, soft };
+            let (kinds, background, count) = (all.kinds, scene.background, queue.count);
+            let met = Met { kinds, background, queue, count, next: after, waiting, soft };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
             for ray in 0..queue.count {
                 let pixel = queue.pixel.0[ray].to_index();
@@ -148,8 +164,34 @@ impl<E: Real> Scratch<E> {
     }
 }
 
+/// The same in scenes with glass: the rays that wait are traced until none is left.
+#[inline(never)]
+fn follow_through_glass<S: Simd, E: Real, N: Kernel<E>>(
+    simd: S,
+    scene: &Prepared<E>,
+    soft: Option<SoftLight<E>>,
+    scratch: &mut Scratch<E>,
+) {
+    let Scratch { queue, hits, waiting, pixels, in_the_way, .. } = scratch;
+    let all = scene.all();
+    let tree = BUILT.tree && scene.tree.is_some();
+    core::mem::swap(&mut hits.color, pixels);
+    while waiting.take(queue) {
+        hits.packets.clear();
+        fitted!(N, all.kinds, tree, C T D => {
+            look::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, all, scene.background, queue, hits)
+        });
+        let (kinds, background, count) = (all.kinds, scene.background, queue.count);
+        let met = Met { kinds, background, queue, count, next: None, waiting: &mut *waiting, soft };
+        shade_more::<S, E, N, false>(simd, scene, met, hits, in_the_way);
+        waiting.add(queue, hits);
+    }
+    waiting.sum_up(pixels);
+    core::mem::swap(&mut hits.color, pixels);
+}
+
 /// Rays that have met something.
-pub(super) struct Met<'a, E> {
+pub(super) struct Met<'a, 'b, E> {
     /// The kinds of what they can have met.
     pub(super) kinds: ByKind<bool>,
     pub(super) background: [E; 3],
@@ -158,6 +200,8 @@ pub(super) struct Met<'a, E> {
     pub(super) count: usize,
     /// Where mirrors send them on to, if they do.
     pub(super) next: Option<&'a mut Queue<E>>,
+    /// The same in scenes with glass.
+    pub(super) waiting: &'a mut Waiting<'b, E>,
     /// Lights of which each ray has a point of its own.
     pub(super) soft: Option<SoftLight<'a, E>>,
 }
@@ -190,7 +234,10 @@ fn shade_more<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
 ) {
     let (queue, count) = (met.queue, met.count);
     match (&scene.beyond, met.soft) {
-        (_, Some(soft)) => shade_softly::<S, E, N, EYE>(simd, scene, soft, met, hits, in_the_way),
+        (beyond, Some(soft)) => {
+            let way = (beyond.as_ref(), soft);
+            shade_softly::<S, E, N, EYE>(simd, scene, way, met, hits, in_the_way);
+        }
         (Some(beyond), None) => shade_beyond::<S, E, N, EYE>(simd, scene, beyond, met, hits, in_the_way),
         (None, None) => shade_plain::<S, E, N, EYE>(simd, scene, met, hits, in_the_way),
     }
@@ -205,26 +252,20 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
     beyond: &Beyond<E>,
-    Met { kinds: _, background, queue, count, next, soft: _ }: Met<E>,
+    met: Met<E>,
     hits: &mut Hits<E>,
     in_the_way: &mut InTheWay,
 ) {
-    look_at_bodies::<S, E, EYE>(simd, &beyond.bodies, count, queue, hits);
+    let queue = met.queue;
+    look_at_bodies::<S, E, EYE>(simd, &beyond.bodies, met.count, queue, hits);
     if hits.packets.is_empty() {
         return;
     }
-    surfaces::<S, E, Anything<N::By>, EYE, true, true>(simd, scene, background, queue, hits);
-    let painted = beyond.finishes.as_ref().filter(|finishes| finishes.has_patterns);
-    if let Some(finishes) = painted {
-        finishes.paint::<E, EYE>(queue, hits, Lanes::<S, E>::LEN);
-    }
+    surfaces::<S, E, Anything<N::By>, EYE, true, true>(simd, scene, met.background, queue, hits);
+    let is_painted = paint::<S, E, EYE>(beyond, queue, hits);
     in_the_way.find(simd, scene, hits);
     light_up_beyond::<S, E, Anything<N::By>, EYE>(simd, scene, beyond, queue, hits, in_the_way);
-    match next {
-        Some(next) if painted.is_some() => reflect::<S, E, EYE, true>(simd, scene, queue, hits, next),
-        Some(next) => reflect::<S, E, EYE, false>(simd, scene, queue, hits, next),
-        None => {}
-    }
+    go_on::<S, E, N, EYE>(simd, scene, is_painted, met, hits);
 }
 
 /// In pictures whose lights have an extent.
@@ -232,27 +273,61 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
 fn shade_softly<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
-    soft: SoftLight<E>,
-    Met { kinds: _, background, queue, count, next, soft: _ }: Met<E>,
+    (beyond, soft): (Option<&Beyond<E>>, SoftLight<E>),
+    met: Met<E>,
     hits: &mut Hits<E>,
     in_the_way: &mut InTheWay,
 ) {
-    if let Some(beyond) = &scene.beyond {
-        look_at_bodies::<S, E, EYE>(simd, &beyond.bodies, count, queue, hits);
+    let queue = met.queue;
+    if let Some(beyond) = beyond {
+        look_at_bodies::<S, E, EYE>(simd, &beyond.bodies, met.count, queue, hits);
     }
     if hits.packets.is_empty() {
         return;
     }
-    surfaces::<S, E, Anything<N::By>, EYE, true, true>(simd, scene, background, queue, hits);
-    let finishes = scene.beyond.as_ref().and_then(|beyond| beyond.finishes.as_ref());
-    let painted = finishes.filter(|finishes| finishes.has_patterns);
+    surfaces::<S, E, Anything<N::By>, EYE, true, true>(simd, scene, met.background, queue, hits);
+    let is_painted = beyond.is_some_and(|beyond| paint::<S, E, EYE>(beyond, queue, hits));
+    in_the_way.find(simd, scene, hits);
+    light_up_softly::<S, E, Anything<N::By>, EYE>(simd, scene, soft, queue, hits, in_the_way);
+    go_on::<S, E, N, EYE>(simd, scene, is_painted, met, hits);
+}
+
+/// Gives hits the coefficients of patterns; whether there are any.
+#[inline(always)]
+fn paint<S: Simd, E: Real, const EYE: bool>(
+    beyond: &Beyond<E>,
+    queue: &Queue<E>,
+    hits: &mut Hits<E>,
+) -> bool {
+    let painted = beyond.finishes.as_ref().filter(|finishes| finishes.has_patterns);
     if let Some(finishes) = painted {
         finishes.paint::<E, EYE>(queue, hits, Lanes::<S, E>::LEN);
     }
-    in_the_way.find(simd, scene, hits);
-    light_up_softly::<S, E, Anything<N::By>, EYE>(simd, scene, soft, queue, hits, in_the_way);
+    painted.is_some()
+}
+
+/// Sends on what mirrors and glass do.
+#[inline(always)]
+fn go_on<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    is_painted: bool,
+    Met { queue, next, waiting, .. }: Met<E>,
+    hits: &mut Hits<E>,
+) {
+    if let Some(glass) = scene.beyond.as_ref().and_then(Beyond::glass) {
+        if !waiting.is_at_the_end() {
+            let send_on = if is_painted {
+                send_on::<S, E, Anything<N::By>, EYE, true>
+            } else {
+                send_on::<S, E, Anything<N::By>, EYE, false>
+            };
+            send_on(simd, scene, glass, queue, hits, waiting);
+        }
+        return;
+    }
     match next {
-        Some(next) if painted.is_some() => reflect::<S, E, EYE, true>(simd, scene, queue, hits, next),
+        Some(next) if is_painted => reflect::<S, E, EYE, true>(simd, scene, queue, hits, next),
         Some(next) => reflect::<S, E, EYE, false>(simd, scene, queue, hits, next),
         None => {}
     }
@@ -263,7 +338,7 @@ fn shade_softly<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
 fn shade_plain<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
-    Met { kinds, background, queue, count: _, next, soft: _ }: Met<E>,
+    Met { kinds, background, queue, next, .. }: Met<E>,
     hits: &mut Hits<E>,
     in_the_way: &mut InTheWay,
 ) {

@@ -45,7 +45,7 @@ pub(super) fn refract(
 }
 
 /// Whether an object, which is no instance, has no inside.
-pub(super) fn is_flat(object: &Object) -> bool {
+pub(crate) fn is_flat(object: &Object) -> bool {
     match object {
         Object::Triangle(_) | Object::Disc(_) | Object::Plane(_) => true,
         Object::Cuboid(cuboid) => cuboid.min().cmpeq(cuboid.max()).any(),

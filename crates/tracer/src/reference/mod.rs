@@ -29,10 +29,11 @@ use glam::DVec3;
 use image::RgbImage;
 use rayfold_scene::{Object, Scene};
 
+pub(crate) use glass::is_flat;
 pub(crate) use light::highlight;
 pub(crate) use pattern::coefficients;
 pub use sampled::{Estimate, estimate, render_exposed};
-
+pub(crate) use shading::{FAINT, FAINT_LINEAR};
 pub use shapes::Surface;
 pub(crate) use shapes::{normal_and_width, power, triangle_normal};
 pub(crate) use tone::levels;

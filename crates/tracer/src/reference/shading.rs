@@ -12,10 +12,10 @@ use super::world::{World, glass};
 use crate::camera::Ray;
 
 /// Once a path has met glass, a ray that counts for less than this in every channel is not followed.
-const FAINT: f64 = 1.0 / 4096.0;
+pub(crate) const FAINT: f64 = 1.0 / 4096.0;
 
 /// The same where the picture is of linear light, whose dark tones are spread.
-const FAINT_LINEAR: f64 = 1.0 / 65536.0;
+pub(crate) const FAINT_LINEAR: f64 = 1.0 / 65536.0;
 
 /// Follows rays.
 pub(super) struct Shader<'a> {

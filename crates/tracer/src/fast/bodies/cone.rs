@@ -158,6 +158,6 @@ impl<E: Real> Cone<E> {
         );
         let normal = normal.normalize(simd);
         let side = within.select(zero - one, one);
-        Met { point: Vec3::<S, E>::new(x * radius, y * radius, z), normal: normal.scale(side) }
+        Met { point: Vec3::<S, E>::new(x * radius, y * radius, z), normal: normal.scale(side), within }
     }
 }

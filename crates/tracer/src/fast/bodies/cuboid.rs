@@ -69,7 +69,8 @@ impl<E: Real> Cuboid<E> {
         let (x, nx) = face::<S, E>(simd, is_x, entering, ray.direction.x, hx, place.x);
         let (y, ny) = face::<S, E>(simd, is_y, entering, ray.direction.y, hy, place.y);
         let (z, nz) = face::<S, E>(simd, is_z, entering, ray.direction.z, hz, place.z);
-        Met { point: Vec3::<S, E>::new(x, y, z), normal: Vec3::<S, E>::new(nx, ny, nz) }
+        let (point, normal) = (Vec3::<S, E>::new(x, y, z), Vec3::<S, E>::new(nx, ny, nz));
+        Met { point, normal, within: !entering }
     }
 }
 

@@ -38,11 +38,12 @@ struct Local<S: Simd, E: Real> {
     direction: Vec3<S, E>,
 }
 
-/// Where rays meet a body, in its coordinates: the place brought onto it, and the unit normal on the side that they came
-/// from.
+/// Where rays meet a body, in its coordinates: the place brought onto it, the unit normal on the side that they came
+/// from, and whether that is the inside.
 struct Met<S: Simd, E: Real> {
     point: Vec3<S, E>,
     normal: Vec3<S, E>,
+    within: Mask<S, E>,
 }
 
 /// A shape in its own coordinates.
@@ -158,7 +159,7 @@ impl<E: Real> Body<E> {
                 let size = point.x.abs() + point.y.abs() + point.z.abs();
                 let offset = size
                     .mul_add(constant::<S, E>(simd, OFFSET * E::ROUNDOFF), splat::<S, E>(simd, self.offset));
-                Surface { start: normal.scale_add(offset, point), normal }
+                Surface { start: normal.scale_add(offset, point), normal, offset, within: met.within }
             },
         )
     }

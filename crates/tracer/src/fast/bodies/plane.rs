@@ -4,6 +4,7 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use super::{Local, Met};
+use crate::fast::packet::no_lane;
 use crate::fast::real::{Lanes, Mask, Real, Vec3, constant};
 
 /// Where rays meet the plane z = 0. The distance is worked out as that to a box's slab, so that what lies in the plane of
@@ -22,5 +23,6 @@ pub(super) fn surface<S: Simd, E: Real>(simd: S, ray: Local<S, E>, distance: Lan
     let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
     let Vec3 { x, y, .. } = ray.direction.scale_add(distance, ray.origin);
     let up = ray.direction.z.simd_gt(zero).select(zero - one, one);
-    Met { point: Vec3::<S, E>::new(x, y, zero), normal: Vec3::<S, E>::new(zero, zero, up) }
+    let (point, normal) = (Vec3::<S, E>::new(x, y, zero), Vec3::<S, E>::new(zero, zero, up));
+    Met { point, normal, within: no_lane::<S, E>(simd) }
 }

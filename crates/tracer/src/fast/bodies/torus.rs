@@ -148,8 +148,9 @@ impl<E: Real> Torus<E> {
         let outside = start.outside(zero);
         // From the surface itself what goes inwards is within.
         let inwards = outside.simd_eq(zero) & outward.dot(ray.direction).simd_gt(zero);
-        let side = (outside.simd_lt(zero) | inwards).select(zero - one, one);
-        Met { point: outward.scale_add(tube, circle), normal: outward.scale(side) }
+        let within = outside.simd_lt(zero) | inwards;
+        let side = within.select(zero - one, one);
+        Met { point: outward.scale_add(tube, circle), normal: outward.scale(side), within }
     }
 }
 

@@ -8,6 +8,7 @@ use rayfold_scene::{Light, Scene};
 use super::hulls::{Cone, Hulls, Region};
 use crate::fast::bounce::{Column, Columns, Hits, Queue, columns};
 use crate::fast::candidates::Candidates;
+use crate::fast::dimming::{Arriving, Shadow};
 use crate::fast::features::Features;
 use crate::fast::finish::{Finishes, Lit};
 use crate::fast::geometry::Geometry;
@@ -172,7 +173,7 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
         #[inline(always)]
         || {
             let SoftLight { extents, points } = soft;
-            let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
+            let zero = constant::<S, E>(simd, 0.0);
             let far = constant::<S, E>(simd, E::FAR);
             let (low, high) = region(simd, hits);
             let from = Region::new(low, high);
@@ -202,41 +203,51 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                 let start = Vec3::load(simd, &hits.start, at);
                 let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
                 let seen = Ray { origin: start, direction: Vec3::load(simd, &queue.direction, at) };
-                let mut gloss = beyond.and_then(|beyond| beyond.finishes.as_ref()).map(Finishes::gloss);
+                let finishes = beyond.and_then(|beyond| beyond.finishes.as_ref());
+                let mut gloss = finishes.map(Finishes::gloss);
+                let glass = beyond.and_then(|beyond| Some((scene, beyond, beyond.glass()?)));
+                // Most of glass scatters nothing, and needs no shadow rays.
+                let mut shows = zero.simd_eq(zero);
+                if let (Some(_), Some(finishes)) = (glass, finishes) {
+                    let diffuse = Vec3::<S, E>::load(simd, &hits.diffuse, at);
+                    shows = diffuse.x.simd_ne(zero) | diffuse.y.simd_ne(zero) | diffuse.z.simd_ne(zero);
+                    shows |= finishes.shines(simd, orders);
+                }
                 let mut sum = Vec3::zero(simd);
                 for (index, light) in scene.suns.iter().enumerate() {
-                    let (towards, lit) = match &extents.suns[index] {
-                        None => {
-                            let towards = light.sun.towards(simd);
-                            let lit = normal.dot(towards).simd_gt(zero);
-                            if lit.any_true() {
-                                let candidates = obstacles.of[index].candidates(others, F::KINDS);
-                                (towards, unoccluded::<S, E, F>(simd, scene, light, start, lit, candidates))
-                            } else {
-                                (towards, lit)
-                            }
-                        }
-                        Some((own, _)) => {
-                            let towards = points.of::<S, EYE>(simd, *own, &queue.pixel, at);
-                            let lit = normal.dot(towards).simd_gt(zero);
+                    let own = extents.suns[index].as_ref();
+                    let towards = match own {
+                        None => light.sun.towards(simd),
+                        Some((own, _)) => points.of::<S, EYE>(simd, *own, &queue.pixel, at),
+                    };
+                    let ray = Ray { origin: start, direction: towards };
+                    let cosine = normal.dot(towards);
+                    let facing = cosine.simd_gt(zero) & shows;
+                    let mut lit = facing;
+                    if lit.any_true() {
+                        lit = if own.is_some() {
                             let mut candidates = all(sun_masks[index]);
                             candidates.masks = candidates.masks.and_spheres(others);
-                            let ray = Ray { origin: start, direction: towards };
-                            (towards, unmet::<S, E, F>(simd, scene, ray, far, lit, candidates))
-                        }
-                    };
-                    let mut lit = lit;
+                            unmet::<S, E, F>(simd, scene, ray, far, lit, candidates)
+                        } else {
+                            let candidates = obstacles.of[index].candidates(others, F::KINDS);
+                            unoccluded::<S, E, F>(simd, scene, light, start, lit, candidates)
+                        };
+                    }
                     if let Some(beyond) = beyond
                         && lit.any_true()
                     {
-                        let ray = Ray { origin: start, direction: towards };
                         lit = beyond.bodies.unoccluded(simd, ray, far, lit);
                     }
-                    let cosine = normal.dot(towards);
-                    sum = Vec3::splat(simd, light.sun.color).scale_add(lit.select(cosine, zero), sum);
+                    let mut arriving = Arriving { color: Vec3::splat(simd, light.sun.color), lit };
+                    if let Some(glass) = glass {
+                        arriving =
+                            arriving.through_glass::<F>(simd, glass, facing & !lit, Shadow { ray, far });
+                    }
+                    let Arriving { color, lit } = arriving;
+                    sum = color.scale_add(lit.select(cosine, zero), sum);
                     if let Some(gloss) = &mut gloss {
-                        let lit = Lit { lanes: lit, towards, part: one };
-                        gloss.add(lit, light.sun.color, (seen, normal), orders);
+                        gloss.add(Lit { lanes: lit, towards, color }, (seen, normal), orders);
                     }
                 }
                 for (index, lamp) in lamps.iter().enumerate() {
@@ -248,7 +259,8 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                         }
                     };
                     let cosine = normal.dot(ray.direction);
-                    let mut lit = cosine.simd_gt(zero);
+                    let facing = cosine.simd_gt(zero) & shows;
+                    let mut lit = facing;
                     if let Some(beyond) = beyond
                         && lit.any_true()
                     {
@@ -257,10 +269,16 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                     let mut candidates = all(lamp_masks[index]);
                     candidates.masks = candidates.masks.and_spheres(others);
                     lit = unmet::<S, E, F>(simd, scene, ray, far, lit, candidates);
-                    sum = Vec3::splat(simd, lamp.color).scale_add(lit.select(cosine * part, zero), sum);
+                    let mut arriving = Arriving { color: Vec3::splat(simd, lamp.color), lit };
+                    if let Some(glass) = glass {
+                        arriving =
+                            arriving.through_glass::<F>(simd, glass, facing & !lit, Shadow { ray, far });
+                    }
+                    let Arriving { color, lit } = arriving;
+                    sum = color.scale_add(lit.select(cosine * part, zero), sum);
                     if let Some(gloss) = &mut gloss {
-                        let lit = Lit { lanes: lit, towards: ray.direction, part };
-                        gloss.add(lit, lamp.color, (seen, normal), orders);
+                        let lit = Lit { lanes: lit, towards: ray.direction, color: color.scale(part) };
+                        gloss.add(lit, (seen, normal), orders);
                     }
                 }
                 let diffuse = Vec3::load(simd, &hits.diffuse, at);

@@ -116,7 +116,7 @@ impl<'a, E: Real> Sampled<'a, E> {
         let band = film.width * self.side.1 as usize;
         let (pixels, goals) = film.split();
         pixels.par_chunks_mut(band).zip(goals.counts.par_chunks(band)).enumerate().try_for_each_init(
-            || Box::new(Workspace::new()),
+            || Box::new(Workspace::new(self.options.cancel)),
             |workspace, (row, (pixels, counts))| {
                 if self.options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
                     return Err(RenderError::Cancelled);

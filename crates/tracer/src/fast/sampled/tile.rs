@@ -1,6 +1,7 @@
 //! The samples of a tile's pixels in a pass: where their rays go, and what comes of them.
 
 use std::ops::Range;
+use std::sync::atomic::AtomicBool;
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
@@ -60,8 +61,8 @@ struct Item {
 }
 
 /// Memory of a worker, used again for each of its tiles.
-pub(super) struct Workspace<E> {
-    scratch: Scratch<E>,
+pub(super) struct Workspace<'a, E> {
+    scratch: Scratch<'a, E>,
     items: Vec<Item>,
     lights: LightPoints<E>,
     seeds: [u32; ROOM],
@@ -73,10 +74,11 @@ pub(super) struct Workspace<E> {
     objects: [u32; ROOM],
 }
 
-impl<E: Real> Workspace<E> {
-    pub(super) fn new() -> Self {
+impl<'a, E: Real> Workspace<'a, E> {
+    /// Where there is much glass a tile is given up halfway once `cancel` is raised.
+    pub(super) fn new(cancel: Option<&'a AtomicBool>) -> Self {
         Self {
-            scratch: Scratch::new(),
+            scratch: Scratch::new(cancel),
             items: vec![],
             lights: LightPoints::default(),
             seeds: [0; ROOM],
@@ -204,7 +206,7 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     let (scene, count) = (&moment.prepared, batch.len());
     let soft = moment.extents.as_ref().map(|extents| SoftLight { extents, points: lights });
     aim::<S, E>(simd, moment, &mut scratch.queue);
-    let Scratch { queue, hits, next, in_the_way, sights, .. } = &mut *scratch;
+    let Scratch { queue, hits, next, waiting, in_the_way, sights, .. } = &mut *scratch;
     let tree = BUILT.tree && scene.tree.is_some();
     let candidates = match &scene.sights {
         Some(all) if BUILT.tree && all.gather(tile.place.0, tile.place.1, sights) => {
@@ -215,18 +217,21 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     };
     next.count = 0;
     hits.packets.clear();
+    if scene.has_glass() {
+        waiting.begin(pass.bounces);
+    }
     let (kinds, background) = (candidates.kinds, scene.background);
     if matches!(scene.rays, Rays::Pinhole(_)) && moment.lens.is_none() {
         fitted!(N, kinds, tree, C T D => {
             look::<S, E, Variant<N::By, C, T, D>, true>(simd, scene, candidates, background, queue, hits)
         });
-        let met = Met { kinds, background, queue, count, next: Some(&mut *next), soft };
+        let met = Met { kinds, background, queue, count, next: Some(&mut *next), waiting, soft };
         shade::<S, E, N, true>(simd, scene, met, hits, in_the_way);
     } else {
         fitted!(N, kinds, tree, C T D => {
             look::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, candidates, background, queue, hits)
         });
-        let met = Met { kinds, background, queue, count, next: Some(&mut *next), soft };
+        let met = Met { kinds, background, queue, count, next: Some(&mut *next), waiting, soft };
         shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
     }
     if batch.iter().any(|item| item.sample == 0) {

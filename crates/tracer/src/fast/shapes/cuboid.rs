@@ -225,7 +225,8 @@ impl<E: Real> Tests<Cuboid<E>, E> for Robust {
         let (y, ny) = face::<S, E>(simd, is_y, d.y.simd_gt(zero), entering, (min.y, max.y), point.y);
         let (z, nz) = face::<S, E>(simd, is_z, d.z.simd_gt(zero), entering, (min.z, max.z), point.z);
         let (point, normal) = (Vec3::<S, E>::new(x, y, z), Vec3::<S, E>::new(nx, ny, nz));
-        Surface { start: normal.scale_add(offset(simd, point, OFFSET), point), normal }
+        let offset = offset(simd, point, OFFSET);
+        Surface { start: normal.scale_add(offset, point), normal, offset, within: !entering }
     }
 }
 

@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 
 use crate::fast::bounds::Bounds;
 use crate::fast::lights::sun::Sun;
-use crate::fast::packet::{Nearest, Ray, Surface};
+use crate::fast::packet::{Nearest, Ray, Surface, no_lane};
 use crate::fast::placed::{self, Face, Sight};
 use crate::fast::predicate::Place;
 use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
@@ -198,8 +198,13 @@ impl<E: Real> Tests<Sphere<E>, E> for Robust {
         let center = Vec3::splat(simd, sphere.center);
         let to_center = if EYE { center } else { center.sub(ray.origin) };
         let outward = ray.direction.scale_sub(distance, to_center).normalize(simd);
-        let outside =
-            Surface { start: outward.scale_add(splat::<S, E>(simd, sphere.outer), center), normal: outward };
+        let offset = splat::<S, E>(simd, (sphere.outer - sphere.inner) * E::narrow(0.5));
+        let outside = Surface {
+            start: outward.scale_add(splat::<S, E>(simd, sphere.outer), center),
+            normal: outward,
+            offset,
+            within: no_lane::<S, E>(simd),
+        };
         if EYE && sphere.is_outside_the_eye() {
             return outside;
         }
@@ -215,7 +220,8 @@ impl<E: Real> Tests<Sphere<E>, E> for Robust {
         }
         let away = inside.select(splat::<S, E>(simd, sphere.inner), splat::<S, E>(simd, sphere.outer));
         let side = inside.select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0));
-        Surface { start: outward.scale_add(away, center), normal: outward.scale(side) }
+        let start = outward.scale_add(away, center);
+        Surface { start, normal: outward.scale(side), offset, within: inside }
     }
 }
 

@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 
 use crate::fast::bounds::Bounds;
 use crate::fast::lights::sun::Sun;
-use crate::fast::packet::{Nearest, Ray, Surface, affine, offset};
+use crate::fast::packet::{Nearest, Ray, Surface, affine, no_lane, offset};
 use crate::fast::placed::{self, Face, Sight, across_corners};
 use crate::fast::predicate::{Beside, Corners, Place, settle};
 use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
@@ -290,7 +290,8 @@ impl<E: Real> Tests<Triangle<E>, E> for Robust {
             .select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0));
         let offset =
             offset(simd, point, OFFSET) + height.abs() * constant::<S, E>(simd, OFFSET * E::ROUNDOFF);
-        Surface { start: normal.scale_add(side * offset - above, point), normal: normal.scale(side) }
+        let start = normal.scale_add(side * offset - above, point);
+        Surface { start, normal: normal.scale(side), offset, within: no_lane::<S, E>(simd) }
     }
 }
 

@@ -22,7 +22,7 @@ impl Shape for Sphere {
         }
         let half_chord = ((radius - closest) * (radius + closest)).sqrt();
         // The two solutions are `far` and `power / far`; neither subtracts numbers of the same sign.
-        let far = middle + half_chord.copysign(middle);
+        let far = if middle > 0.0 { middle + half_chord } else { middle - half_chord };
         let power = power(ray.origin, self, 1.0);
         if power > 0.0 {
             (middle > 0.0).then(|| power / far)
@@ -94,6 +94,11 @@ mod tests {
         assert_eq!(distance(&unit, ray([0.0, 0.0, 3.0], [0.0, 0.0, -1.0])), Some(2.0));
         assert_eq!(distance(&unit, ray([0.0, 0.0, 3.0], [0.0, 0.0, 1.0])), None);
         assert_eq!(distance(&unit, ray([0.0; 3], [0.0, 0.0, 1.0])), Some(1.0));
+        assert_eq!(
+            distance(&unit, ray([0.0; 3], [0.0, 0.0, -1.0])),
+            Some(1.0),
+            "from the middle, whatever the sign of 0"
+        );
         assert_eq!(distance(&unit, ray([0.0, 0.0, 0.5], [0.0, 0.0, -1.0])), Some(1.5));
         assert_eq!(distance(&unit, ray([0.0, 0.0, 0.5], [0.0, 0.0, 1.0])), Some(0.5));
         assert_eq!(distance(&unit, ray([0.0, 0.0, 1.0], [0.0, 0.0, -1.0])), Some(2.0));
