@@ -198,7 +198,8 @@ mod tests {
         let world_of = |objects| scene(objects, lamp(below, 0.0));
         let from_below = |scene: &Scene| {
             let ray = Ray { origin: DVec3::new(0.2, 0.1, 0.0), direction: DVec3::NEG_Y };
-            Shader { world: &World::new(scene), cancel: None }.color(ray, 0).x
+            let world = World::new(scene);
+            Shader { world: &world, lights: &world.middles(), cancel: None }.color(ray, 0).x
         };
         let open = from_below(&world_of(vec![floor.clone()]));
         assert!(open > 0.5);
@@ -226,7 +227,7 @@ mod tests {
         endless.depth = Depth::new(16).unwrap();
         let flag = AtomicBool::new(true);
         let world = World::new(&endless);
-        let shader = Shader { world: &world, cancel: Some(&flag) };
+        let shader = Shader { world: &world, lights: &world.middles(), cancel: Some(&flag) };
         let ray = Ray { origin: DVec3::ZERO, direction: DVec3::X };
         assert_eq!((shader.color(ray, 16), shader.is_cancelled()), (DVec3::ZERO, true));
     }

@@ -410,7 +410,7 @@ mod tests {
             |place, _| if place % 8 == 0 { f64::from(u8::from(dice.bool())) } else { 0.5 },
         );
         let counts: Vec<u32> = film.pixels[..8].iter().map(|pixel| pixel.count).collect();
-        assert_eq!(counts, [64, 32, 16, 8, 4, 1, 1, 1]);
+        assert_eq!(counts, [64, 64, 32, 16, 8, 4, 1, 1]);
     }
 
     /// A line of which few pixels see anything at first is found along its length.
