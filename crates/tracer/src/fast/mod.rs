@@ -11,6 +11,7 @@ mod bounce;
 mod bounds;
 mod candidates;
 mod coincidence;
+mod crowds;
 mod descent;
 mod dispatch;
 mod exact;
@@ -26,6 +27,7 @@ mod look;
 mod naive;
 mod packet;
 mod placed;
+mod planes;
 mod precision;
 mod predicate;
 mod prepare;
@@ -92,10 +94,12 @@ impl<'a> Drawing<'a> {
     pub fn new(scene: &'a Scene, options: &'a RenderOptions) -> Result<Self, RenderError> {
         let drawable = has_kernels(options) && supported::is_drawn_by_kernels(scene);
         let geometry = if drawable { Geometry::new(scene, options.tree).ok() } else { None };
-        let precision = |geometry| Some((geometry, precision::resolve(options, geometry, scene)?));
-        Ok(Self(match geometry.as_ref().and_then(precision) {
-            Some((geometry, Precision::F64)) => Backend::Double(Setup::new(scene, geometry, options)?),
-            Some((geometry, _)) => Backend::Single(Setup::new(scene, geometry, options)?),
+        let precision = |geometry| Some((precision::resolve(options, &geometry, scene)?, geometry));
+        Ok(Self(match geometry.and_then(precision) {
+            Some((Precision::F64, geometry)) => {
+                Backend::Double(Setup::new(scene, &geometry.with_shared_planes(scene), options)?)
+            }
+            Some((_, geometry)) => Backend::Single(Setup::new(scene, &geometry, options)?),
             None => Backend::Reference(scene, options),
         }))
     }

@@ -50,9 +50,12 @@ pub fn nearest_hits(
     }
     let geometry = Geometry::new(scene, options.tree)?;
     match resolve(options, &geometry, scene) {
-        Some(Precision::F64) => probe::<f64>(scene, &geometry, rays, options, |batch, level, out| {
-            on!(level, simd => batch.nearest(simd, out));
-        }),
+        Some(Precision::F64) => {
+            let geometry = geometry.with_shared_planes(scene);
+            probe::<f64>(scene, &geometry, rays, options, |batch, level, out| {
+                on!(level, simd => batch.nearest(simd, out));
+            })
+        }
         Some(_) => probe::<f32>(scene, &geometry, rays, options, |batch, level, out| {
             on!(level, simd => batch.nearest(simd, out));
         }),
