@@ -148,7 +148,8 @@ mod tests {
             assert!(order.into_iter().eq(0..40_000), "each once");
         }
         boxes.truncate(FEW - 1);
-        boxes.fill(boxes[0]);
+        let first = boxes[0];
+        boxes.fill(first);
         assert!(Crowds::find(&boxes).is_none(), "few");
     }
 

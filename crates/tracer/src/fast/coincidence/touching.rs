@@ -120,7 +120,7 @@ mod tests {
         // A ring of radius 4, which the slack widens by height / radius to both sides.
         assert!((ring(&wide, 3.0, 1e-6) / 1.5e-6 - 1.0).abs() < 1e-5);
         assert_eq!(ring(&wide, 3.0, 1e-6), ring(&wide, -3.0, 1e-6));
-        for gap in [-1e-6, 0.0, 0.5e-6] {
+        for gap in [-1e-6f64, 0.0, 0.5e-6] {
             let expected = (10.0 * (1e-6 - gap)).sqrt() - (10.0 * (-1e-6 - gap)).max(0.0).sqrt();
             assert!((ring(&wide, 5.0 + gap, 1e-6) / expected - 1.0).abs() < 1e-5, "{gap}");
         }
