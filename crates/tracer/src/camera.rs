@@ -78,10 +78,12 @@ pub(crate) fn grid(lower_left: DVec2, upper_right: DVec2, screen: Screen, single
 /// tan(fov/2)·(2j + 1 - ny)/ny.
 pub(crate) fn look_grid(look: &Look, screen: Screen) -> (Axis, Axis) {
     let slope = half_angle_slope(look.field_of_view());
-    let (width, height) = (f64::from(screen.width()), f64::from(screen.height()));
-    let step = 2.0 * slope / height;
-    let axis = |samples: f64| Axis { start: slope * (1.0 - samples) / height, step };
-    (axis(width), axis(height))
+    let step = 2.0 * slope / f64::from(screen.height());
+    // Rounded so that its multiples up to the middle are exact: what lies straight ahead is met straight ahead.
+    let unused = (1u64 << (u32::BITS - screen.width().max(screen.height()).leading_zeros())) - 1;
+    let step = f64::from_bits(step.to_bits() & !unused);
+    let axis = |samples: u32| Axis { start: 0.5 * (1.0 - f64::from(samples)) * step, step };
+    (axis(screen.width()), axis(screen.height()))
 }
 
 /// tan(angle/2) of an angle in degrees above 0 and below 180. The complement of a wide angle is known better than the angle.

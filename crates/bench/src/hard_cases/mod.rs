@@ -7,6 +7,8 @@
 
 mod bounces;
 mod boxes;
+mod chosen;
+mod crowds;
 mod curved;
 mod everyday;
 mod everything;
@@ -241,5 +243,53 @@ pub const CASES: &[Case] = &[
         title: "all that the language has, scaled by powers of two",
         asked: "the same picture bit for bit",
         run: everything::scaled_by_two,
+    },
+    Case {
+        number: "32",
+        title: "shadows of what is far away",
+        asked: "at most 0.01 % of the pixels other than the oracle's",
+        run: chosen::far_shadows,
+    },
+    Case {
+        number: "33",
+        title: "slivers as wide as the last bits of their corners",
+        asked: "at most 0.01 % of the pixels other than the oracle's",
+        run: chosen::slivers,
+    },
+    Case {
+        number: "34",
+        title: "big balls, and what lies on them",
+        asked: "at most 0.01 % of the pixels other than the oracle's",
+        run: chosen::big_balls,
+    },
+    Case {
+        number: "35",
+        title: "objects in another order",
+        asked: "the same precision is chosen",
+        run: chosen::orders,
+    },
+    Case {
+        number: "36",
+        title: "triangles in one slanted plane",
+        asked: "the first in the script is seen, but for 0.05 % of the pixels",
+        run: chosen::one_plane,
+    },
+    Case {
+        number: "37",
+        title: "needles through a telescope",
+        asked: "at most 0.01 % of the pixels other than the oracle's",
+        run: chosen::telescopes,
+    },
+    Case {
+        number: "38",
+        title: "thousands of objects in one place",
+        asked: "drawn as by the plain tracer, and prepared in n log n",
+        run: crowds::crowds,
+    },
+    Case {
+        number: "39",
+        title: "edges of rectangles, and parallel rays that go far",
+        asked: "at most 0.01 % of the pixels other than the oracle's",
+        run: chosen::edges,
     },
 ];

@@ -2,15 +2,21 @@
 //!
 //! Where two surfaces of different colours lie nearer behind each other than `f32` tells apart, over more than a pixel,
 //! rounding decides which of them is seen. Pairs of such surfaces are looked for here, in `f64`: faces of triangles and
-//! boxes in almost one plane, and spheres of almost one centre and radius. Those that coincide in `f64`, too, are meant
-//! to, and are not counted.
+//! boxes in almost one plane, spheres that touch from within, and spheres that touch a face. Those that coincide in `f64`,
+//! too, are meant to, and are not counted. Of a sphere and a face the colours do not matter: what lies so near a sphere is
+//! in the shadow of its rounding.
+//!
+//! What is found does not depend on the order of the objects.
+
+mod touching;
 
 use std::ops::Range;
 
 use glam::DVec3;
 use rayfold_scene::{Material, Object, Scene};
 
-use super::bounds::Bounds;
+use self::touching::{MEANT, faces_blur, ring_on_plane, ring_on_sphere};
+use super::bounds::{Bounds, join};
 use super::geometry::{Geometry, View};
 use super::placed::{Face, Placed};
 use super::real::Real;
@@ -20,26 +26,36 @@ use super::tree::{Branches, Part};
 /// Surfaces nearer than this to each other, in roundoffs of their coordinates, may be met at one distance.
 const ONE_SURFACE: f64 = 6.0;
 
-/// Surfaces nearer than this to each other, relative to their coordinates, are meant to be one.
-const MEANT: f64 = 1e-13;
+/// Surfaces nearer than this to a sphere's, in roundoffs of its centre's distance and its radius, may be met on the wrong
+/// side of it.
+///
+/// Half of what a ray starts off by; what is farther off is met where it is.
+const ON_SPHERE: f64 = 16.0;
 
 /// Pairs of boxes that are looked at, for each object, before the search is given up.
-const PAIRS: usize = 400;
+const PAIRS: usize = 64;
+
+/// So many pairs are always looked at.
+const FEW_PAIRS: usize = 1 << 20;
 
 /// Whether there are two surfaces whose order cannot be told in single precision, where it can be seen. `pixel` is the
 /// size of a pixel: an angle from the eye, or a length in parallel projection.
 pub(super) fn surfaces_blur(geometry: &Geometry, scene: &Scene, pixel: f64) -> bool {
     let first = scene.objects.first().map(Object::material);
-    if scene.objects.iter().all(|object| Some(object.material()) == first) {
+    let has = |kind: fn(&Solid) -> bool| geometry.solids.iter().any(kind);
+    let touching = has(is_ball) && has(|solid| !is_ball(solid));
+    if !touching && scene.objects.iter().all(|object| Some(object.material()) == first) {
         return false;
     }
-    let material = |solid: &Solid| scene.objects[solid.order as usize].material();
+    let is_mirror = |solid: &&Solid| scene.objects[solid.order as usize].material().mirror() != DVec3::ZERO;
+    let balls = geometry.solids.iter().filter_map(|solid| solid.shape.ball());
     let search = Search {
         solids: &geometry.solids,
         objects: &scene.objects,
         pixel,
         parallel: matches!(geometry.view, View::Parallel { .. }),
-        mirrored: geometry.solids.iter().any(|solid| material(solid).mirror() != DVec3::ZERO),
+        mirrors: geometry.solids.iter().filter(is_mirror).map(|solid| solid.shape.bounds()).reduce(join),
+        largest_ball: balls.map(on_sphere).fold(0.0, f64::max),
     };
     match &geometry.branches {
         None => search.within(0..geometry.solids.len()),
@@ -52,7 +68,19 @@ struct Search<'a> {
     objects: &'a [Object],
     pixel: f64,
     parallel: bool,
-    mirrored: bool,
+    /// The box around all mirrors, if there are any.
+    mirrors: Option<Bounds>,
+    /// The largest [`on_sphere`].
+    largest_ball: f64,
+}
+
+fn is_ball(solid: &Solid) -> bool {
+    solid.shape.ball().is_some()
+}
+
+/// How near a sphere's surface others may be met on the wrong side of it.
+fn on_sphere((center, radius): (DVec3, f64)) -> f64 {
+    ON_SPHERE * <f32 as Real>::ROUNDOFF * (center.length() + radius)
 }
 
 /// What two boxes have in common, or all but.
@@ -75,15 +103,15 @@ impl Region {
 impl Search<'_> {
     /// Both orders of a pair are looked at once: nodes are compared with themselves and with those after them.
     fn down(&self, branches: &Branches) -> bool {
-        let materials = self.materials(branches);
-        let mut left = PAIRS * self.solids.len();
+        let materials = self.contents(branches);
+        let mut left = (PAIRS * self.solids.len()).max(FEW_PAIRS) as isize;
         let mut pending = vec![(0, 0)];
         while let Some((a, b)) = pending.pop() {
-            if materials[a].is_some() && materials[a] == materials[b] {
+            if materials[a].cannot_blur(&materials[b]) {
                 continue;
             }
             left -= 1;
-            if left == 0 {
+            if left < 0 {
                 // So many boxes in one place cannot be told apart in time: more precision is never wrong.
                 return true;
             }
@@ -100,6 +128,7 @@ impl Search<'_> {
                     pending.extend([(first, first), (second, second), (first, second)]);
                 }
                 (Part::Solids(of), Part::Solids(others)) => {
+                    left -= (of.len() * others.len() / 4) as isize;
                     let steepest = self.region(branches.bounds(a), branches.bounds(b)).steepest();
                     let others = &self.solids[others];
                     let is_blurred = |one: &Solid| others.iter().any(|other| self.blur(one, other, steepest));
@@ -117,21 +146,30 @@ impl Search<'_> {
         false
     }
 
-    /// The material of each node, if all in it have one: most meshes have, and need not be looked into.
-    fn materials(&self, branches: &Branches) -> Vec<Option<&Material>> {
-        let mut materials = vec![None; branches.len()];
-        for at in (0..materials.len()).rev() {
-            materials[at] = match branches.part(at) {
+    /// What is in each node.
+    fn contents(&self, branches: &Branches) -> Vec<Content<'_>> {
+        let nothing = Content { material: None, balls: false, faces: false };
+        let mut contents = vec![nothing; branches.len()];
+        for at in (0..contents.len()).rev() {
+            contents[at] = match branches.part(at) {
                 Part::Solids(of) => {
-                    let first = self.material(&self.solids[of.start]);
-                    self.solids[of].iter().all(|solid| self.material(solid) == first).then_some(first)
+                    let solids = &self.solids[of];
+                    let first = self.material(&solids[0]);
+                    let balls = is_ball(&solids[0]);
+                    let is_one = solids.iter().all(|solid| self.material(solid) == first);
+                    Content { material: is_one.then_some(first), balls, faces: !balls }
                 }
                 Part::Children(first, second) => {
-                    materials[first].filter(|_| materials[first] == materials[second])
+                    let (a, b) = (&contents[first], &contents[second]);
+                    Content {
+                        material: a.material.filter(|_| a.material == b.material),
+                        balls: a.balls || b.balls,
+                        faces: a.faces || b.faces,
+                    }
                 }
             };
         }
-        materials
+        contents
     }
 
     fn material(&self, solid: &Solid) -> &Material {
@@ -149,13 +187,14 @@ impl Search<'_> {
     /// Whether two boxes all but overlap.
     fn touch(&self, a: Bounds, b: Bounds) -> bool {
         let (low, high) = (a.0.max(b.0), a.1.min(b.1));
-        (low - high).max_element() <= self.slack(low.abs().max(high.abs()).element_sum())
+        let slack = self.slack(low.abs().max(high.abs()).element_sum());
+        (low - high).max_element() <= slack.max(self.largest_ball)
     }
 
     /// How near surfaces that reach so far from the origin may be met at one distance.
     fn slack(&self, reach: f64) -> f64 {
         // A mirrored ray starts anywhere in the scene, which has the size of 1.
-        ONE_SURFACE * <f32 as Real>::ROUNDOFF * if self.mirrored { 1.0 } else { reach }
+        ONE_SURFACE * <f32 as Real>::ROUNDOFF * if self.mirrors.is_some() { 1.0 } else { reach }
     }
 
     fn region(&self, a: Bounds, b: Bounds) -> Region {
@@ -178,93 +217,85 @@ impl Search<'_> {
             return false;
         }
         let region = self.region(bounds.0, bounds.1);
-        let are_balls = || match (one.shape.ball(), other.shape.ball()) {
-            (Some(one), Some(other)) => spheres_blur(one, other, &region),
-            (Some(_), None) | (None, Some(_)) | (None, None) => false,
-        };
-        let is_near = are_balls()
-            || faces(&one.shape).any(|a| {
-                let slack = self.slack(a.normal.abs().dot(region.reach));
-                faces(&other.shape).any(|b| faces_blur(&a, &b, slack, region.pixel))
-            });
-        is_near && self.material(one) != self.material(other)
+        match (one.shape.ball(), other.shape.ball()) {
+            (Some(ball), Some(b)) => self.spheres_blur(ball, b, &region) && self.differ(one, other),
+            (Some(ball), None) => self.sphere_blurs(ball, &other.shape, &region),
+            (None, Some(ball)) => self.sphere_blurs(ball, &one.shape, &region),
+            (None, None) => {
+                let is_near = faces(&one.shape).any(|a| {
+                    let slack = self.slack(a.normal.abs().dot(region.reach));
+                    faces(&other.shape).any(|b| faces_blur(&a, &b, slack, region.pixel))
+                });
+                is_near && self.differ(one, other)
+            }
+        }
+    }
+
+    fn differ(&self, one: &Solid, other: &Solid) -> bool {
+        self.material(one) != self.material(other)
+    }
+
+    /// Whether two spheres are within the slack of each other on a strip as wide as a pixel. Those that touch from without
+    /// are seen apart from everywhere but within.
+    fn spheres_blur(&self, one: (DVec3, f64), other: (DVec3, f64), region: &Region) -> bool {
+        let ((center, radius), (c, r)) = if one.1 >= other.1 { (one, other) } else { (other, one) };
+        let apart = (center - c).length();
+        let largest = center.abs().max(c.abs()).max_element() + radius;
+        let is_one = apart + (radius - r) <= MEANT * largest;
+        let without = apart * apart > radius * radius + r * r;
+        let contains_eye = || !self.parallel && (center.length() < radius || c.length() < r);
+        if is_one || 2.0 * r <= region.pixel || without && !contains_eye() {
+            return false;
+        }
+        let slack = region.slack.max(on_sphere(one).max(on_sphere(other)) / 2.0);
+        ring_on_sphere(radius, r, apart, slack) >= region.pixel
+    }
+
+    /// Whether a sphere is within the slack of a face on a strip as wide as a pixel, and that can be seen.
+    fn sphere_blurs(&self, ball: (DVec3, f64), other: &Shape, region: &Region) -> bool {
+        let (center, radius) = ball;
+        let slack = region.slack.max(on_sphere(ball));
+        let (min, max) = other.bounds();
+        let middle = (min + max) / 2.0;
+        2.0 * radius > region.pixel
+            && faces(other).any(|face| {
+                let side = face.normal.dot(center - face.corners[0]);
+                // A ball on a box is in front of it, or the box in front of the ball.
+                let within = face.normal.dot(middle - face.corners[0]);
+                let is_outside = within * side < 0.0 && within.abs() > slack;
+                !is_outside
+                    && !self.are_viewers_beside(&face, side, slack)
+                    && ring_on_plane(&face, center, radius, slack) >= region.pixel
+            })
+    }
+
+    /// Whether all rays that are followed come from the side of a face on which a ball's centre lies, at the height `side`: the
+    /// ball is in front of the face.
+    fn are_viewers_beside(&self, face: &Face, side: f64, slack: f64) -> bool {
+        let (normal, height) =
+            (face.normal * side.signum(), -face.normal.dot(face.corners[0]) * side.signum());
+        let is_eye_beside = if self.parallel { normal.z > 0.0 } else { height > 0.0 };
+        let lowest = |(min, max): Bounds| (normal * min).min(normal * max).element_sum() + height;
+        is_eye_beside && self.mirrors.is_none_or(|mirrors| lowest(mirrors) >= -slack)
     }
 }
 
-/// The distance between two spheres' surfaces along a direction is that of their radii and the part of that of their
-/// centres: within the slack it is on a strip around both.
-fn spheres_blur(
-    (center, radius): (DVec3, f64),
-    (c, r): (DVec3, f64),
-    &Region { slack, pixel, .. }: &Region,
-) -> bool {
-    let (apart, thicker) = ((center - c).length(), (radius - r).abs());
-    let is_one = apart + thicker <= MEANT * (center.abs().max_element() + radius);
-    let strip = 2.0 * slack * radius;
-    !is_one && thicker <= apart + slack && strip >= pixel * apart && 2.0 * radius > pixel
+/// What is in a node.
+#[derive(Clone, Copy)]
+struct Content<'a> {
+    /// The material of all, if it is one: most meshes have one, and need not be looked into.
+    material: Option<&'a Material>,
+    balls: bool,
+    faces: bool,
+}
+
+impl Content<'_> {
+    fn cannot_blur(&self, other: &Self) -> bool {
+        let is_one = self.material.is_some() && self.material == other.material;
+        is_one && !(self.balls && other.faces || self.faces && other.balls)
+    }
 }
 
 fn faces(shape: &Shape) -> impl Iterator<Item = Face> {
     shape.faces().map(|number| shape.face(number))
-}
-
-impl Face {
-    /// For each edge a point of it, and a vector in the plane that points inwards, as long as the edge.
-    fn edges(&self) -> impl Iterator<Item = (DVec3, DVec3)> {
-        (0..4).filter_map(move |k| {
-            let (from, to) = (self.corners[k], self.corners[(k + 1) % 4]);
-            (from != to).then(|| (from, self.normal.cross(to - from)))
-        })
-    }
-
-    /// Whether no edge parts the two but for less than `depth`.
-    fn may_cover(&self, other: &Self, depth: f64) -> bool {
-        self.edges().all(|(from, inwards)| {
-            let within = |corner: DVec3| inwards.dot(corner - from);
-            let deepest = other.corners.map(within).into_iter().fold(0.0, f64::max);
-            deepest * deepest > depth * depth * inwards.length_squared()
-        })
-    }
-}
-
-/// Whether two faces are within the slack of each other over more than a pixel.
-fn faces_blur(a: &Face, b: &Face, slack: f64, pixel: f64) -> bool {
-    // Around the line where their planes meet lies a strip as narrow as the angle is wide.
-    if 4.0 * slack * slack < pixel * pixel * a.normal.cross(b.normal).length_squared() {
-        return false;
-    }
-    let height = |corner: DVec3| a.normal.dot(corner - a.corners[0]);
-    let span = |corners: &[DVec3]| {
-        corners
-            .iter()
-            .map(|corner| height(*corner))
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), height| {
-                (low.min(height), high.max(height))
-            })
-    };
-    let is_near = |(low, high): (f64, f64)| {
-        let largest = a.corners.iter().map(|corner| corner.abs().max_element()).fold(0.0, f64::max);
-        low <= slack && high >= -slack && high.max(-low) > MEANT * largest
-    };
-    if !is_near(span(&b.corners)) || !a.may_cover(b, pixel) || !b.may_cover(a, pixel) {
-        return false;
-    }
-    // What of one lies over the other (Sutherland and Hodgman).
-    let mut over = b.corners.to_vec();
-    for (from, inwards) in a.edges() {
-        let depth = |corner: DVec3| inwards.dot(corner - from);
-        let mut within = Vec::new();
-        for (at, &corner) in over.iter().enumerate() {
-            let before = over[(at + over.len() - 1) % over.len()];
-            let (d, e) = (depth(before), depth(corner));
-            if (d < 0.0) != (e < 0.0) {
-                within.push(before.lerp(corner, d / (d - e)));
-            }
-            if e >= 0.0 {
-                within.push(corner);
-            }
-        }
-        over = within;
-    }
-    !over.is_empty() && is_near(span(&over))
 }

@@ -15,9 +15,10 @@ use super::bounds::{Bounds, join};
 use super::lens::Lens;
 use super::lights::lamp::Place;
 use super::lights::sun::Direction;
-use super::placed::Placed;
+use super::placed::{Placed, nearest_within};
+use super::planes;
 use super::shapes::{Shape, Solid, reach};
-use super::tree::{Branches, group};
+use super::tree::{Branches, Copies, Part, group};
 use crate::RenderError;
 use crate::camera::{Axis, Single, grid, look_grid};
 use crate::parallel::map;
@@ -90,8 +91,10 @@ impl Geometry {
         let solids = shapes.into_iter().enumerate();
         let solids = solids.filter_map(|(order, shape)| Some(Solid { shape: shape?, order: order as u32 }));
         let mut solids: Vec<Solid> = solids.collect();
-        let branches = group(&mut solids, tree);
         let is_finished = scene.objects.iter().any(|object| object.material().finish().is_some());
+        // Of those at one distance what is not of glass is seen.
+        let copies = if is_finished { Copies::Kept } else { Copies::Dropped };
+        let branches = group(&mut solids, tree, copies);
         let orders = scene.objects.iter().filter(|_| has_bodies).zip(0..);
         let bodies =
             orders.filter_map(|(object, order)| bodies::body(object, order, center, scale)).collect();
@@ -120,6 +123,32 @@ impl Geometry {
 }
 
 impl Geometry {
+    /// With the same numbers for all triangles in one plane, where it matters which of them is seen.
+    pub(super) fn with_shared_planes(mut self, scene: &Scene) -> Self {
+        let first = scene.objects.first().map(Object::material);
+        if scene.objects.iter().any(|object| Some(object.material()) != first) {
+            let solids: &mut Vec<Solid> = Arc::make_mut(&mut self.solids);
+            planes::share(solids);
+        }
+        self
+    }
+
+    /// How near to the origin a solid's surface comes, at least.
+    pub(super) fn nearest(&self) -> f64 {
+        let of = |solids: &[Solid]| solids.iter().map(|s| s.shape.nearest()).fold(f64::INFINITY, f64::min);
+        let Some(branches) = &self.branches else { return of(&self.solids) };
+        let (mut nearest, mut pending) = (f64::INFINITY, vec![0]);
+        while let Some(at) = pending.pop() {
+            if nearest_within(branches.bounds(at)) < nearest {
+                match branches.part(at) {
+                    Part::Solids(range) => nearest = nearest.min(of(&self.solids[range])),
+                    Part::Children(first, second) => pending.extend([first, second]),
+                }
+            }
+        }
+        nearest
+    }
+
     /// The box of all solids.
     pub(super) fn whole(&self) -> Bounds {
         match &self.branches {

@@ -11,6 +11,7 @@ mod bounce;
 mod bounds;
 mod candidates;
 mod coincidence;
+mod crowds;
 mod descent;
 mod dimming;
 mod dispatch;
@@ -30,6 +31,7 @@ mod naive;
 mod onwards;
 mod packet;
 mod placed;
+mod planes;
 mod precision;
 mod predicate;
 mod prepare;
@@ -119,12 +121,12 @@ impl<'a> Drawing<'a> {
         }
         let Ranked { scene: ranked, .. } = &Ranked::new(scene);
         let geometry = if has_kernels(options) { Geometry::new(ranked, options.tree).ok() } else { None };
-        let precision = |geometry| Some((geometry, precision::resolve(options, geometry, ranked)?));
-        Ok(Self(match geometry.as_ref().and_then(precision) {
-            Some((geometry, Precision::F64)) => {
-                Backend::Double(Setup::new(scene, ranked, geometry, options)?)
+        let precision = |geometry| Some((precision::resolve(options, &geometry, ranked)?, geometry));
+        Ok(Self(match geometry.and_then(precision) {
+            Some((Precision::F64, geometry)) => {
+                Backend::Double(Setup::new(scene, ranked, &geometry.with_shared_planes(ranked), options)?)
             }
-            Some((geometry, _)) => Backend::Single(Setup::new(scene, ranked, geometry, options)?),
+            Some((_, geometry)) => Backend::Single(Setup::new(scene, ranked, &geometry, options)?),
             None => Backend::Reference(exposure, options),
         }))
     }
@@ -198,6 +200,9 @@ fn sampled_backend<'a>(
     let precisions = precisions.map(|(geometry, moment)| precision::resolve(options, geometry, moment));
     let Some(precisions) = precisions.collect::<Option<Vec<_>>>() else { return Ok(None) };
     Ok(Some(if precisions.contains(&Precision::F64) {
+        let geometries = geometries.into_iter().zip(&moments);
+        let geometries: Vec<_> =
+            geometries.map(|(geometry, moment)| geometry.with_shared_planes(moment)).collect();
         Backend::SampledDouble(Sampled::new(scene, &moments, &geometries, options)?)
     } else {
         Backend::SampledSingle(Sampled::new(scene, &moments, &geometries, options)?)

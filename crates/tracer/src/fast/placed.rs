@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::bounds::Bounds;
 
@@ -40,8 +40,21 @@ pub(super) trait Placed {
         None
     }
 
+    /// How near to the origin its surface comes, at least.
+    fn nearest(&self) -> f64;
+
+    /// How near to the origin the edge of its shadow passes, at least, in the light of a sun: `x` and `y` are that one's
+    /// screen.
+    fn shadow_nearest(&self, x: DVec3, y: DVec3) -> f64;
+
     /// Whether the errors of single precision cannot be seen in it.
     fn is_fine(&self, sight: &Sight) -> bool;
+
+    /// How far from the origin it reaches, at least.
+    fn farthest(&self) -> f64 {
+        let (min, max) = self.bounds();
+        min.abs().max(max.abs()).length()
+    }
 
     /// The largest coordinate of its points, at least: what its rounding errors are relative to.
     fn magnitude(&self) -> f64 {
@@ -70,10 +83,10 @@ pub(super) struct Sight {
     pub(super) normal: f64,
     /// The part of a pixel that nothing may move by.
     pub(super) invisible: f64,
-    /// The part of a pixel that shadows and mirrored outlines may move by.
-    pub(super) hardly_visible: f64,
     /// Rounding errors that add up in a point on a surface, in roundoffs of its distance and the size of what it is on.
     pub(super) point: f64,
+    /// The same in where a ray starts that goes on from there, and in the test of what it meets.
+    pub(super) start: f64,
 }
 
 impl Sight {
@@ -81,8 +94,28 @@ impl Sight {
     /// as those of the directions are, which are known to be invisible; in parallel what is far away is as large as what
     /// is near.
     pub(super) fn is_fine_if_flat(&self, magnitude: f64) -> bool {
-        !self.parallel || self.point * self.roundoff * magnitude <= self.invisible * self.pixel
+        !self.parallel || self.is_invisible(self.start * magnitude, 0.0)
     }
+
+    /// Whether so many roundoffs cannot be seen at this distance.
+    pub(super) fn is_invisible(&self, roundoffs: f64, distance: f64) -> bool {
+        let pixel = if self.parallel { self.pixel } else { self.pixel * distance };
+        self.roundoff * roundoffs <= self.invisible * pixel
+    }
+}
+
+/// How near to the origin what lies within a box comes.
+pub(super) fn nearest_within((min, max): Bounds) -> f64 {
+    DVec3::ZERO.clamp(min, max).length()
+}
+
+/// How near to the origin the edge between two corners passes on a sun's screen, whose axes are `x` and `y`.
+pub(super) fn edge_nearest([from, to]: [DVec3; 2], x: DVec3, y: DVec3) -> f64 {
+    let on_screen = |corner: DVec3| DVec2::new(corner.dot(x), corner.dot(y));
+    let (from, along) = (on_screen(from), on_screen(to) - on_screen(from));
+    let square = along.length_squared();
+    let part = if square > 0.0 { (-from.dot(along) / square).clamp(0.0, 1.0) } else { 0.0 };
+    (from + part * along).length()
 }
 
 /// [`Placed::across`] of what is spanned by corners.

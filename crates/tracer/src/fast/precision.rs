@@ -2,10 +2,14 @@
 //!
 //! Bounds on the rounding errors of the `f32` kernels are set against the size of a pixel and of a level: what moves an
 //! outline or a shadow by less than a small part of a pixel, or a colour by less than a part of a level, cannot be seen.
-//! Triangles and boxes need no bound of their own: their errors are relative to the distance of what is seen, as those
-//! of the directions are. Which of two surfaces comes first is known, whatever the rounding, if they do not
+//! Triangles and boxes that are seen need no bound of their own: their errors are relative to the distance of what is
+//! seen, as those of the directions are. Those of a shadow are relative to the distance of what casts it, which may be
+//! far from where it falls. Which of two surfaces comes first is known, whatever the rounding, if they do not
 //! all but [coincide](super::coincidence). What the kernels' numbers cannot hold at all is known here too.
+//!
+//! The choice does not depend on the order of the objects.
 
+use glam::DVec3;
 use rayfold_scene::Scene;
 
 use super::beyond::is_needed;
@@ -15,21 +19,36 @@ use super::geometry::{Geometry, View};
 use super::glass::SURFACES_OF_ONE;
 use super::placed::{Placed, Sight};
 use super::real::Real;
-use super::shapes::Solid;
+use super::rounding::OFFSET;
+use super::shapes::{Shape, Solid};
 use crate::camera::Axis;
 use crate::{Precision, RenderOptions};
 
-/// Rounding errors that add up in a ray's direction, in roundoffs.
-const DIRECTION: f64 = 3.0;
+/// Rounding errors that add up in an outline that is seen from the eye, in roundoffs of its distance.
+///
+/// Those of the ray's direction are 3, and a triangle is met up to 16 beside its edges (`Beside::Eye` in the predicate).
+const OUTLINE: f64 = 19.0;
 
 /// Rounding errors that add up in a point on a sphere, in roundoffs of its distance and radius.
 const POINT: f64 = 2.0;
 
+/// The same in where a ray starts that goes on from a surface, and in the test of what it meets.
+const START: f64 = OFFSET + POINT;
+
+/// Rounding errors that add up in the edge of a shadow, in roundoffs of the coordinates of what casts it.
+///
+/// The direction of the light is rounded: 1 in each of three coordinates. A box has 8 of its test ([`LATE`]) and 1 of its
+/// corners; a circle on the sun's screen 4 of each centre's coordinate and as much of the point's; a triangle 4
+/// (`Beside::Light`), and 5 of a point's sides. Together 12, and room.
+///
+/// [`LATE`]: super::rounding::LATE
+const SHADOW: f64 = 16.0;
+
+/// Pairs of what casts a shadow and what it may fall on that are looked at before the search is given up.
+const PAIRS: usize = 1 << 22;
+
 /// The part of a pixel that nothing may move by.
 const INVISIBLE: f64 = 0.05;
-
-/// The part of a pixel that shadows and mirrored outlines may move by.
-const HARDLY_VISIBLE: f64 = 0.2;
 
 /// The error of a normal, as a sine, that stays below a quarter of a level.
 const SHADE: f64 = 1e-3;
@@ -59,7 +78,7 @@ pub(super) fn resolve(options: &RenderOptions, geometry: &Geometry, scene: &Scen
     let is_pinhole = matches!(geometry.view, View::Pinhole { .. });
     // Which side of such a surface the eye is on is decided with more than these numbers.
     let is_at_eye = is_pinhole && geometry.bodies.iter().any(bodies::Solid::is_at_origin);
-    if is_at_eye || !DOUBLE.holds(geometry, scene, &colors) {
+    if is_at_eye || !DOUBLE.holds(geometry, scene, &colors) || is_too_deep(&geometry.view) {
         return None;
     }
     // The errors of what few scenes have are bounded for `f64` alone.
@@ -70,6 +89,14 @@ pub(super) fn resolve(options: &RenderOptions, geometry: &Geometry, scene: &Scen
             Precision::Auto => SINGLE.holds(geometry, scene, &colors) && is_enough(geometry, scene, &colors),
         };
     Some(if single { Precision::F32 } else { Precision::F64 })
+}
+
+/// Whether parallel rays go so far that the errors of `f64` there can be seen in a pixel.
+fn is_too_deep(view: &View) -> bool {
+    match *view {
+        View::Parallel { pixel, .. } => START * <f64 as Real>::ROUNDOFF > INVISIBLE * pixel,
+        View::Pinhole { .. } => false,
+    }
 }
 
 impl Range {
@@ -170,7 +197,7 @@ fn is_enough(geometry: &Geometry, scene: &Scene, colors: &Colors) -> bool {
         }
     };
     let parallel = matches!(geometry.view, View::Parallel { .. });
-    if !parallel && DIRECTION * roundoff > INVISIBLE * pixel {
+    if !parallel && OUTLINE * roundoff > INVISIBLE * pixel {
         return false;
     }
     let sight = Sight {
@@ -179,8 +206,49 @@ fn is_enough(geometry: &Geometry, scene: &Scene, colors: &Colors) -> bool {
         parallel,
         normal: SHADE / colors.scattered.max(1.0),
         invisible: INVISIBLE,
-        hardly_visible: HARDLY_VISIBLE,
         point: POINT,
+        start: START,
     };
-    geometry.solids.iter().all(|solid| solid.shape.is_fine(&sight)) && !surfaces_blur(geometry, scene, pixel)
+    geometry.solids.iter().all(|solid| solid.shape.is_fine(&sight))
+        && are_shadows_fine(geometry, &sight)
+        && !surfaces_blur(geometry, scene, pixel)
+}
+
+/// Whether the errors of shadows cannot be seen where these fall: no nearer to the eye than the nearest surface, nor than
+/// their edges pass it.
+fn are_shadows_fine(geometry: &Geometry, sight: &Sight) -> bool {
+    if geometry.suns.is_empty() {
+        return true;
+    }
+    let nearest = geometry.nearest();
+    let (min, max) = geometry.whole();
+    if sight.is_invisible(SHADOW * min.abs().max(max.abs()).length(), nearest) {
+        return true;
+    }
+    let mut left = PAIRS;
+    geometry.suns.iter().all(|sun| {
+        let (x, y) = sun.towards.any_orthonormal_pair();
+        geometry.solids.iter().all(|Solid { shape, .. }| {
+            let error = SHADOW * shape.farthest();
+            sight.is_invisible(error, nearest)
+                || sight.is_invisible(error, shape.shadow_nearest(x, y))
+                || has_nothing_behind(shape, sun.towards, error * sight.roundoff, geometry, &mut left)
+        })
+    })
+}
+
+/// Whether a flat solid hides the light of a sun from none: all others lie before its plane, but for a `slack`. False where
+/// `left` comparisons are not enough.
+fn has_nothing_behind(
+    shape: &Shape,
+    towards: DVec3,
+    slack: f64,
+    geometry: &Geometry,
+    left: &mut usize,
+) -> bool {
+    let Some(normal) = shape.plane() else { return false };
+    let behind = if normal.dot(towards) > 0.0 { -normal } else { normal };
+    let depth = shape.support(behind) + slack;
+    *left = left.saturating_sub(geometry.solids.len());
+    *left > 0 && geometry.solids.iter().all(|other| other.shape.support(behind) <= depth)
 }

@@ -50,9 +50,12 @@ pub fn nearest_hits(
     let ranked = &Ranked::new(scene);
     let geometry = Geometry::new(&ranked.scene, options.tree)?;
     match resolve(options, &geometry, &ranked.scene) {
-        Some(Precision::F64) => probe::<f64>(ranked, &geometry, rays, options, |batch, level, out| {
-            on!(level, simd => batch.nearest(simd, out));
-        }),
+        Some(Precision::F64) => {
+            let geometry = geometry.with_shared_planes(&ranked.scene);
+            probe::<f64>(ranked, &geometry, rays, options, |batch, level, out| {
+                on!(level, simd => batch.nearest(simd, out));
+            })
+        }
         Some(_) => probe::<f32>(ranked, &geometry, rays, options, |batch, level, out| {
             on!(level, simd => batch.nearest(simd, out));
         }),

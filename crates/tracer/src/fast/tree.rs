@@ -1,8 +1,10 @@
 //! A bounding volume hierarchy for scenes of many objects.
 //!
-//! `obvhs` groups the objects; the bounds are our own, of the kernels' precision and wide enough for every rounding
-//! error of their tests ([`padded`]), so that the tree never hides what testing all objects would hit.
+//! `obvhs` groups the objects, and [crowds](super::crowds) of them; the bounds are our own, of the kernels' precision and wide
+//! enough for every rounding error of their tests ([`padded`]), so that the tree never hides what testing all objects would
+//! hit.
 
+use std::cmp::Ordering;
 use std::ops::Range;
 
 use glam::Vec3A;
@@ -12,6 +14,7 @@ use obvhs::{Boundable, BvhBuildParams};
 
 use super::bounds::{Bounds, NOTHING, join, padded};
 use super::candidates::MASKED;
+use super::crowds::Crowds;
 use super::kind::Kind;
 use super::placed::Placed;
 use super::real::Real;
@@ -108,12 +111,26 @@ impl Boundable for Item {
     }
 }
 
+/// What becomes of solids in a crowd that are the same as one before them in the script.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Copies {
+    Kept,
+    /// The first hides the others.
+    Dropped,
+}
+
 /// What a tree is grown of.
 pub(super) trait Grouped: Copy + Sync {
     fn bounds(&self) -> Bounds;
 
     /// A leaf has solids of one number alone, that of their kind.
     fn number(&self) -> u32;
+
+    /// Its position in the script.
+    fn order(&self) -> u32;
+
+    /// How it lies to another of its kind in an order in which only those that are the same are equal.
+    fn compare(&self, other: &Self) -> Ordering;
 }
 
 impl Grouped for Solid {
@@ -124,13 +141,22 @@ impl Grouped for Solid {
     fn number(&self) -> u32 {
         self.shape.kind().number()
     }
+
+    fn order(&self) -> u32 {
+        self.order
+    }
+
+    fn compare(&self, other: &Self) -> Ordering {
+        let pairs = self.shape.numbers().into_iter().zip(other.shape.numbers());
+        pairs.map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+    }
 }
 
 /// Brings solids into the order of a tree's leaves and gives its shape, if there are more than masks can hold or `tree`
 /// asks for it.
-pub(super) fn group<T: Grouped>(solids: &mut Vec<T>, tree: Option<bool>) -> Option<Branches> {
+pub(super) fn group<T: Grouped>(solids: &mut Vec<T>, tree: Option<bool>, copies: Copies) -> Option<Branches> {
     let is_needed = solids.len() > MASKED || tree == Some(true) && !solids.is_empty();
-    is_needed.then(|| plant(solids))
+    is_needed.then(|| plant(solids, copies))
 }
 
 /// All solids in one leaf a kind.
@@ -143,13 +169,15 @@ pub(super) fn stump(solids: &[Solid]) -> (Vec<Solid>, Branches) {
     (solids, branches)
 }
 
-fn plant<T: Grouped>(solids: &mut Vec<T>) -> Branches {
-    let bounds = map(solids, |solid| {
+fn plant<T: Grouped>(solids: &mut Vec<T>, copies: Copies) -> Branches {
+    let boxes = map(solids, |solid| {
         let (min, max) = solid.bounds();
-        Item(Aabb { min: Vec3A::from(min.as_vec3()), max: Vec3A::from(max.as_vec3()) })
+        Aabb { min: Vec3A::from(min.as_vec3()), max: Vec3A::from(max.as_vec3()) }
     });
+    let clusters = Clusters::new(solids, &boxes, copies);
+    let items: Vec<Item> = (0..clusters.len()).map(|at| Item(clusters.bounds(&boxes, at))).collect();
     let params = BvhBuildParams { max_prims_per_leaf: LEAF, ..BvhBuildParams::fast_build() };
-    let grown = build_bvh2(&bounds, params, &mut Default::default());
+    let grown = build_bvh2(&items, params, &mut Default::default());
     // Depth first, children side by side and after their parent.
     let mut branches = Vec::with_capacity(grown.nodes.len());
     branches.push(Branch::EMPTY);
@@ -166,13 +194,111 @@ fn plant<T: Grouped>(solids: &mut Vec<T>) -> Branches {
         } else {
             let from = order.len();
             let items = &grown.primitive_indices[first..first + node.prim_count as usize];
-            order.extend(items.iter().map(|&item| solids[item as usize]));
-            order[from..].sort_by_key(|solid| solid.number());
-            leaf(&mut branches, at, &order[from..], from);
+            items.iter().for_each(|&item| clusters.add(solids, item as usize, &mut order));
+            halve(&mut branches, at, &mut order[from..], from);
         }
     }
     *solids = order;
     Branches::bounded(branches, solids)
+}
+
+/// What a tree is grown of: single solids, and crowds.
+enum Clusters {
+    Single(usize),
+    Crowded {
+        /// Positions of solids.
+        order: Vec<u32>,
+        /// Where each cluster begins, and the end of the last.
+        starts: Vec<usize>,
+    },
+}
+
+impl Clusters {
+    fn new<T: Grouped>(solids: &[T], boxes: &[Aabb], copies: Copies) -> Self {
+        let Some(crowds) = Crowds::find(boxes) else { return Self::Single(solids.len()) };
+        let mut starts = Vec::new();
+        let mut order = Vec::with_capacity(solids.len());
+        let mut done = 0;
+        let single = |to: usize, done: &mut usize, order: &mut Vec<u32>, starts: &mut Vec<usize>| {
+            while *done < to {
+                starts.push(order.len());
+                order.push(crowds.order[*done]);
+                *done += 1;
+            }
+        };
+        for crowd in &crowds.ranges {
+            single(crowd.start, &mut done, &mut order, &mut starts);
+            starts.push(order.len());
+            let crowded = &crowds.order[crowd.clone()];
+            match copies {
+                Copies::Kept => order.extend(crowded),
+                Copies::Dropped => order.extend(without_copies(solids, crowded)),
+            }
+            done = crowd.end;
+        }
+        single(crowds.order.len(), &mut done, &mut order, &mut starts);
+        starts.push(order.len());
+        Self::Crowded { order, starts }
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Self::Single(count) => *count,
+            Self::Crowded { starts, .. } => starts.len() - 1,
+        }
+    }
+
+    fn bounds(&self, boxes: &[Aabb], at: usize) -> Aabb {
+        match self {
+            Self::Single(_) => boxes[at],
+            Self::Crowded { order, starts } => order[starts[at]..starts[at + 1]]
+                .iter()
+                .fold(Aabb::empty(), |whole, &solid| whole.union(&boxes[solid as usize])),
+        }
+    }
+
+    /// Adds the solids of one of them.
+    fn add<T: Grouped>(&self, solids: &[T], at: usize, to: &mut Vec<T>) {
+        match self {
+            Self::Single(_) => to.push(solids[at]),
+            Self::Crowded { order, starts } => {
+                to.extend(order[starts[at]..starts[at + 1]].iter().map(|&solid| solids[solid as usize]));
+            }
+        }
+    }
+}
+
+/// Those of a crowd that are not the same as one that comes before in the script.
+fn without_copies<T: Grouped>(solids: &[T], crowd: &[u32]) -> Vec<u32> {
+    let solid = |at: u32| &solids[at as usize];
+    let compare = |a: u32, b: u32| {
+        let (a, b) = (solid(a), solid(b));
+        a.number().cmp(&b.number()).then_with(|| a.compare(b))
+    };
+    let mut sorted: Vec<usize> = (0..crowd.len()).collect();
+    sorted.sort_by(|&a, &b| {
+        let order = || solid(crowd[a]).order().cmp(&solid(crowd[b]).order());
+        compare(crowd[a], crowd[b]).then_with(order)
+    });
+    let mut firsts: Vec<usize> =
+        sorted.chunk_by(|&a, &b| compare(crowd[a], crowd[b]).is_eq()).map(|same| same[0]).collect();
+    firsts.sort_unstable();
+    firsts.into_iter().map(|at| crowd[at]).collect()
+}
+
+/// Makes leaves of solids, in halves where they are more than a leaf holds.
+fn halve<T: Grouped>(branches: &mut Vec<Branch>, at: usize, solids: &mut [T], from: usize) {
+    if solids.len() <= LEAF as usize {
+        solids.sort_by_key(Grouped::number);
+        return leaf(branches, at, solids, from);
+    }
+    let children = branches.len();
+    branches[at].first = children as u32;
+    branches.extend([Branch::EMPTY; 2]);
+    let middle = solids.len() / 2;
+    let (first, second) = solids.split_at_mut(middle);
+    halve(branches, children, first, from);
+    halve(branches, children + 1, second, from + middle);
 }
 
 impl Branch {

@@ -103,7 +103,7 @@ pub(super) fn nearest(objects: &[Object], ray: Ray) -> Option<Hit> {
     for (index, object) in objects.iter().enumerate() {
         let Some(distance) = shapes::distance(object, ray) else { continue };
         let is_before = best.is_none_or(|(other, least)| {
-            distance < least
+            distance < least && !shapes::are_one(&objects[other], least, object, distance)
                 || distance == least && glass(object).is_none() && glass(&objects[other]).is_some()
         });
         if is_before {

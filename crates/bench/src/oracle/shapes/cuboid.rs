@@ -17,7 +17,7 @@ impl Shape for Cuboid {
         if enter > *start { Some(enter) } else { (leave > *start).then_some(leave) }
     }
 
-    /// On an edge that of the first axis which leads there.
+    /// On an edge that of the first axis which leads there, but of a rectangle its own.
     fn outward(&self, line: &Line, t: &Real) -> Vector {
         let Some((axis, entering)) = met(self, line, t) else { return DVec3::ZERO.into() };
         let upwards = (line.direction.0[axis].sign() > 0) != entering;
@@ -34,6 +34,9 @@ impl Shape for Cuboid {
 /// The axis whose face is met at `t`, and whether the line enters there.
 fn met(cuboid: &Cuboid, line: &Line, t: &Real) -> Option<(usize, bool)> {
     let [(enter, first), (_, last)] = slabs(cuboid, line)?;
+    let mut flat = (0..3).filter(|&axis| cuboid.min()[axis] == cuboid.max()[axis]);
+    let rectangle = flat.next().filter(|_| flat.next().is_none());
+    let first = rectangle.filter(|&axis| line.direction.0[axis].sign() != 0).unwrap_or(first);
     Some(if (&enter.value() - t).sign() == 0 { (first, true) } else { (last, false) })
 }
 

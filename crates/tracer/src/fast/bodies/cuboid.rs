@@ -52,7 +52,7 @@ impl<E: Real> Cuboid<E> {
         (hit & distance.simd_gt(zero), distance)
     }
 
-    /// Where faces meet, that of the first axis counts.
+    /// Where faces meet, that of the first axis counts, but of a rectangle its own.
     #[inline(always)]
     pub(super) fn surface<S: Simd>(&self, simd: S, ray: Local<S, E>, distance: Lanes<S, E>) -> Met<S, E> {
         let zero = constant::<S, E>(simd, 0.0);
@@ -60,6 +60,13 @@ impl<E: Real> Cuboid<E> {
         let entering = enter.simd_gt(zero);
         let is_x = (entering & near.x.simd_eq(enter)) | (!entering & far.x.simd_eq(leave));
         let is_y = !is_x & ((entering & near.y.simd_eq(enter)) | (!entering & far.y.simd_eq(leave)));
+        let d = ray.direction;
+        let (is_x, is_y) = match self.half.map(|half| half > E::narrow(0.0)) {
+            [false, true, true] => (is_x | d.x.simd_ne(zero), is_y & d.x.simd_eq(zero)),
+            [true, false, true] => (is_x & d.y.simd_eq(zero), is_y | d.y.simd_ne(zero)),
+            [true, true, false] => (is_x & d.z.simd_eq(zero), is_y & d.z.simd_eq(zero)),
+            _ => (is_x, is_y),
+        };
         let is_z = !is_x & !is_y;
         let place = ray.direction.scale_add(distance, ray.origin);
         let [hx, hy, hz] = self.half.map(

@@ -29,7 +29,7 @@ use super::bounds::Crossing;
 use super::descent::{backwards, descend};
 use super::packet::{Nearest, Ray, Surface};
 use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
-use super::tree::{Tree, group};
+use super::tree::{Copies, Tree, group};
 
 /// A packet of rays in the coordinates of a body.
 #[derive(Clone, Copy)]
@@ -181,7 +181,7 @@ impl<E: Real> Bodies<E> {
     pub(super) fn new(solids: &[Solid]) -> Self {
         let (mut planes, mut bounded): (Vec<Solid>, Vec<Solid>) =
             solids.iter().copied().partition(|solid| solid.bounds().is_none());
-        let branches = group(&mut bounded, Some(true));
+        let branches = group(&mut bounded, Some(true), Copies::Kept);
         let count = planes.len();
         let tree = branches.map(|branches| Tree::new(&branches, &bounded, |place| (count + place) as u32));
         planes.append(&mut bounded);

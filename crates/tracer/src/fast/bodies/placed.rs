@@ -1,5 +1,7 @@
 //! Bodies in the kernels' coordinates, in `f64`, before the first pixel.
 
+use std::cmp::Ordering;
+
 use glam::DVec3;
 use rayfold_scene::model::unit;
 use rayfold_scene::{Cuboid, Instance, Object};
@@ -178,5 +180,14 @@ impl Grouped for Solid {
     /// Bodies have a tree of their own, in which all are alike.
     fn number(&self) -> u32 {
         0
+    }
+
+    fn order(&self) -> u32 {
+        self.order
+    }
+
+    /// None is taken for the same as another.
+    fn compare(&self, other: &Self) -> Ordering {
+        self.order.cmp(&other.order)
     }
 }

@@ -13,8 +13,9 @@ use fearless_simd::prelude::*;
 use super::{Local, Met};
 use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
 
-/// A bracket is narrowed so often at most.
-const STEPS: u32 = 64;
+/// A bracket is narrowed so often at most: every third time it is halved, so that it ends at the last bit also where a ray
+/// grazes the torus and secants help little.
+const STEPS: u32 = 3 * f64::MANTISSA_DIGITS;
 
 /// Around the origin, square to z; lengths are in units of the torus.
 #[derive(Clone, Copy, Debug)]

@@ -9,7 +9,7 @@ use glam::DVec3;
 use crate::fast::bounds::Bounds;
 use crate::fast::lights::sun::Sun;
 use crate::fast::packet::{Nearest, Ray, Slopes, Surface, offset};
-use crate::fast::placed::{self, Face, Sight, across_corners};
+use crate::fast::placed::{self, Face, Sight, across_corners, edge_nearest, nearest_within};
 use crate::fast::predicate::Place;
 use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rounding::{LATE, OFFSET};
@@ -71,6 +71,18 @@ impl placed::Placed for Placed {
         Face { corners: [start, start + u, start + u + v, start + v], normal: DVec3::AXES[axis] }
     }
 
+    fn nearest(&self) -> f64 {
+        let inside = DVec3::ZERO.clamp(self.min, self.max) == DVec3::ZERO;
+        if inside { (-self.min).min(self.max).min_element() } else { nearest_within(self.bounds()) }
+    }
+
+    /// Of all edges, though not every one is the shadow's.
+    fn shadow_nearest(&self, x: DVec3, y: DVec3) -> f64 {
+        let faces = (0..6).map(|number| self.face(number).corners);
+        let edges = faces.flat_map(|corners| (0..4).map(move |k| [corners[k], corners[(k + 1) % 4]]));
+        edges.map(|edge| edge_nearest(edge, x, y)).fold(f64::INFINITY, f64::min)
+    }
+
     fn is_fine(&self, sight: &Sight) -> bool {
         sight.is_fine_if_flat(self.magnitude())
     }
@@ -82,15 +94,16 @@ pub(in crate::fast) struct Cuboid<E> {
     pub(in crate::fast) min: [E; 3],
     pub(in crate::fast) max: [E; 3],
     pub(in crate::fast) order: E,
+    /// The axis to which it is square, if it is a rectangle.
+    flat: Option<u8>,
 }
 
 impl<E: Real> Cuboid<E> {
     pub(in crate::fast) fn new(&Placed { min, max }: &Placed, order: u32) -> Self {
-        Self {
-            min: min.to_array().map(E::narrow),
-            max: max.to_array().map(E::narrow),
-            order: E::narrow(f64::from(order)),
-        }
+        let (min, max) = (min.to_array().map(E::narrow), max.to_array().map(E::narrow));
+        let mut axes = (0..3u8).filter(|&axis| min[usize::from(axis)] == max[usize::from(axis)]);
+        let flat = axes.next().filter(|_| axes.next().is_none());
+        Self { min, max, order: E::narrow(f64::from(order)), flat }
     }
 
     /// Where the ray enters each slab of the box and where it leaves the box (Kay and Kajiya); planes belong to their
@@ -193,7 +206,8 @@ impl<E: Real> Tests<Cuboid<E>, E> for Robust {
         }
     }
 
-    /// The point is brought onto the face; where faces meet that of the first axis counts.
+    /// The point is brought onto the face; where faces meet that of the first axis counts, but of a rectangle its own: its
+    /// sides have no area.
     #[inline(always)]
     fn surface<S: Simd, const EYE: bool>(
         simd: S,
@@ -214,6 +228,12 @@ impl<E: Real> Tests<Cuboid<E>, E> for Robust {
         let out_y = d.y.simd_ne(zero) & out.y.max(other.y).simd_eq(leave);
         let is_x = (entering & near.x.simd_eq(enter)) | (!entering & out_x);
         let is_y = !is_x & ((entering & near.y.simd_eq(enter)) | (!entering & out_y));
+        let (is_x, is_y) = match cuboid.flat {
+            None => (is_x, is_y),
+            Some(0) => (is_x | d.x.simd_ne(zero), is_y & d.x.simd_eq(zero)),
+            Some(1) => (is_x & d.y.simd_eq(zero), is_y | d.y.simd_ne(zero)),
+            Some(_) => (is_x & d.z.simd_eq(zero), is_y & d.z.simd_eq(zero)),
+        };
         let is_z = !is_x & !is_y;
         let point = d.scale_add(distance, ray.origin);
         let point = Vec3::<S, E>::new(

@@ -62,6 +62,20 @@ impl Shape {
         }
     }
 
+    /// What tells it from others of its kind.
+    pub(super) fn numbers(&self) -> [f64; 9] {
+        let mut numbers = [0.0; 9];
+        let parts = match self {
+            Self::Sphere(sphere) => [sphere.center, DVec3::splat(sphere.radius), DVec3::splat(sphere.power)],
+            Self::Cuboid(cuboid) => [cuboid.min, cuboid.max, DVec3::ZERO],
+            Self::Triangle(triangle) => triangle.vertices,
+        };
+        for (three, part) in numbers.chunks_exact_mut(3).zip(parts) {
+            three.copy_from_slice(&part.to_array());
+        }
+        numbers
+    }
+
     /// A box of this size.
     pub(super) fn of_box((min, max): Bounds) -> Self {
         Self::Cuboid(cuboid::Placed { min, max })
@@ -126,6 +140,14 @@ impl Placed for Shape {
 
     fn plane(&self) -> Option<DVec3> {
         whatever!(self, shape => shape.plane())
+    }
+
+    fn nearest(&self) -> f64 {
+        whatever!(self, shape => shape.nearest())
+    }
+
+    fn shadow_nearest(&self, x: DVec3, y: DVec3) -> f64 {
+        whatever!(self, shape => shape.shadow_nearest(x, y))
     }
 
     fn is_fine(&self, sight: &Sight) -> bool {

@@ -72,15 +72,23 @@ impl placed::Placed for Placed {
         unreachable!("a sphere has no faces")
     }
 
-    /// An outline is off by the errors of a point on it, a shadow and a mirrored outline too; a normal by those of the
-    /// point for the radius.
+    /// `power` is the difference of two squares without cancellation.
+    fn nearest(&self) -> f64 {
+        self.power.abs() / (self.center.length() + self.radius)
+    }
+
+    fn shadow_nearest(&self, x: DVec3, y: DVec3) -> f64 {
+        (self.center.dot(x).hypot(self.center.dot(y)) - self.radius).abs()
+    }
+
+    /// An outline is off by the errors of a point on it, and what touches the sphere or is mirrored in it by where rays
+    /// start from it; a normal by the errors of the point for the radius.
     fn is_fine(&self, sight: &Sight) -> bool {
         let &Self { center, radius, .. } = self;
-        let away = center.length();
-        let error = sight.point * sight.roundoff * (away + radius);
-        let nearest = if sight.parallel { 1.0 } else { (away - radius).abs() };
+        let (away, size) = (center.length(), center.length() + radius);
         let seen = sight.parallel || radius > 0.5 * sight.pixel * away;
-        error <= sight.hardly_visible * sight.pixel * nearest && !(seen && error > sight.normal * radius)
+        let bent = sight.point * sight.roundoff * size > sight.normal * radius;
+        sight.is_invisible(sight.start * size, self.nearest()) && !(seen && bent)
     }
 }
 

@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3};
 use crate::fast::bounds::Bounds;
 use crate::fast::lights::sun::Sun;
 use crate::fast::packet::{Nearest, Ray, Surface, affine, no_lane, offset};
-use crate::fast::placed::{self, Face, Sight, across_corners};
+use crate::fast::placed::{self, Face, Sight, across_corners, edge_nearest, nearest_within};
 use crate::fast::predicate::{Beside, Corners, Place, settle};
 use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rounding::{CONSTANT, EDGE_ON, GRAZING, OFFSET, SIDE, VOLUME, distance_error};
@@ -21,13 +21,16 @@ use crate::reference::{normal_and_width, triangle_normal};
 pub(in crate::fast) struct Placed {
     pub(in crate::fast) vertices: [DVec3; 3],
     pub(in crate::fast) normal: DVec3,
+    /// `normal · point` of its points.
+    pub(in crate::fast) height: f64,
 }
 
 /// The width of a triangle, for its length, below which its normal is worked out from where its corners are rounded to.
 const NEEDLE: f64 = 0.1;
 
 impl Placed {
-    /// Moved so that `center` is the origin, and then scaled; none if it has no area.
+    /// Moved so that `center` is the origin, and then scaled; none if it has no area, or if rounding leaves it none there:
+    /// then it is thinner than anything that can be seen.
     pub(in crate::fast) fn new(
         triangle: &rayfold_scene::Triangle,
         center: DVec3,
@@ -39,9 +42,14 @@ impl Placed {
         if own == DVec3::ZERO {
             return None;
         }
+        let [a, b, c] = vertices;
+        if a == b || b == c || c == a {
+            return None;
+        }
         // A needle turns when its corners are rounded; rays meet it as it is here.
-        let here = if width < NEEDLE { triangle_normal(&vertices) } else { own };
-        Some(Self { vertices, normal: if here == DVec3::ZERO { own } else { here } })
+        let normal = if width < NEEDLE { triangle_normal(&vertices) } else { own };
+        let height = normal.dot(Ends::new(vertices).nearest());
+        (normal != DVec3::ZERO).then_some(Self { vertices, normal, height })
     }
 }
 
@@ -75,6 +83,18 @@ impl placed::Placed for Placed {
 
     fn plane(&self) -> Option<DVec3> {
         Some(self.normal)
+    }
+
+    fn nearest(&self) -> f64 {
+        nearest_within(self.bounds()).max(self.height.abs())
+    }
+
+    fn shadow_nearest(&self, x: DVec3, y: DVec3) -> f64 {
+        let [a, b, c] = self.vertices;
+        [[a, b], [b, c], [c, a]]
+            .map(|edge| edge_nearest(edge, x, y))
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
     }
 
     fn is_fine(&self, sight: &Sight) -> bool {
@@ -123,7 +143,7 @@ pub(in crate::fast) struct Triangle<E> {
 impl<E: Real> Triangle<E> {
     // Out of line, and below too, so that what is made of a million triangles is the same code whatever calls it.
     #[inline(never)]
-    pub(in crate::fast) fn new(&Placed { vertices, normal }: &Placed, order: u32) -> Self {
+    pub(in crate::fast) fn new(&Placed { vertices, normal, height }: &Placed, order: u32) -> Self {
         let [a, b, c] = vertices;
         let ends = Ends::new(vertices);
         let [to_a, to_b, to_c] = ends.squares.map(f64::sqrt);
@@ -147,7 +167,7 @@ impl<E: Real> Triangle<E> {
             edges: [a.0, b.0, c.0],
             from_eye: [a.1, b.1, c.1],
             normal: point(normal),
-            height: E::narrow(normal.dot(ends.nearest())),
+            height: E::narrow(height),
             order: E::narrow(f64::from(order)),
         }
     }
@@ -308,7 +328,7 @@ impl<E: Real> Prism<E> {
     /// From the Plücker coordinates of the ray through `o` along `d`: `d · moment + direction · (o × d)`. `axes` are the
     /// sun's [rounded](Sun::rounded) ones.
     #[inline(never)]
-    pub(in crate::fast) fn new(&Placed { vertices, normal }: &Placed, axes: DMat3) -> Self {
+    pub(in crate::fast) fn new(&Placed { vertices, normal, height }: &Placed, axes: DMat3) -> Self {
         let towards = axes.row(2);
         let facing = normal.dot(towards);
         let sign = facing.signum();
@@ -330,7 +350,6 @@ impl<E: Real> Prism<E> {
             let scale = scale(slope, start, 3.0 * CONSTANT * l1(edge));
             (point(slope * scale), E::narrow(start * scale + 0.5))
         };
-        let height = normal.dot(ends.nearest());
         let scale = sign * scale(normal, height, CONSTANT);
         Self {
             sides: [side(1, 2), side(2, 0), side(0, 1)],

@@ -23,6 +23,7 @@ impl Shape for Cuboid {
             Some((_, (_, axis))) => (axis, false),
             None => unreachable!("the ray hits the box at {distance}"),
         };
+        let axis = flat_axis(self).filter(|&axis| ray.direction[axis] != 0.0).unwrap_or(axis);
         let forwards = ray.direction[axis] > 0.0;
         let mut point = (ray.origin + distance * ray.direction).clamp(min, max);
         point[axis] = if forwards == entering { min[axis] } else { max[axis] };
@@ -34,6 +35,12 @@ impl Shape for Cuboid {
     fn seen_from(&self, eye: DVec3) -> Option<Object> {
         Object::from(self.clone()).placed(1.0, |corner| corner - eye).ok()
     }
+}
+
+/// The axis to which the box is square, if it is a rectangle: its sides have no area.
+fn flat_axis(cuboid: &Cuboid) -> Option<usize> {
+    let mut axes = (0..3).filter(|&axis| cuboid.min()[axis] == cuboid.max()[axis]);
+    axes.next().filter(|_| axes.next().is_none())
 }
 
 /// Distances at which the ray enters and leaves the box, each with its axis: Kay and Kajiya's slabs, where the planes
@@ -99,5 +106,19 @@ mod tests {
         assert_eq!(distance(&flat, ray([0.5, 0.5, 2.0], [0.0, 0.0, -1.0])), Some(2.0));
         assert_eq!(distance(&flat, ray([3.0, 0.0, 0.0], [-1.0, 0.0, 0.0])), Some(2.0));
         assert_eq!(distance(&flat, ray([3.0, 0.0, 1e-300], [-1.0, 0.0, 0.0])), None);
+    }
+
+    #[test]
+    fn the_edge_of_a_rectangle_has_its_normal() {
+        let floor =
+            Cuboid::new([DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 0.0, 1.0)], Material::default());
+        let floor = floor.unwrap();
+        for x in [-1.0, -0.3, 1.0] {
+            let r = ray([x - 2.0, 2.0, -1.0], [2.0, -2.0, 0.0]);
+            let met = Shape::distance(&floor, r).unwrap();
+            assert_eq!(Shape::surface(&floor, r, met).normal, DVec3::Y, "at {x}");
+        }
+        let along = ray([-3.0, 0.0, 0.5], [1.0, 0.0, 0.0]);
+        assert_eq!(Shape::surface(&floor, along, 2.0).normal, DVec3::NEG_X);
     }
 }

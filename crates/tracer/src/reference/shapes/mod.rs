@@ -20,6 +20,7 @@ use rayfold_scene::Object;
 
 pub(crate) use instance::in_world;
 pub(crate) use sphere::power;
+pub(super) use triangle::are_one;
 pub(crate) use triangle::{normal_and_width, triangle_normal};
 
 use crate::camera::Ray;

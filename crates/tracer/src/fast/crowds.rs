@@ -1,0 +1,163 @@
+//! Objects so much in one place that their boxes do not tell them apart.
+//!
+//! Builders of trees compare neighbours and choose by the area of their boxes. Among thousands of boxes that all but cover
+//! each other no choice is better than another, and looking for one takes the square of their number. Here such crowds are
+//! found in `n log n`: objects are sorted along a curve through their middles (Morton, 1966), and where the boxes of
+//! neighbours on it cover the same place many times, they are a crowd. A tree is grown of crowds as of single objects, and a
+//! crowd is halved along the curve.
+
+use std::ops::Range;
+
+use glam::{DVec3, UVec3, Vec3A};
+use obvhs::aabb::Aabb;
+use rayon::prelude::*;
+
+/// Fewer objects than this are compared with each other in no time.
+const FEW: usize = 4096;
+
+/// Neighbours on the curve that are looked at together.
+const NEIGHBOURS: usize = 64;
+
+/// How many times neighbours of a crowd cover the place that they lie in, at least. Those of a mesh cover it a few times.
+const COVERED: f32 = 16.0;
+
+/// Bits of a place on the curve along each axis.
+const BITS: u32 = 10;
+
+/// Bits of an object's number, below those of its place.
+const INDEX: u32 = 32;
+
+/// Objects in the order of the curve, and which ranges of that are crowds.
+pub(super) struct Crowds {
+    pub(super) order: Vec<u32>,
+    pub(super) ranges: Vec<Range<usize>>,
+}
+
+impl Crowds {
+    /// None where all can be told apart, or are few.
+    pub(super) fn find(boxes: &[Aabb]) -> Option<Self> {
+        if boxes.len() < FEW {
+            return None;
+        }
+        let middles: Vec<Vec3A> = boxes.iter().map(|of| 0.5 * of.min + 0.5 * of.max).collect();
+        let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+        sort(&middles, &mut order);
+        let mut ranges: Vec<Range<usize>> = Vec::new();
+        for from in (0..order.len()).step_by(NEIGHBOURS) {
+            let end = (from + NEIGHBOURS).min(order.len());
+            if is_crowd(order[from..end].iter().map(|&at| &boxes[at as usize])) {
+                match ranges.last_mut() {
+                    Some(last) if last.end == from => last.end = end,
+                    Some(_) | None => ranges.push(from..end),
+                }
+            }
+        }
+        let crowded: usize = ranges.iter().map(Range::len).sum();
+        (crowded >= FEW).then_some(Self { order, ranges })
+    }
+}
+
+/// Whether boxes cover the place that they lie in many times.
+fn is_crowd<'a>(boxes: impl Iterator<Item = &'a Aabb>) -> bool {
+    let length = |of: &Aabb| of.diagonal().element_sum();
+    let (mut whole, mut area, mut extent) = (Aabb::empty(), 0.0, 0.0);
+    for of in boxes {
+        whole = whole.union(of);
+        area += of.half_area();
+        extent += length(of);
+    }
+    // Boxes along a line have no area.
+    if whole.half_area() > 0.0 {
+        area >= COVERED * whole.half_area()
+    } else {
+        extent >= COVERED * length(&whole)
+    }
+}
+
+/// Sorts objects along the curve; those in one place of it along a finer one, if they are many.
+fn sort(middles: &[Vec3A], order: &mut [u32]) {
+    let place = |at: u32| middles[at as usize];
+    let (low, high) = order.iter().fold((Vec3A::INFINITY, Vec3A::NEG_INFINITY), |(low, high), &at| {
+        (low.min(place(at)), high.max(place(at)))
+    });
+    let size = f64::from((high - low).max_element());
+    // Also where it is not a number.
+    if !(size > 0.0 && size.is_finite()) {
+        return;
+    }
+    let cells = f64::from((1u32 << BITS) - 1) / size;
+    let mut places: Vec<u64> = order
+        .par_iter()
+        .map(|&at| {
+            let cell: DVec3 = (place(at).as_dvec3() - low.as_dvec3()) * cells;
+            along_curve(cell.as_uvec3()) << INDEX | u64::from(at)
+        })
+        .collect();
+    places.par_sort_unstable();
+    for (at, place) in order.iter_mut().zip(&places) {
+        *at = (place & ((1 << INDEX) - 1)) as u32;
+    }
+    let mut from = 0;
+    for same in places.chunk_by(|a, b| a >> INDEX == b >> INDEX) {
+        if same.len() >= FEW {
+            sort(middles, &mut order[from..from + same.len()]);
+        }
+        from += same.len();
+    }
+}
+
+/// The bits of three numbers in turn.
+fn along_curve(cell: UVec3) -> u64 {
+    let spread = |x: u32| {
+        let x = u64::from(x);
+        let x = (x | x << 16) & 0xff_0000_ff00_00ff;
+        let x = (x | x << 8) & 0xf00f_00f0_0f00_f00f;
+        let x = (x | x << 4) & 0x30c3_0c30_c30c_30c3;
+        (x | x << 2) & 0x1249_2492_4924_9249
+    };
+    spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn around(middle: Vec3A, half: Vec3A) -> Aabb {
+        Aabb { min: middle - half, max: middle + half }
+    }
+
+    fn place(rng: &mut fastrand::Rng) -> Vec3A {
+        Vec3A::new(rng.f32(), rng.f32(), rng.f32())
+    }
+
+    #[test]
+    fn a_crowd_is_found_wherever_it_stands_and_scattered_boxes_are_none() {
+        let mut rng = fastrand::Rng::with_seed(1);
+        let mut boxes: Vec<Aabb> = (0..20_000).map(|_| around(place(&mut rng), Vec3A::splat(0.01))).collect();
+        assert!(Crowds::find(&boxes).is_none(), "scattered");
+        // In one ten-thousandth of the scene, in no order.
+        for half in [Vec3A::splat(1e-5), Vec3A::new(1e-5, 0.0, 0.0), Vec3A::ZERO] {
+            let mut mixed = boxes.clone();
+            mixed.extend((0..20_000).map(|_| around(Vec3A::splat(0.3) + 1e-7 * place(&mut rng), half)));
+            rng.shuffle(&mut mixed);
+            let found = Crowds::find(&mixed).expect("a crowd");
+            let crowded: usize = found.ranges.iter().map(Range::len).sum();
+            assert!((18_000..22_000).contains(&crowded), "{crowded} of 20000, {half}");
+            let mut order = found.order.clone();
+            order.sort_unstable();
+            assert!(order.into_iter().eq(0..40_000), "each once");
+        }
+        boxes.truncate(FEW - 1);
+        let first = boxes[0];
+        boxes.fill(first);
+        assert!(Crowds::find(&boxes).is_none(), "few");
+    }
+
+    #[test]
+    fn neighbours_on_the_curve_share_their_first_bits() {
+        assert_eq!(along_curve(UVec3::new(1, 0, 0)), 1);
+        assert_eq!(along_curve(UVec3::new(0, 1, 0)), 2);
+        assert_eq!(along_curve(UVec3::new(2, 0, 1)), 12);
+        assert_eq!(along_curve(UVec3::splat((1 << BITS) - 1)), (1 << (3 * BITS)) - 1);
+    }
+}
