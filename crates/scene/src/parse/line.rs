@@ -92,9 +92,12 @@ impl<'a> Parser<'a> {
         words: &'w mut Words,
         values: &'w mut [f64; MAX_NUMBERS],
     ) -> Option<Statement<'a, 'w>> {
-        let text = match std::str::from_utf8(line.bytes) {
-            Ok(text) => text,
-            Err(error) => self.not_utf8(line, error)?,
+        let text = match self.whole {
+            Some(whole) => &whole[line.offset..line.offset + line.bytes.len()],
+            None => match std::str::from_utf8(line.bytes) {
+                Ok(text) => text,
+                Err(error) => self.not_utf8(line, error)?,
+            },
         };
         if self.has_returns
             && let Some(at) = memchr::memchr(b'\r', text.as_bytes())

@@ -82,6 +82,8 @@ struct Parser<'a> {
     trace_misspelt: bool,
     /// Whether a line could not be read: an `End` may have stood there, or a `Group`.
     line_lost: bool,
+    /// The text, unless something in it is not UTF-8.
+    whole: Option<&'a str>,
     /// Whether there is a carriage return in the text, wherever.
     has_returns: bool,
     /// Where the first command since the last `Trace` stands that has no effect if no other `Trace` comes.
@@ -132,6 +134,7 @@ impl<'a> Parser<'a> {
             is_fresh: false,
             trace_misspelt: false,
             line_lost: false,
+            whole: None,
             has_returns: false,
             unseen: Unseen::NOTHING,
             materials: Names::new(),
@@ -145,6 +148,7 @@ impl<'a> Parser<'a> {
 
     fn text(mut self, bytes: &'a [u8]) -> Parsed {
         let mut last = Line { number: 1, offset: 0, bytes: &[] };
+        self.whole = std::str::from_utf8(bytes).ok();
         self.has_returns = memchr::memchr(b'\r', bytes).is_some();
         let mut words = Words::new();
         for line in lines(bytes) {
