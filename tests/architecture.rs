@@ -34,7 +34,7 @@ const KNOWS: &[(&str, &[&str])] = &[
             "rayfold-studio",
         ],
     ),
-    ("rayfold-xtask", &[]),
+    ("rayfold-xtask", &["rayfold-scene"]),
     (
         "rayfold-bench",
         &[

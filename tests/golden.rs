@@ -43,33 +43,93 @@ fn hello() {
     check("hello", &["frame01", "frame17", "frame34", "frame50"]);
 }
 
-fn check(folder: &str, frames: &[&str]) {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    for frame in frames {
-        let scene = load(&root.join("scenes").join(folder).join(format!("{frame}.txt")));
-        let golden_path = root.join("tests/golden").join(folder).join(format!("{frame}.png"));
-        if std::env::var_os("RAYFOLD_RENEW").is_some() {
-            fs::create_dir_all(golden_path.parent().unwrap()).unwrap();
-            by_reference(&scene).save(&golden_path).unwrap();
+#[test]
+fn marbles() {
+    check_curves("marbles", &[1, 20]);
+}
+
+#[test]
+fn glass() {
+    check_curves("glass", &[1, 31]);
+}
+
+#[test]
+fn clockwork() {
+    check_curves("clockwork", &[1, 7]);
+}
+
+#[test]
+fn planets() {
+    check_curves("planets", &[1, 21]);
+}
+
+#[test]
+fn lamp() {
+    check_curves("lamp", &[1, 13]);
+}
+
+#[test]
+fn every_scene_is_shown_and_has_golden_frames() {
+    let readme = fs::read_to_string(root().join("scenes/README.md")).unwrap();
+    let mut count = 0;
+    for entry in fs::read_dir(root().join("scenes")).unwrap() {
+        let entry = entry.unwrap();
+        if !entry.file_type().unwrap().is_dir() {
+            continue;
         }
-        let golden = image::open(&golden_path)
-            .unwrap_or_else(|e| panic!("{}: {e}", golden_path.display()))
-            .into_rgb8();
-        let name = format!("{folder}/{frame}");
-        compare(&format!("{name} by the reference"), &golden, &by_reference(&scene));
-        compare(&name, &golden, &render(&scene, &RenderOptions::default()).unwrap());
+        count += 1;
+        let name = entry.file_name().into_string().unwrap();
+        assert!(root().join("tests/golden").join(&name).is_dir(), "{name} has no golden frames");
+        assert!(readme.contains(&format!("| `{name}`")), "scenes/README.md does not tell of {name}");
+        let picture = root().join(format!("docs/images/{name}.gif"));
+        let size = fs::metadata(&picture).unwrap_or_else(|e| panic!("{}: {e}", picture.display())).len();
+        assert!(size < 1_000_000, "{} has {size} bytes", picture.display());
     }
+    assert_eq!(count, 10);
+}
+
+/// Of a folder with a script a frame, some of them.
+fn check(folder: &str, scripts: &[&str]) {
+    for script in scripts {
+        compare_all(folder, script, &load(&format!("scenes/{folder}/{script}.txt"), 0));
+    }
+}
+
+/// Of a folder with one script for all frames, some of them, counted from 1.
+fn check_curves(folder: &str, frames: &[usize]) {
+    for frame in frames {
+        let scene = load(&format!("scenes/{folder}/{folder}.txt"), frame - 1);
+        compare_all(folder, &format!("frame{frame:02}"), &scene);
+    }
+}
+
+fn compare_all(folder: &str, frame: &str, scene: &Scene) {
+    let golden_path = root().join("tests/golden").join(folder).join(format!("{frame}.png"));
+    if std::env::var_os("RAYFOLD_RENEW").is_some() {
+        fs::create_dir_all(golden_path.parent().unwrap()).unwrap();
+        by_reference(scene).save(&golden_path).unwrap();
+    }
+    let golden =
+        image::open(&golden_path).unwrap_or_else(|e| panic!("{}: {e}", golden_path.display())).into_rgb8();
+    let name = format!("{folder}/{frame}");
+    compare(&format!("{name} by the reference"), &golden, &by_reference(scene));
+    compare(&name, &golden, &render(scene, &RenderOptions::default()).unwrap());
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
 fn by_reference(scene: &Scene) -> RgbImage {
     reference::render(scene, &RenderOptions::default()).unwrap()
 }
 
-fn load(path: &Path) -> Scene {
-    let text = fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    let parsed = parse(&path.display().to_string(), &text, &Limits::default());
-    let script = parsed.script.unwrap_or_else(|| panic!("{}: {:?}", path.display(), parsed.diagnostics));
-    let mut scene = script.frames().next().unwrap();
+/// Frame `k`, counted from 0, of a script, at the size of golden frames.
+fn load(script: &str, k: usize) -> Scene {
+    let text = fs::read(root().join(script)).unwrap_or_else(|e| panic!("{script}: {e}"));
+    let parsed = parse(script, &text, &Limits::default());
+    let parsed_script = parsed.script.unwrap_or_else(|| panic!("{script}: {:?}", parsed.diagnostics));
+    let mut scene = parsed_script.frame(k).unwrap();
     scene.screen = Screen::new(SIDE, SIDE).unwrap();
     scene
 }

@@ -67,7 +67,7 @@ fn folder(animation: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(animation)
 }
 
-/// The animations in `scenes/`.
+/// The animations in `scenes/` that are in version 1 of the language.
 pub const EXAMPLES: [&str; 5] = ["sphere_light", "moving_up", "artistic", "artisticsss", "hello"];
 
 /// A surface that scatters and mirrors.

@@ -145,6 +145,28 @@ pub(crate) const MAX_NUMBERS: usize = {
     most
 };
 
+/// The commands by the first letters of their names, each letter's as a chain: the place in [`Command::ALL`] of the first,
+/// and behind each the next; `NONE` ends a chain.
+struct Index {
+    first: [u8; 26],
+    next: [u8; Command::ALL.len()],
+}
+
+const NONE: u8 = u8::MAX;
+
+/// So that a line's command is found with a comparison or two.
+const INDEX: Index = {
+    let mut index = Index { first: [NONE; 26], next: [NONE; Command::ALL.len()] };
+    let mut i = Command::ALL.len();
+    while i > 0 {
+        i -= 1;
+        let letter = (Command::ALL[i].name().as_bytes()[0].to_ascii_lowercase() - b'a') as usize;
+        index.next[i] = index.first[letter];
+        index.first[letter] = i as u8;
+    }
+    index
+};
+
 impl Command {
     /// Its name.
     pub const fn name(self) -> &'static str {
@@ -153,7 +175,14 @@ impl Command {
 
     /// The command of this name, in any letter case.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.iter().copied().find(|c| c.name().eq_ignore_ascii_case(name))
+        let letter = name.bytes().next()?.to_ascii_lowercase().wrapping_sub(b'a');
+        let first = *INDEX.first.get(usize::from(letter))?;
+        let chain = || {
+            std::iter::successors(Some(first), |place| INDEX.next.get(usize::from(*place)).copied())
+                .map_while(|place| Self::ALL.get(usize::from(place)).copied())
+        };
+        // Most write it as the documentation does, which is compared faster.
+        chain().find(|c| c.name() == name).or_else(|| chain().find(|c| c.name().eq_ignore_ascii_case(name)))
     }
 
     /// The command that was probably meant: a slip or two away, or cut short.
@@ -183,6 +212,10 @@ mod tests {
     fn names_are_not_shared() {
         for command in Command::ALL {
             assert_eq!(Command::from_name(&command.name().to_uppercase()), Some(*command));
+            assert_eq!(Command::from_name(&command.name().to_lowercase()), Some(*command));
+        }
+        for none in ["", "S", "Zoom", "Äpfel", "{", "@", "Spheres", "spher", "1"] {
+            assert_eq!(Command::from_name(none), None, "{none}");
         }
     }
 

@@ -20,26 +20,6 @@ fn the_example_is_a_script() {
     assert_eq!(parsed.script.map(|script| script.frame_count()), Some(1));
 }
 
-/// The lines that are set apart by four blanks and start with `start`.
-fn lines(start: &str) -> String {
-    let lines = PAGE.lines().skip_while(|line| !line.starts_with(&format!("    {start}")));
-    lines.take_while(|line| line.starts_with("    ")).map(|line| format!("{}\n", line.trim())).collect()
-}
-
-#[test]
-fn the_examples_of_curves_and_groups_are_in_order() {
-    let script = format!(
-        "Screen 4 3\nMaterial red diffuse 1 0 0\nMaterial brass diffuse .8 .6 .2\nGroup hand\nBox 0 0 0 .1 .1 1 red\nEnd\n\
-         {}{}Frames 60\nTrace\n",
-        lines("Sphere 1   ("),
-        lines("Group clock")
-    );
-    let parsed = parse("clock.txt", script.as_bytes(), &Limits::default());
-    assert!(parsed.diagnostics.is_empty(), "{script}\n{:?}", parsed.diagnostics);
-    let script = parsed.script.unwrap();
-    assert_eq!((script.frame_count(), script.frame(59).unwrap().objects.len()), (60, 5));
-}
-
 #[test]
 fn the_message_is_what_is_told_about_the_example_misspelt() {
     let script = block("# Two balls").replacen("\nSphere", "\nSpere", 1);
@@ -94,7 +74,7 @@ fn every_parameter_is_told_with_what_it_counts_by_and_may_be() {
         let expect: Vec<_> = parameters.map(|(entry, p)| told(entry, p)).collect();
         assert_eq!(rows, expect, "the page should have\n| {} |", expect.join(" |\n| "));
     };
-    check("### Parameters", &language().commands);
+    check("## Parameters", &language().commands);
     check("### Parameters of clauses", &language().clauses);
 }
 

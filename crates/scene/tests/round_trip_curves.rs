@@ -6,6 +6,8 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
 use proptest::prelude::*;
+use proptest::strategy::ValueTree as _;
+use proptest::test_runner::TestRunner;
 use rayfold_scene::{Clause, Command, Diagnostic, Form, Limits, Script, Values, parse};
 
 /// A number, or one that changes.
@@ -81,7 +83,8 @@ fn numbers(form: &Form, draft: &Draft) -> String {
         let fit = |x: f64| fitting(field.values, x);
         text += " ";
         match (number, field.values) {
-            (_, Values::OneOf(words)) => text += words[0],
+            (Number::Still(x), Values::OneOf(words)) => text += words[fit(*x) as usize],
+            (Number::Moving { .. }, Values::OneOf(words)) => text += words[0],
             (Number::Moving { words, keys }, _) if form.curves => {
                 let keys: Vec<_> = keys.iter().map(|(frame, x)| format!("{frame}:{:e}", fit(*x))).collect();
                 text += &format!("({words}{})", keys.join(" "));
@@ -95,23 +98,26 @@ fn numbers(form: &Form, draft: &Draft) -> String {
 
 /// A script of these lines; those that may not stand where they do are left out.
 fn script(drafts: &[Draft]) -> String {
-    let mut text = String::from("Screen 4 3\n");
-    let (mut materials, mut groups, mut is_open) = (Vec::new(), Vec::new(), false);
+    // Two plain materials, so that there is always one that objects and patterns can name.
+    let mut text = String::from("Screen 4 3\nMaterial m-0 diffuse 1 0 0\nMaterial m-1 ambient .1 .2 .3\n");
+    let mut materials: Vec<_> = ["m-0", "m-1"].map(String::from).into();
+    let (mut groups, mut is_open) = (Vec::new(), false);
     for draft in drafts {
         let command = Command::ALL[draft.command % Command::ALL.len()];
         let form = command.form();
         let is_object = form.surface().is_some();
         let line = match command {
             Command::Material if !is_open => {
-                let clause = Clause::ALL[draft.left_out % Clause::ALL.len()];
                 let mut line = format!("Material m-{}", materials.len());
-                // The first are plain, so that patterns can name them.
-                if clause.form().ends_with.is_none() || materials.len() < 2 {
-                    line += &format!(" DIFFUSE{}", numbers(Clause::Diffuse.form(), draft));
-                }
-                if materials.len() >= 2 && clause != Clause::Diffuse {
+                let first = draft.left_out % Clause::ALL.len();
+                let mut has_pattern = false;
+                for clause in Clause::ALL.iter().cycle().skip(first).take(1 + draft.name) {
+                    let is_pattern = clause.form().ends_with.is_some();
+                    if is_pattern && std::mem::replace(&mut has_pattern, true) {
+                        continue;
+                    }
                     line += &format!(" {}{}", clause.name(), numbers(clause.form(), draft));
-                    if clause.form().ends_with.is_some() {
+                    if is_pattern {
                         line += &format!(" {}", materials[draft.name % 2]);
                     }
                 }
@@ -131,10 +137,11 @@ fn script(drafts: &[Draft]) -> String {
                 format!("Use {}{}", groups[draft.name % groups.len()], numbers(form, draft))
             }
             Command::Material | Command::Group | Command::End | Command::Use => continue,
+            Command::Frames if !is_open && draft.name == 0 => format!("Frames {}", 1 + draft.left_out),
             Command::Frames if !is_open => {
                 format!("Frames {} {}", 1 + draft.name, 1 + draft.name + draft.left_out)
             }
-            _ if is_object && draft.name > 2 && !materials.is_empty() => {
+            _ if is_object && draft.name > 2 => {
                 let all = numbers(form, draft);
                 let mut words: Vec<String> = Vec::new();
                 for word in all.split(' ').filter(|word| !word.is_empty()) {
@@ -166,6 +173,32 @@ fn read(text: &str) -> Result<Script, Vec<Diagnostic>> {
 /// As numbers: the texts of two numbers differ where their bits do; `==` takes 0 and -0 for the same.
 fn bits(scene: &impl std::fmt::Debug) -> String {
     format!("{scene:?}")
+}
+
+/// What is tried below is everything: each command, clause and word is in scripts that are in order.
+#[test]
+fn everything_of_the_language_is_drawn() {
+    let mut runner = TestRunner::deterministic();
+    let drafts = prop::collection::vec(draft(), 1..40);
+    let texts: Vec<_> = (0..400)
+        .map(|_| script(&drafts.new_tree(&mut runner).unwrap().current()))
+        .filter(|text| read(text).is_ok())
+        .map(|text| text.to_lowercase())
+        .collect();
+    assert!(texts.len() > 100, "{} of 400 are in order", texts.len());
+    let words = Command::ALL.iter().flat_map(|command| {
+        let of_values = command.form().fields.iter().flat_map(|field| match field.values {
+            Values::OneOf(words) => words,
+            _ => &[],
+        });
+        of_values.copied().chain([command.name()])
+    });
+    for word in words.chain(Clause::ALL.iter().map(|clause| clause.name())) {
+        let word = word.to_lowercase();
+        let has = |text: &&String| text.split([' ', '\n']).any(|other| other == word);
+        let count = texts.iter().filter(has).count();
+        assert!(count >= 5, "`{word}` is in {count} of {} scripts", texts.len());
+    }
 }
 
 proptest! {

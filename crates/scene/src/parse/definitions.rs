@@ -184,7 +184,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    pub(super) fn material(&mut self, s: &Statement<'a>) {
+    pub(super) fn material(&mut self, s: &Statement<'a, '_>) {
         let (Some(name), Some(subject)) = (s.name(), s.subject.clone()) else { return };
         let errors_before = self.report.error_count();
         let (clauses, moving) = self.clauses(s, subject.end);
@@ -226,7 +226,7 @@ impl<'a> Parser<'a> {
     }
 
     /// The clauses behind byte `at`, and those of them with curves among all lines with curves.
-    fn clauses(&mut self, s: &Statement<'a>, at: usize) -> (Vec<ClauseLine>, Vec<usize>) {
+    fn clauses(&mut self, s: &Statement<'a, '_>, at: usize) -> (Vec<ClauseLine>, Vec<usize>) {
         let words = parameters(s.text.as_bytes(), at);
         let (mut lines, mut moving): (Vec<ClauseLine>, Vec<usize>) = (Vec::new(), Vec::new());
         if words.is_empty() {
@@ -273,7 +273,7 @@ impl<'a> Parser<'a> {
     /// The numbers of a clause; `None` if there is a fault in them, which is reported.
     fn clause_numbers(
         &mut self,
-        s: &Statement<'a>,
+        s: &Statement<'a, '_>,
         clause: Clause,
         place: &Range<usize>,
         words: &[Range<usize>],
@@ -316,7 +316,7 @@ impl<'a> Parser<'a> {
     /// that the definition cannot go on with; both are reported.
     fn clause_material(
         &mut self,
-        s: &Statement<'a>,
+        s: &Statement<'a, '_>,
         clause: Clause,
         place: &Range<usize>,
         words: &[Range<usize>],
@@ -337,7 +337,7 @@ impl<'a> Parser<'a> {
     }
 
     /// What is wrong with the numbers of a clause.
-    fn check_clause(&mut self, s: &Statement<'a>, clause: Clause, row: &Row, spans: &[Range<usize>]) {
+    fn check_clause(&mut self, s: &Statement<'a, '_>, clause: Clause, row: &Row, spans: &[Range<usize>]) {
         let values = row.at(0.0);
         let mut clauses = crate::model::Clauses::default();
         let mut numbers = Numbers::new(&values, row.len(), None);
@@ -352,7 +352,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    pub(super) fn open_group(&mut self, s: &Statement<'a>) {
+    pub(super) fn open_group(&mut self, s: &Statement<'a, '_>) {
         let (Some(name), Some(subject)) = (s.name(), s.subject.clone()) else { return };
         if let Some(first) = self.groups.line_of(name) {
             let span = subject.clone();
@@ -371,7 +371,7 @@ impl<'a> Parser<'a> {
         });
     }
 
-    pub(super) fn end_group(&mut self, s: &Statement<'a>) {
+    pub(super) fn end_group(&mut self, s: &Statement<'a, '_>) {
         if self.group.is_none() && !self.line_lost {
             self.report.error(s.line, s.words.command.clone(), wording::end_without_group);
         }
@@ -379,7 +379,7 @@ impl<'a> Parser<'a> {
     }
 
     /// A command that may not stand in a group ends it, so that what follows is not faulty too.
-    pub(super) fn leave_group_at(&mut self, s: &Statement<'a>) {
+    pub(super) fn leave_group_at(&mut self, s: &Statement<'a, '_>) {
         if let Some(group) = &self.group {
             let (name, number) = (group.name, group.line.number);
             if !self.line_lost {

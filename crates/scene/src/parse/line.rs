@@ -11,31 +11,31 @@ use crate::report::{Fault, Line};
 use crate::row::{Number, Row};
 
 /// A command whose words are numbers and names, and as many as it takes.
-pub(super) struct Statement<'a> {
+pub(super) struct Statement<'a, 'w> {
     pub(super) line: Line<'a>,
     /// Of the line, without what is not UTF-8 in its comment.
     pub(super) text: &'a str,
     pub(super) command: Command,
     /// Without the name that stands before the numbers.
-    pub(super) words: Words,
+    pub(super) words: &'w Words,
     /// The name that stands before the numbers.
     pub(super) subject: Option<Range<usize>>,
     /// Of the parameters; 0 for optional ones that are missing, and for curves.
-    pub(super) values: [f64; MAX_NUMBERS],
+    pub(super) values: &'w [f64; MAX_NUMBERS],
     /// The parameters, if one of them is a curve.
     pub(super) row: Option<Row>,
     /// The name of a material that stands in the place of numbers.
     pub(super) surface: Option<Range<usize>>,
 }
 
-/// The parameters of a line.
+/// What the parameters of a line are beside numbers.
+#[derive(Default)]
 struct Parameters {
-    values: [f64; MAX_NUMBERS],
     row: Option<Row>,
     surface: Option<Range<usize>>,
 }
 
-impl<'a> Statement<'a> {
+impl<'a> Statement<'a, '_> {
     /// Of its command.
     pub(super) fn place(&self) -> (Line<'a>, Range<usize>) {
         (self.line, self.words.command.clone())
@@ -78,24 +78,37 @@ fn decimal_comma(text: &str, command: Command, words: &Words) -> Option<Range<us
 
 impl<'a> Parser<'a> {
     /// Reads a line and does what it says, unless it has a fault, which is reported.
-    pub(super) fn line(&mut self, line: Line<'a>) {
-        if let Some(statement) = self.statement(line) {
+    pub(super) fn line(&mut self, line: Line<'a>, words: &mut Words) {
+        let mut values = [0.0; MAX_NUMBERS];
+        if let Some(statement) = self.statement(line, words, &mut values) {
             self.run(&statement);
         }
     }
 
     /// `None` for a line without a command and for one with a fault, which is reported.
-    fn statement(&mut self, line: Line<'a>) -> Option<Statement<'a>> {
-        let text = match std::str::from_utf8(line.bytes) {
-            Ok(text) => text,
-            Err(error) => self.not_utf8(line, error)?,
+    fn statement<'w>(
+        &mut self,
+        line: Line<'a>,
+        words: &'w mut Words,
+        values: &'w mut [f64; MAX_NUMBERS],
+    ) -> Option<Statement<'a, 'w>> {
+        let text = match self.whole {
+            Some(whole) => &whole[line.offset..line.offset + line.bytes.len()],
+            None => match std::str::from_utf8(line.bytes) {
+                Ok(text) => text,
+                Err(error) => self.not_utf8(line, error)?,
+            },
         };
-        if let Some(at) = text.find('\r') {
+        if self.has_returns
+            && let Some(at) = memchr::memchr(b'\r', text.as_bytes())
+        {
             self.report.error(line, at..at + 1, wording::lone_carriage_return);
             self.expect_no_more();
             return None;
         }
-        let mut words = Words::of(text.as_bytes())?;
+        if !words.read(text.as_bytes()) {
+            return None;
+        }
         let name = &text[words.command.clone()];
         let Some(command) = Command::from_name(name) else {
             self.unknown_command(line, text, words);
@@ -103,26 +116,24 @@ impl<'a> Parser<'a> {
         };
         let subject = match command.form().subject {
             None => None,
-            Some(subject) => match self.subject(line, text, command, subject, &mut words) {
+            Some(subject) => match self.subject(line, text, command, subject, words) {
                 Some(name) => Some(name),
                 None => {
-                    self.faulty_line(line, text, command, None, &words);
+                    self.faulty_line(line, text, command, None, words);
                     return None;
                 }
             },
         };
         if matches!(command.act(), Act::Material) {
-            let values = [0.0; MAX_NUMBERS];
             return Some(Statement { line, text, command, words, subject, values, row: None, surface: None });
         }
-        let Some(parameters) = self.parameters(line, text, command, &words) else {
-            self.faulty_line(line, text, command, subject, &words);
+        let Some(Parameters { row, surface }) = self.parameters(line, text, command, words, values) else {
+            self.faulty_line(line, text, command, subject, words);
             return None;
         };
-        let Parameters { values, row, surface } = parameters;
         if words.count() > command.form().arity().0
             && row.is_none()
-            && let Some(comma) = decimal_comma(text, command, &words)
+            && let Some(comma) = decimal_comma(text, command, words)
         {
             self.report.warning(line, comma.clone(), || wording::decimal_comma(&text[comma]));
         }
@@ -181,36 +192,38 @@ impl<'a> Parser<'a> {
         text
     }
 
-    fn unknown_command(&mut self, line: Line<'a>, text: &'a str, mut words: Words) {
+    fn unknown_command(&mut self, line: Line<'a>, text: &'a str, words: &mut Words) {
         let name = &text[words.command.clone()];
         // Looking for it takes longer than parsing a line.
         let nearest = if self.report.describes_next() { Command::nearest(name) } else { None };
         self.report.error(line, words.command.clone(), || wording::unknown_command(name, nearest));
         if let Some(command) = nearest {
             let subject = words.take_first().filter(|span| is_name(&text[span.clone()]));
-            self.faulty_line(line, text, command, subject, &words);
+            self.faulty_line(line, text, command, subject, words);
         }
     }
 
-    /// The parameters; `None` if there is a fault in them or in their number, which is reported.
+    /// The parameters, their numbers into `values`, which are 0; `None` if there is a fault in them or in their number,
+    /// which is reported.
     fn parameters(
         &mut self,
         line: Line<'a>,
         text: &str,
         command: Command,
         words: &Words,
+        values: &mut [f64; MAX_NUMBERS],
     ) -> Option<Parameters> {
         let form = command.form();
-        let mut parameters = Parameters { values: [0.0; MAX_NUMBERS], row: None, surface: None };
+        let mut parameters = Parameters::default();
         let mut curves: Vec<(usize, Number)> = Vec::new();
         let (mut good, mut is_countable) = (true, true);
         let (_, most) = form.arity();
         let takes_words = matches!(form.fields.first().map(|field| field.values), Some(Values::OneOf(_)));
-        for (i, span) in words.parameters().iter().take(most).enumerate() {
+        for (i, span) in words.parameters()[..words.parameters().len().min(most)].iter().enumerate() {
             let word = &text[span.clone()];
             let result = match number::parse(word) {
                 Ok(value) if !takes_words => {
-                    parameters.values[i] = value;
+                    values[i] = value;
                     continue;
                 }
                 result => result,
@@ -218,7 +231,7 @@ impl<'a> Parser<'a> {
             let (name, field) = form.number(i);
             if let Values::OneOf(words) = field.values {
                 match words.iter().position(|known| known.eq_ignore_ascii_case(word)) {
-                    Some(place) => parameters.values[i] = place as f64,
+                    Some(place) => values[i] = place as f64,
                     None => {
                         good = false;
                         self.report.error(line, span.clone(), || wording::no_such_word(word, words, field));
@@ -233,7 +246,7 @@ impl<'a> Parser<'a> {
                         good = false;
                         self.report.error(line, span.clone(), || wording::unwanted_curve(command, name));
                     }
-                    Ok(Number::Still(value)) => parameters.values[i] = value,
+                    Ok(Number::Still(value)) => values[i] = value,
                     Ok(curve) => curves.push((i, curve)),
                     Err((place, fault)) => {
                         good = false;
@@ -275,7 +288,7 @@ impl<'a> Parser<'a> {
         }
         if !curves.is_empty() {
             let count = count.min(most) - usize::from(parameters.surface.is_some());
-            let mut numbers: Vec<_> = parameters.values[..count].iter().copied().map(Number::Still).collect();
+            let mut numbers: Vec<_> = values[..count].iter().copied().map(Number::Still).collect();
             curves.into_iter().for_each(|(i, curve)| numbers[i] = curve);
             parameters.row = Some(Row::new(numbers));
         }

@@ -33,7 +33,7 @@ use line::Statement;
 use names::Names;
 use picture::Picture;
 use seen::{Exposure, Moving, Origin};
-use text::lines;
+use text::{Words, lines};
 
 /// What a text turned out to be.
 #[derive(Clone, Debug)]
@@ -82,6 +82,10 @@ struct Parser<'a> {
     trace_misspelt: bool,
     /// Whether a line could not be read: an `End` may have stood there, or a `Group`.
     line_lost: bool,
+    /// The text, unless something in it is not UTF-8.
+    whole: Option<&'a str>,
+    /// Whether there is a carriage return in the text, wherever.
+    has_returns: bool,
     /// Where the first command since the last `Trace` stands that has no effect if no other `Trace` comes.
     unseen: Unseen<(Line<'a>, Range<usize>)>,
     materials: Names<'a, MaterialInfo>,
@@ -130,6 +134,8 @@ impl<'a> Parser<'a> {
             is_fresh: false,
             trace_misspelt: false,
             line_lost: false,
+            whole: None,
+            has_returns: false,
             unseen: Unseen::NOTHING,
             materials: Names::new(),
             groups: Names::new(),
@@ -142,8 +148,11 @@ impl<'a> Parser<'a> {
 
     fn text(mut self, bytes: &'a [u8]) -> Parsed {
         let mut last = Line { number: 1, offset: 0, bytes: &[] };
+        self.whole = std::str::from_utf8(bytes).ok();
+        self.has_returns = memchr::memchr(b'\r', bytes).is_some();
+        let mut words = Words::new();
         for line in lines(bytes) {
-            self.line(line);
+            self.line(line, &mut words);
             last = line;
         }
         self.finish(last)
@@ -205,7 +214,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn run(&mut self, s: &Statement<'a>) {
+    fn run(&mut self, s: &Statement<'a, '_>) {
         let act = s.command.act();
         if self.group.is_some() && !matches!(act, Act::Object(_) | Act::Use | Act::End) {
             self.leave_group_at(s);
@@ -234,8 +243,8 @@ impl<'a> Parser<'a> {
     }
 
     /// What the line holds; `None` for what is no such thing, which is reported.
-    fn read<T>(&mut self, s: &Statement<'a>, surface: Option<&Material>, reader: Reader<T>) -> Option<T> {
-        match reader(&mut Numbers::new(&s.values, s.words.count(), surface)) {
+    fn read<T>(&mut self, s: &Statement<'a, '_>, surface: Option<&Material>, reader: Reader<T>) -> Option<T> {
+        match reader(&mut Numbers::new(s.values, s.words.count(), surface)) {
             Ok(item) => Some(item),
             Err(faults) => {
                 self.invalid(s, faults);
@@ -246,7 +255,11 @@ impl<'a> Parser<'a> {
 
     /// What the line holds, or the line itself if it has curves, whose conditions are looked at when it is known when it
     /// is seen. With it the number of the line among those with curves.
-    fn read_value<T>(&mut self, s: &Statement<'a>, reader: Reader<T>) -> Option<(Value<T>, Option<usize>)> {
+    fn read_value<T>(
+        &mut self,
+        s: &Statement<'a, '_>,
+        reader: Reader<T>,
+    ) -> Option<(Value<T>, Option<usize>)> {
         match &s.row {
             None => self.read(s, None, reader).map(|value| (Value::Still(value), None)),
             Some(row) => {
@@ -258,7 +271,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn screen(&mut self, s: &Statement<'a>) {
+    fn screen(&mut self, s: &Statement<'a, '_>) {
         self.unseen.lasting.get_or_insert_with(|| s.place());
         let limit = self.limits.max_pixels;
         self.screen = match self.read(s, None, Screen::read) {
@@ -273,7 +286,7 @@ impl<'a> Parser<'a> {
         self.picture.screen_set();
     }
 
-    fn camera(&mut self, s: &Statement<'a>, read: Reader<Camera>) {
+    fn camera(&mut self, s: &Statement<'a, '_>, read: Reader<Camera>) {
         self.unseen.lasting.get_or_insert_with(|| s.place());
         let Some((camera, moving)) = self.read_value(s, read) else {
             self.picture.camera_faulty();
@@ -285,7 +298,7 @@ impl<'a> Parser<'a> {
         self.record(|recorder| recorder.set_camera(camera));
     }
 
-    fn lens(&mut self, s: &Statement<'a>) {
+    fn lens(&mut self, s: &Statement<'a, '_>) {
         self.unseen.lasting.get_or_insert_with(|| s.place());
         let Some((lens, moving)) = self.read_value(s, Lens::read) else { return };
         self.picture.lens_set(s, &lens);
@@ -294,7 +307,7 @@ impl<'a> Parser<'a> {
         self.record(|recorder| recorder.set_lens(lens));
     }
 
-    fn background(&mut self, s: &Statement<'a>) {
+    fn background(&mut self, s: &Statement<'a, '_>) {
         self.unseen.removable.get_or_insert_with(|| s.place());
         let Some((background, moving)) = self.read_value(s, Background::read) else { return };
         let old = self.pending.background.replace((moving, self.exposures.len()));
@@ -303,7 +316,7 @@ impl<'a> Parser<'a> {
     }
 
     /// A setting that a `Clear` leaves.
-    fn set<T: Scripted>(&mut self, s: &Statement<'a>, set: impl FnOnce(&mut Recorder, T)) {
+    fn set<T: Scripted>(&mut self, s: &Statement<'a, '_>, set: impl FnOnce(&mut Recorder, T)) {
         self.unseen.lasting.get_or_insert_with(|| s.place());
         if let Some(value) = self.read(s, None, T::read) {
             // Also of a script with errors: what a `Trace` is, is asked later.
@@ -311,7 +324,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn object(&mut self, s: &Statement<'a>, read: Reader<Object>) {
+    fn object(&mut self, s: &Statement<'a, '_>, read: Reader<Object>) {
         if self.group.is_none() {
             self.unseen.removable.get_or_insert_with(|| s.place());
         }
@@ -368,7 +381,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn light(&mut self, s: &Statement<'a>, read: Reader<Light>) {
+    fn light(&mut self, s: &Statement<'a, '_>, read: Reader<Light>) {
         self.unseen.removable.get_or_insert_with(|| s.place());
         let Some((light, moving)) = self.read_value(s, read) else { return };
         if let Some(moving) = moving {
@@ -389,7 +402,7 @@ impl<'a> Parser<'a> {
         self.recorder.clear();
     }
 
-    fn trace(&mut self, s: &Statement<'a>) {
+    fn trace(&mut self, s: &Statement<'a, '_>) {
         self.unseen = Unseen::NOTHING;
         let (numbers, shutter) = (self.recorder.numbers, self.recorder.shutter);
         let before = self.frames;
@@ -421,7 +434,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn draw_group(&mut self, s: &Statement<'a>) {
+    fn draw_group(&mut self, s: &Statement<'a, '_>) {
         if self.group.is_none() {
             self.unseen.removable.get_or_insert_with(|| s.place());
         }
@@ -446,7 +459,9 @@ impl<'a> Parser<'a> {
         let is_hidden = still == Some(None) || info.drawn == 0;
         let (drawn, uses) = if is_hidden { (0, 0) } else { (info.drawn, info.uses.saturating_add(1)) };
         if !is_hidden && !(4.0 * reach).is_finite() || !scale.is_finite() {
-            self.report.error(s.line, s.words.rest(0), wording::too_far);
+            let whole = s.words.command.start..s.words.end().end;
+            let span = if s.words.count() == 0 { whole } else { s.words.rest(0) };
+            self.report.error(s.line, span, wording::too_far);
         }
         self.see_group(number, reach, scale);
         self.count_drawn(s, drawn, uses);
@@ -458,7 +473,7 @@ impl<'a> Parser<'a> {
     }
 
     /// Counts what is drawn, in the group that is being defined or in the scene.
-    fn count_drawn(&mut self, s: &Statement<'a>, drawn: usize, uses: usize) {
+    fn count_drawn(&mut self, s: &Statement<'a, '_>, drawn: usize, uses: usize) {
         if let Some(group) = &mut self.group {
             group.drawn = group.drawn.saturating_add(drawn);
             group.uses = group.uses.saturating_add(uses);
@@ -473,11 +488,11 @@ impl<'a> Parser<'a> {
         self.check_limit(s, used, self.uses, limit, "groups drawn in a scene");
     }
 
-    fn invalid(&mut self, s: &Statement<'a>, faults: Faults) {
+    fn invalid(&mut self, s: &Statement<'a, '_>, faults: Faults) {
         faults.0.into_iter().for_each(|fault| self.invalid_value(s, fault));
     }
 
-    fn invalid_value(&mut self, s: &Statement<'a>, fault: InvalidValue) {
+    fn invalid_value(&mut self, s: &Statement<'a, '_>, fault: InvalidValue) {
         let form = s.command.form();
         let place = form.place(|name, parameter| fault.is_about(parameter, name));
         let (name, field) = form.number(place.start);
@@ -488,7 +503,7 @@ impl<'a> Parser<'a> {
     }
 
     /// Reports the command that goes beyond a limit.
-    fn check_limit(&mut self, s: &Statement<'a>, before: usize, count: usize, limit: usize, what: &str) {
+    fn check_limit(&mut self, s: &Statement<'a, '_>, before: usize, count: usize, limit: usize, what: &str) {
         if before <= limit && count > limit {
             let span = s.words.command.clone();
             self.report.error(s.line, span, || wording::beyond_limit(count - before, count, limit, what));

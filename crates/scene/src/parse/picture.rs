@@ -32,7 +32,7 @@ impl<'a> Picture<'a> {
         (self.window, self.has_camera, self.is_orthographic) = (None, true, false);
     }
 
-    pub(super) fn camera_set(&mut self, s: &Statement<'a>, camera: &Value<Camera>) {
+    pub(super) fn camera_set(&mut self, s: &Statement<'a, '_>, camera: &Value<Camera>) {
         self.is_compared = false;
         self.has_camera = true;
         self.is_orthographic = *camera == Value::Still(Camera::Orthographic);
@@ -54,7 +54,7 @@ impl<'a> Picture<'a> {
         self.window = corners.map(|corners| (s.line, s.words.span(10..14), corners));
     }
 
-    pub(super) fn lens_set(&mut self, s: &Statement<'a>, lens: &Value<Lens>) {
+    pub(super) fn lens_set(&mut self, s: &Statement<'a, '_>, lens: &Value<Lens>) {
         let is_point = matches!(lens, Value::Still(lens) if lens.radius() == 0.0);
         self.lens = (!is_point).then(|| s.place());
     }

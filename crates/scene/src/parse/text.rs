@@ -8,11 +8,20 @@ use crate::report::{BYTE_ORDER_MARK, Line};
 /// The lines of a text without their ends and without the byte-order mark. The last one is empty when the text ends
 /// with a line feed.
 pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
-    let mut offset = if bytes.starts_with(BYTE_ORDER_MARK) { BYTE_ORDER_MARK.len() } else { 0 };
-    bytes[offset..].split(|&b| b == b'\n').enumerate().map(move |(i, whole)| {
-        let line = Line { number: i + 1, offset, bytes: whole.strip_suffix(b"\r").unwrap_or(whole) };
-        offset += whole.len() + 1;
-        line
+    let mut next = Some(if bytes.starts_with(BYTE_ORDER_MARK) { BYTE_ORDER_MARK.len() } else { 0 });
+    (1..).map_while(move |number| {
+        let offset = next?;
+        let whole = match memchr::memchr(b'\n', &bytes[offset..]) {
+            Some(length) => {
+                next = Some(offset + length + 1);
+                &bytes[offset..offset + length]
+            }
+            None => {
+                next = None;
+                &bytes[offset..]
+            }
+        };
+        Some(Line { number, offset, bytes: whole.strip_suffix(b"\r").unwrap_or(whole) })
     })
 }
 
@@ -42,14 +51,12 @@ const CLASSES: [Class; 256] = {
 /// The next word of `line` from byte `at` on; `at` comes to stand behind it.
 #[inline]
 pub(super) fn next_word(line: &[u8], at: &mut usize) -> Option<Range<usize>> {
-    let mut end = *at;
-    while end < line.len() && CLASSES[usize::from(line[end])] == Class::Separator {
-        end += 1;
-    }
-    let start = end;
-    while end < line.len() && CLASSES[usize::from(line[end])] == Class::Word {
-        end += 1;
-    }
+    let behind = |start: usize, class: Class| {
+        let mut bytes = line[start..].iter();
+        start + bytes.position(|&b| CLASSES[usize::from(b)] != class).unwrap_or(line.len() - start)
+    };
+    let start = behind(*at, Class::Separator);
+    let mut end = behind(start, Class::Word);
     if end == start && end < line.len() && CLASSES[usize::from(line[end])] == Class::Mark {
         end += 1;
     }
@@ -82,7 +89,9 @@ pub(super) fn parameters(line: &[u8], mut at: usize) -> Vec<Range<usize>> {
 
 /// The words of a line, as bytes of it: its command and the parameters, of which those beyond the most that any
 /// command takes are only counted. A curve is one parameter.
-#[derive(Clone, Debug, PartialEq)]
+///
+/// One stands for all lines of a text, as it is too large to be handed on by value.
+#[derive(Debug)]
 pub(super) struct Words {
     pub(super) command: Range<usize>,
     parameters: [Range<usize>; MAX_NUMBERS],
@@ -92,20 +101,29 @@ pub(super) struct Words {
 }
 
 impl Words {
-    /// `None` for a line without a command.
-    pub(super) fn of(line: &[u8]) -> Option<Self> {
-        const NOWHERE: Range<usize> = 0..0;
+    const NOWHERE: Range<usize> = 0..0;
+
+    /// Those of an empty line.
+    pub(super) const fn new() -> Self {
+        Self { command: Self::NOWHERE, parameters: [Self::NOWHERE; MAX_NUMBERS], count: 0, end: 0 }
+    }
+
+    /// Takes the words of another line; whether it has a command.
+    pub(super) fn read(&mut self, line: &[u8]) -> bool {
+        self.count = 0;
         let mut at = 0;
-        let command = next_word(line, &mut at)?;
-        let mut words = Self { end: command.end, command, parameters: [NOWHERE; MAX_NUMBERS], count: 0 };
+        let command = next_word(line, &mut at);
+        let is_there = command.is_some();
+        self.command = command.unwrap_or(Self::NOWHERE);
+        self.end = self.command.end;
         while let Some(word) = next_parameter(line, &mut at) {
-            words.end = word.end;
-            if let Some(slot) = words.parameters.get_mut(words.count) {
+            self.end = word.end;
+            if let Some(slot) = self.parameters.get_mut(self.count) {
                 *slot = word;
             }
-            words.count += 1;
+            self.count += 1;
         }
-        Some(words)
+        is_there
     }
 
     /// How many parameters there are.
@@ -128,6 +146,9 @@ impl Words {
 
     /// From the first to the last of some parameters, of those that are there.
     pub(super) fn span(&self, parameters: Range<usize>) -> Range<usize> {
+        if parameters.start >= self.count {
+            return Self::NOWHERE;
+        }
         let last = parameters.end.min(self.count).max(parameters.start + 1) - 1;
         self.parameters[parameters.start].start..self.parameters[last].end
     }
@@ -139,7 +160,7 @@ impl Words {
 
     /// From parameter `first` to the last word.
     pub(super) fn rest(&self, first: usize) -> Range<usize> {
-        self.parameters.get(first).map_or(self.end, |word| word.start)..self.end
+        self.parameters().get(first).map_or(self.end, |word| word.start)..self.end
     }
 }
 
@@ -170,12 +191,10 @@ mod tests {
     #[test]
     fn words_are_what_blanks_tabs_commas_and_comments_leave() {
         let check = |line: &str, expect: &[&str]| {
-            let words = Words::of(line.as_bytes());
-            let got: Vec<_> = words
-                .iter()
-                .flat_map(|w| std::iter::once(&w.command).chain(w.parameters()))
-                .map(|word| &line[word.clone()])
-                .collect();
+            let mut words = Words::new();
+            let command = words.read(line.as_bytes()).then_some(&words.command);
+            let got: Vec<_> =
+                command.into_iter().chain(words.parameters()).map(|word| &line[word.clone()]).collect();
             assert_eq!(got, expect, "{line:?}");
         };
         check("", &[]);
@@ -194,8 +213,19 @@ mod tests {
     #[test]
     fn surplus_words_are_counted() {
         let line = format!("Clear{}", " 1".repeat(100));
-        let words = Words::of(line.as_bytes()).unwrap();
+        let mut words = Words::new();
+        assert!(words.read(line.as_bytes()));
         assert_eq!((words.count(), words.parameters().len()), (100, MAX_NUMBERS));
         assert_eq!((words.rest(0), words.end()), (6..line.len(), line.len()..line.len()));
+    }
+
+    #[test]
+    fn nothing_is_left_of_the_line_before() {
+        let mut words = Words::new();
+        assert!(words.read(b"Sphere 1 2 3"));
+        assert!(words.read(b"Trace"));
+        assert_eq!((words.count(), words.parameters().len(), words.end()), (0, 0, 5..5));
+        assert_eq!(words.span(0..2), 0..0);
+        assert!(!words.read(b"  # nothing"));
     }
 }

@@ -123,18 +123,17 @@ impl Recorder {
 
     /// `drawn` is how many objects a frame has at most.
     pub(crate) fn trace(&mut self, screen: Screen, drawn: usize) {
-        let view = View {
-            screen,
-            camera: self.camera.clone(),
-            background: self.background.clone(),
-            lens: self.lens.clone(),
-            samples: self.samples,
-            shutter: self.shutter,
-            tone: self.tone,
-            depth: self.depth,
-        };
-        if self.views.last() != Some(&view) {
-            self.views.push(view);
+        if !self.views.last().is_some_and(|view| self.is_seen_by(view, screen)) {
+            self.views.push(View {
+                screen,
+                camera: self.camera.clone(),
+                background: self.background.clone(),
+                lens: self.lens.clone(),
+                samples: self.samples,
+                shutter: self.shutter,
+                tone: self.tone,
+                depth: self.depth,
+            });
         }
         let (objects, lights) = (self.objects.note(), self.lights.note());
         if let Some(last) = self.shots.last_mut()
@@ -154,6 +153,16 @@ impl Recorder {
             before,
             drawn,
         });
+    }
+
+    /// Whether `view` is how things stand, which mostly they do.
+    fn is_seen_by(&self, view: &View, screen: Screen) -> bool {
+        let View { screen: size, camera, background, lens, samples, shutter, tone, depth } = view;
+        *size == screen
+            && *camera == self.camera
+            && *background == self.background
+            && *lens == self.lens
+            && (*samples, *shutter, *tone, *depth) == (self.samples, self.shutter, self.tone, self.depth)
     }
 
     /// The script; `None` when there are no frames.

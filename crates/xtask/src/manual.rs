@@ -1,0 +1,172 @@
+//! The scripts of `docs/language.md` that have a picture each.
+//!
+//! A block of code that starts with ```` ```scene NAME ```` is the script of `NAME`'s picture. One that sets the size of the
+//! image is whole; before any other the stage is put (the block `stage`: camera, light and floor), and a `Trace` behind it.
+//! Knows nothing of how a script is drawn.
+//!
+//! ````text
+//! ```scene sphere
+//! Sphere 1  0 1 0  red
+//! ```
+//! ````
+
+use anyhow::{Context, ensure};
+
+/// The language's page, from the root of the repository.
+pub(crate) const PAGE: &str = "docs/language.md";
+/// Where its pictures are, from the root of the repository.
+pub(crate) const PICTURES: &str = "docs/images/language";
+
+/// What examples that are not whole share.
+const STAGE: &str = "stage";
+/// Examples whose names start so show how a number changes, not a scene.
+const CURVE: &str = "curve-";
+
+/// A script of the page.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Example {
+    /// Also its picture's, without the ending.
+    pub(crate) name: String,
+    /// A whole script.
+    pub(crate) script: String,
+}
+
+impl Example {
+    /// Whether its picture is a plot of a number over the frames.
+    pub(crate) fn is_curve(&self) -> bool {
+        self.name.starts_with(CURVE)
+    }
+
+    /// The name of its picture's file.
+    pub(crate) fn file(&self) -> String {
+        format!("{}.{}", self.name, if self.is_curve() { "svg" } else { "png" })
+    }
+}
+
+/// All examples of a page, in its order; the stage alone is none.
+///
+/// # Errors
+/// When a name is there twice, or there is no stage for an example that needs it.
+pub(crate) fn examples(page: &str) -> anyhow::Result<Vec<Example>> {
+    let blocks = blocks(page);
+    let stage = blocks.iter().find(|(name, _)| *name == STAGE).map(|(_, text)| text.as_str());
+    let mut all: Vec<Example> = Vec::new();
+    for (name, text) in blocks.iter().filter(|(name, _)| *name != STAGE) {
+        ensure!(all.iter().all(|other| other.name != *name), "there are two scripts `{name}`");
+        let is_whole = text.lines().any(|line| line.starts_with("Screen"));
+        let script = if is_whole {
+            text.clone()
+        } else {
+            let stage = stage.with_context(|| format!("`{name}` needs a script `{STAGE}`"))?;
+            format!("{stage}{text}Trace\n")
+        };
+        all.push(Example { name: (*name).to_owned(), script });
+    }
+    Ok(all)
+}
+
+/// The blocks of code that are scripts with a name.
+fn blocks(page: &str) -> Vec<(&str, String)> {
+    let mut lines = page.lines();
+    let mut blocks = Vec::new();
+    while let Some(line) = lines.next() {
+        if let Some(name) = line.strip_prefix("```scene ") {
+            let text = lines.by_ref().take_while(|line| *line != "```").map(|line| format!("{line}\n"));
+            blocks.push((name.trim(), text.collect()));
+        }
+    }
+    blocks
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::fs;
+    use std::path::Path;
+
+    use rayfold_scene::{Command, Limits, parse};
+
+    use super::*;
+
+    /// Bytes of a picture: larger ones make the page slow to read.
+    const LARGEST: u64 = 100_000;
+
+    fn root() -> &'static Path {
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+    }
+
+    fn page() -> (String, Vec<Example>) {
+        let page = fs::read_to_string(root().join(PAGE)).unwrap();
+        let examples = examples(&page).unwrap();
+        (page, examples)
+    }
+
+    #[test]
+    fn what_is_not_whole_stands_on_the_stage() {
+        let page = "a\n```scene stage\nScreen 4 3\n```\n```scene a\nSphere 1\n```\nb\n```text\nno\n```\n\
+                    ```scene b\nScreen 2 1\nTrace\n```\n";
+        let example = |name: &str, script: &str| Example { name: name.into(), script: script.into() };
+        assert_eq!(
+            examples(page).unwrap(),
+            [example("a", "Screen 4 3\nSphere 1\nTrace\n"), example("b", "Screen 2 1\nTrace\n")]
+        );
+        assert!(examples("```scene a\nSphere 1\n```\n").is_err());
+        assert!(examples("```scene a\nScreen 1 1\n```\n```scene a\nScreen 1 1\n```\n").is_err());
+    }
+
+    #[test]
+    fn every_script_of_the_page_is_in_order() {
+        let (_, examples) = page();
+        for Example { name, script } in &examples {
+            let parsed = parse(name, script.as_bytes(), &Limits::default());
+            // The stage has more materials than each example uses.
+            let faults: Vec<_> = parsed
+                .diagnostics
+                .iter()
+                .filter(|d| d.is_error() || !d.message.contains("this material is not used"))
+                .map(|d| d.render(false))
+                .collect();
+            assert!(faults.is_empty(), "{}", faults.join("\n"));
+        }
+    }
+
+    #[test]
+    fn every_picture_of_the_page_is_there_and_is_drawn_by_it() {
+        let (page, examples) = page();
+        let files: BTreeSet<String> = examples.iter().map(Example::file).collect();
+        for file in &files {
+            let path = root().join(PICTURES).join(file);
+            let size =
+                fs::metadata(&path).unwrap_or_else(|e| panic!("cargo xtask pictures: {file}: {e}")).len();
+            assert!(size <= LARGEST, "{file} has {size} bytes");
+            assert!(page.contains(&format!("](images/language/{file})")), "the page does not show {file}");
+        }
+        let shown = page.split("](images/language/").skip(1).filter_map(|rest| rest.split(')').next());
+        let shown: BTreeSet<String> = shown.map(str::to_owned).collect();
+        let there: BTreeSet<String> = fs::read_dir(root().join(PICTURES))
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        assert_eq!((&shown, &there), (&files, &files), "what the page shows, and what is there");
+    }
+
+    #[test]
+    fn everything_of_the_language_has_a_picture() {
+        let (_, examples) = page();
+        let words: BTreeSet<String> = examples
+            .iter()
+            .flat_map(|example| example.script.split_whitespace())
+            .map(str::to_lowercase)
+            .collect();
+        let language = rayfold_scene::language();
+        let clauses = language.clauses.iter().map(|clause| clause.name);
+        for name in Command::ALL.iter().map(|command| command.name()).chain(clauses) {
+            // What these do to a pixel is not drawn by every version.
+            let is_of_sampling = ["Samples", "Shutter", "Lens"].contains(&name);
+            assert!(is_of_sampling || words.contains(&name.to_lowercase()), "no script uses `{name}`");
+        }
+        for mode in &language.curve_modes {
+            assert!(words.iter().any(|word| word.trim_start_matches('(') == mode.name), "{}", mode.name);
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! `cargo xtask pictures`: the pictures of the language's page, drawn from the scripts in it.
+//!
+//! Drawn by the program `rayfold` of this checkout, so that this one builds without a renderer. A picture is written only
+//! where it differs, so that an unchanged page changes no file.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, bail, ensure};
+use image::{ImageFormat, RgbImage};
+use rayfold_scene::{Limits, Script, parse};
+
+use crate::manual::{Example, PAGE, PICTURES, examples};
+use crate::plot;
+use crate::toolchain::say;
+
+/// What to draw.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Names of the pictures to draw; all of them, and none that is left over, when not given
+    names: Vec<String>,
+    /// The program that draws; this checkout's, built first, when not given
+    #[arg(long, value_name = "PROGRAM")]
+    rayfold: Option<PathBuf>,
+}
+
+/// Draws and writes what differs.
+///
+/// # Errors
+/// When a script is faulty, a name is none, or a file cannot be written.
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let page = fs::read_to_string(root.join(PAGE)).context(PAGE)?;
+    let examples = examples(&page).context(PAGE)?;
+    if let Some(unknown) =
+        args.names.iter().find(|name| examples.iter().all(|example| example.name != **name))
+    {
+        bail!("{PAGE} has no script `{unknown}`: its block would start with \"```scene {unknown}\"");
+    }
+    let folder = root.join(PICTURES);
+    fs::create_dir_all(&folder).context(PICTURES)?;
+    let is_meant = |example: &&Example| args.names.is_empty() || args.names.contains(&example.name);
+    for example in examples.iter().filter(is_meant) {
+        let picture = draw(example, args.rayfold.as_deref())
+            .with_context(|| format!("{PAGE}: the script `{}`", example.name))?;
+        write(&folder.join(example.file()), &picture)?;
+    }
+    if args.names.is_empty() {
+        remove_others(&folder, &examples)?;
+    }
+    Ok(())
+}
+
+/// The bytes of its file.
+fn draw(example: &Example, rayfold: Option<&Path>) -> anyhow::Result<Vec<u8>> {
+    let script = script(example)?;
+    if example.is_curve() {
+        return plot::svg(&script).map(String::into_bytes);
+    }
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("script.txt");
+    fs::write(&path, &example.script)?;
+    let status = match rayfold {
+        Some(program) => Command::new(program),
+        None => cargo_run(),
+    }
+    .args(["render", "--quiet", "--output"])
+    .arg(folder.path().join("%d.png"))
+    .arg(&path)
+    .status()
+    .context("rayfold could not be run")?;
+    ensure!(status.success(), "it could not be drawn");
+    // Of an animation its frames side by side.
+    let frame = |k: usize| Ok(image::open(folder.path().join(format!("{k}.png")))?.into_rgb8());
+    let frames: Vec<RgbImage> = (1..=script.frame_count()).map(frame).collect::<anyhow::Result<_>>()?;
+    let mut png = std::io::Cursor::new(Vec::new());
+    side_by_side(&frames)?.write_to(&mut png, ImageFormat::Png)?;
+    Ok(png.into_inner())
+}
+
+/// The program of this checkout.
+fn cargo_run() -> Command {
+    let mut command = Command::new(env!("CARGO"));
+    command.args(["run", "--quiet", "--package", "rayfold", "--"]);
+    command
+}
+
+fn script(example: &Example) -> anyhow::Result<Script> {
+    let parsed = parse(&example.name, example.script.as_bytes(), &Limits::default());
+    let faults = || parsed.diagnostics.iter().map(|d| d.render(false)).collect::<String>();
+    parsed.script.with_context(faults)
+}
+
+/// Pictures of one height, from left to right.
+fn side_by_side(pictures: &[RgbImage]) -> anyhow::Result<RgbImage> {
+    let height = pictures.first().context("a script has a frame")?.height();
+    let mut strip = RgbImage::new(pictures.iter().map(RgbImage::width).sum(), height);
+    let mut left = 0;
+    for picture in pictures {
+        image::imageops::replace(&mut strip, picture, left, 0);
+        left += i64::from(picture.width());
+    }
+    Ok(strip)
+}
+
+/// Writes a file unless it is as it should be.
+fn write(path: &PathBuf, bytes: &[u8]) -> anyhow::Result<()> {
+    if fs::read(path).is_ok_and(|there| there == bytes) {
+        return Ok(());
+    }
+    fs::write(path, bytes).with_context(|| path.display().to_string())?;
+    say(&format!("{}", path.file_name().unwrap_or_default().display()));
+    Ok(())
+}
+
+/// Removes pictures that no script draws any more.
+fn remove_others(folder: &Path, examples: &[Example]) -> anyhow::Result<()> {
+    for entry in fs::read_dir(folder).context(PICTURES)? {
+        let entry = entry?;
+        if examples.iter().all(|example| entry.file_name() != example.file().as_str()) {
+            fs::remove_file(entry.path()).with_context(|| entry.path().display().to_string())?;
+            say(&format!("{} is removed", entry.file_name().display()));
+        }
+    }
+    Ok(())
+}
