@@ -351,9 +351,11 @@ fn aim<S: Simd, E: Real>(simd: S, moment: &Moment<E>, queue: &mut Queue<E>) {
 fn note_objects<E: Real>(hits: &Hits<E>, lanes: usize, objects: &mut [u32; ROOM]) {
     objects.fill(NOTHING);
     for &(at, _) in &hits.packets {
-        for ray in at..(at + lanes).min(ROOM) {
-            if hits.distance.0[ray].widen() < E::FAR {
-                objects[ray] = hits.order.0[ray].to_index() as u32;
+        let end = (at + lanes).min(ROOM);
+        let hits = hits.distance.0[at..end].iter().zip(&hits.order.0[at..end]);
+        for (object, (distance, order)) in objects[at..end].iter_mut().zip(hits) {
+            if distance.widen() < E::FAR {
+                *object = order.to_index() as u32;
             }
         }
     }
