@@ -1,0 +1,111 @@
+//! A slice of the search; `rayfold-bench explore` goes to the end.
+
+use super::*;
+
+/// States of a world up to which every `cargo test` searches it.
+const SMALL: u64 = 2_000;
+
+/// States of every other world that are seen.
+const SLICE: u64 = 300;
+
+/// Worlds of no more states than that, searched to their ends.
+const SMALL_WORLDS: [&str; 9] = [
+    "one frame, a kill",
+    "one frame, a kill and a late write",
+    "one frame, a lost answer",
+    "one frame, an event twice",
+    "one frame, an event lost",
+    "one frame, overwritten when done, a late write",
+    "one frame, deleted when done, a lost answer",
+    "two frames, one deleted when done, a kill",
+    "three frames, the last one new",
+];
+
+fn world(name: &str) -> World {
+    worlds().into_iter().find(|world| world.name == name).expect(name)
+}
+
+#[test]
+fn small_worlds_hold_whatever_happens_in_whatever_order() {
+    for name in SMALL_WORLDS {
+        let explored = explore(&world(name), None, SMALL).unwrap_or_else(|found| panic!("{found}"));
+        println!("{name}: {explored:?}");
+        assert!(explored.complete && explored.rests > 0, "{name}: {explored:?}");
+    }
+}
+
+#[test]
+fn large_worlds_hold_as_far_as_they_are_searched() {
+    for world in worlds() {
+        let explored = explore(&world, None, SLICE).unwrap_or_else(|found| panic!("{found}"));
+        assert!(explored.steps >= explored.states - 1, "{}: {explored:?}", world.name);
+    }
+}
+
+/// The search finds what breaks without the rule.
+#[track_caller]
+fn notices(rule: Mutation, name: &str, most: u64) {
+    let found = explore(&world(name), Some(rule), most).expect_err("a broken rule is noticed");
+    assert!(found.steps.len() > 5, "{found}");
+    println!("{rule:?}: {} states: {found}", found.states);
+}
+
+#[test]
+fn a_missing_second_listing_is_noticed() {
+    notices(Mutation::SkipSecondListing, "one of two frames, changed and changed back", 1_000_000);
+}
+
+#[test]
+fn claims_before_their_commit_are_noticed() {
+    notices(Mutation::ClaimBeforeCommit, "the second of two frames comes, goes and comes back", 1_000_000);
+}
+
+#[test]
+fn unconditional_manifests_are_noticed() {
+    notices(Mutation::DropIfMatch, "one frame, a kill and a late write", 1_000_000);
+}
+
+#[test]
+fn leaving_ones_own_commit_is_noticed() {
+    notices(Mutation::LeaveOwnCommit, "one frame, a kill", 1_000_000);
+}
+
+#[test]
+fn missing_claims_are_noticed() {
+    notices(Mutation::NeverClaim, "one frame, a kill", 1_000_000);
+}
+
+#[test]
+fn assemblers_that_leave_early_are_noticed() {
+    notices(Mutation::AssemblerLeavesEarly, "one frame, changed thrice when done", 1_000_000);
+}
+
+#[test]
+fn assemblers_that_do_not_look_again_are_noticed() {
+    notices(Mutation::AssemblerDoesNotLookAgain, "one frame, overwritten", 1_000_000);
+}
+
+#[test]
+fn unconditional_gifs_are_noticed() {
+    notices(Mutation::DropGifCondition, "one frame, overwritten twice when done, a late write", 1_000_000);
+}
+
+#[test]
+fn measure() {
+    let worlds = provoking();
+    for rule in [Mutation::ClaimBeforeCommit, Mutation::DropGifCondition, Mutation::AssemblerDoesNotLookAgain]
+    {
+        let n = (0..500).filter(|seed| provoke(&worlds, *seed, Some(rule)).is_err()).collect::<Vec<_>>();
+        println!("MEASURE {rule:?}: {} of 500: {n:?}", n.len());
+    }
+}
+
+#[test]
+fn a_seed_gives_the_same_schedule() {
+    let noticed = || {
+        let worlds = provoking();
+        let rule = Some(Mutation::NeverClaim);
+        (0..20).map(|seed| provoke(&worlds, seed, rule).err().map(|found| found.steps)).collect::<Vec<_>>()
+    };
+    assert_eq!(noticed(), noticed());
+}
