@@ -565,7 +565,7 @@ async fn settings_that_could_not_be_read_are_read_again() {
 /// Three restarts counted as three attempts: then 75 s of a busy store failed a frame for good, and so did the next sweep.
 #[tokio::test]
 async fn restarts_are_no_attempts_at_a_frame() {
-    let mut world = World::new();
+    let world = World::new();
     world.put("scripts/a/1.txt", script(1, 1)).await;
     let catch_up = Policy { stuck_after: Duration::ZERO, attempts_count: false, ..world.policy.clone() };
     let begun_attempts = async |world: &World| {
