@@ -8,7 +8,6 @@
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::num::NonZeroU64;
 use std::ops::Range;
 use std::pin::Pin;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -401,7 +400,7 @@ impl Renderer for Drawer {
     async fn draw(&self, name: &ScriptName, script: Bytes, part: Part) -> Result<Drawing> {
         Ok(match (Play::of(&script), part) {
             (Play::Frame, None) | (Play::Split(_), Some(_)) => {
-                Drawing::Frame(picture(name, &script, part.map(NonZeroU64::from)).into())
+                Drawing::Frame(picture(name, &script, part).into())
             }
             (Play::Split(count), None) => Drawing::Split(count),
             (Play::Bad | Play::Hang | Play::Crash | Play::Frame, _) => {

@@ -228,19 +228,19 @@ impl State {
                     Some(text) => Request::Put(key.clone(), (*text).into(), PutOptions::always()),
                     None => Request::Delete(key.clone()),
                 };
-                next.apply(world, memo, request, None, delivery)?;
+                next.apply(memo, request, None, delivery)?;
             }
             Choice::Ghost(place) => {
                 let ghost = next.ghosts.swap_remove(place);
                 next.needs_sweep = true;
-                next.apply(world, memo, ghost.request.clone(), Some(ghost.listed), Delivery::Once)?;
+                next.apply(memo, ghost.request.clone(), Some(ghost.listed), Delivery::Once)?;
             }
             Choice::Request { process: place, slot, fate } => {
                 let process = self.processes[place].clone();
                 let Some((_, request)) = process.standing.requests.iter().find(|(of, _)| *of == slot) else {
                     return Err("a request that nobody has sent".to_owned());
                 };
-                next.meet(world, memo, (place, &process), (slot, request.clone()), fate)?;
+                next.meet(memo, (place, &process), (slot, request.clone()), fate)?;
             }
         }
         Ok(next)
@@ -248,7 +248,6 @@ impl State {
 
     fn meet(
         &mut self,
-        world: &World,
         memo: &mut Memo,
         (place, process): (usize, &Arc<Process>),
         (slot, request): (u32, Request),
@@ -256,18 +255,18 @@ impl State {
     ) -> Result<(), String> {
         let listed = Some(process.listed);
         let answer = match fate {
-            Fate::Answered(delivery) => Some(self.apply(world, memo, request, listed, delivery)?),
+            Fate::Answered(delivery) => Some(self.apply(memo, request, listed, delivery)?),
             Fate::Lost { effect } => {
                 self.budget.losses -= 1;
                 if effect {
-                    self.apply(world, memo, request, listed, Delivery::Once)?;
+                    self.apply(memo, request, listed, Delivery::Once)?;
                 }
                 Some(Answer::Lost)
             }
             Fate::Killed { effect } => {
                 self.budget.kills -= 1;
                 if effect {
-                    self.apply(world, memo, request, listed, Delivery::Once)?;
+                    self.apply(memo, request, listed, Delivery::Once)?;
                 }
                 None
             }
@@ -303,7 +302,6 @@ impl State {
     /// Has a request take effect, and fires what follows.
     fn apply(
         &mut self,
-        world: &World,
         memo: &mut Memo,
         request: Request,
         listed: Option<Timestamp>,
@@ -318,7 +316,7 @@ impl State {
             Request::List(request) => Ok(Answer::Page(self.contents.bucket.list(&request))),
             Request::Delete(key) => {
                 if Arc::make_mut(&mut self.contents).delete(&key) {
-                    self.changed(world, memo, &key, None, listed, delivery)?;
+                    self.changed(memo, &key, false, listed, delivery)?;
                 }
                 Ok(Answer::Deleted)
             }
@@ -330,7 +328,7 @@ impl State {
                         if let Some(listed) = listed {
                             self.watch(&key, &etag, before, listed)?;
                         }
-                        self.changed(world, memo, &key, Some(()), listed, delivery)?;
+                        self.changed(memo, &key, true, listed, delivery)?;
                         Ok(Answer::ETag(etag))
                     }
                     Err(Error::NotFound { .. }) => Ok(Answer::NotFound),
@@ -342,17 +340,16 @@ impl State {
 
     fn changed(
         &mut self,
-        _: &World,
         memo: &mut Memo,
         key: &str,
-        there: Option<()>,
+        there: bool,
         listed: Option<Timestamp>,
         delivery: Delivery,
     ) -> Result<(), String> {
         if listed.is_some() && key.starts_with("scripts/") {
             return Err(format!("a function wrote {key}"));
         }
-        let Some(work) = work_of(key, there.is_some()) else { return Ok(()) };
+        let Some(work) = work_of(key, there) else { return Ok(()) };
         let copies = match delivery {
             Delivery::Once => 1,
             Delivery::Twice => {
