@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use rayfold_lambda::animator::GifAnimator;
 use rayfold_lambda::raytracer::RayTracer;
+use rayfold_pipeline::failure::{End, Failure, Recorded};
 use rayfold_pipeline::keys::{Animation, Key, Receipt};
 use rayfold_pipeline::manifest::{FrameState, Manifest, Status};
 use rayfold_pipeline::render::Outcome;
@@ -17,7 +18,7 @@ use rayfold_pipeline::retry::{Scope, retry};
 use rayfold_pipeline::store::{ListRequest, MemoryStore, PutOptions, Store};
 use rayfold_pipeline::sweep::Visit;
 use rayfold_pipeline::{
-    Clock, Invocation, Policy, Randomness, Result, Timestamp, assemble, render_frame, sweep,
+    Clock, Invocation, Policy, Randomness, Result, Timestamp, assemble, record_failure, render_frame, sweep,
 };
 
 /// A clock that jumps to wherever someone waits for.
@@ -91,7 +92,7 @@ impl World {
                 if prefix == "assemblies/" {
                     let invocation =
                         Invocation::new(&self.store, &self.clock, &self.random, &self.policy, &listed.key);
-                    require_send(assemble(&invocation, &GifAnimator, &listed.key)).await.unwrap();
+                    require_send(assemble(&invocation, &GifAnimator::default(), &listed.key)).await.unwrap();
                 } else {
                     self.event(&listed.key).await;
                 }
@@ -467,4 +468,133 @@ async fn what_is_too_large_is_named_and_not_read_whole() {
     let long = script(2, 1) + &"#".repeat(1_000_000);
     let Outcome::Faulty(reason) = world.upload("scripts/a/2.txt", &long).await else { panic!("it is drawn") };
     assert!(reason.message.contains("200 bytes"), "{}", reason.message);
+}
+
+/// A frame that was none was refused without its name, and `retry` went round in circles.
+#[tokio::test]
+async fn a_frame_that_is_none_is_drawn_anew_and_in_the_end_named() {
+    let mut world = World::new();
+    world.upload("scripts/a/1.txt", &script(1, 1)).await;
+    let frames = world.store.list(ListRequest::all("frames/a/1@")).await.unwrap().objects;
+    let key = &frames[0].key;
+    let whole = world.store.get(key).await.unwrap().body;
+    // Of the next set it is a part.
+    for (number, garbage) in
+        ["".into(), "garbage".into(), whole.slice(..whole.len() / 2)].into_iter().enumerate()
+    {
+        world.put(key, garbage).await;
+        world.upload("scripts/a/2.txt", &script(number as u32 + 2, 1)).await;
+        world.deliver().await;
+        assert_eq!(world.manifest("a").await.head.status, Status::Done, "{number}");
+        let expected = local_gif(&[script(1, 1), script(number as u32 + 2, 1)], 10.0);
+        assert!(world.gif("a").await.unwrap() == expected, "{number}");
+        assert!(world.store.get(key).await.unwrap().body == whole, "{number}");
+    }
+    // As often as a frame may be tried: from now on it is named.
+    world.put(key, "garbage").await;
+    world.upload("scripts/a/2.txt", &script(9, 1)).await;
+    world.deliver().await;
+    let manifest = world.manifest("a").await;
+    assert_eq!((manifest.head.status, manifest.head.failed), (Status::Failed, 1));
+    let FrameState::Failed(fault) = &manifest.frames[0].state else { panic!() };
+    let message = &fault.reason.as_ref().unwrap().message;
+    assert!(message.starts_with(&format!("{key} is no frame, though drawn 3 times: ")), "{message}");
+
+    let animation = Animation::new("a").unwrap();
+    let invocation = Invocation::new(&world.store, &world.clock, &world.random, &world.policy, "retry");
+    retry(&invocation, &animation, Scope::Failed).await.unwrap();
+    world.delivered.clear();
+    world.deliver().await;
+    assert_eq!(world.manifest("a").await.head.status, Status::Done);
+    assert!(world.gif("a").await.unwrap() == local_gif(&[script(1, 1), script(9, 1)], 10.0));
+}
+
+/// One animation of millions of frames, or one script of them, could be drawn at others' cost.
+#[tokio::test]
+async fn of_an_animation_with_too_many_frames_no_more_are_drawn() {
+    let mut world = World::new();
+    world.policy.most_frames = Some(3);
+    let Outcome::Faulty(reason) = world.upload("scripts/b/1.txt", &script(1, 4)).await else { panic!() };
+    assert!(reason.message.starts_with("1.txt has 4 frames: expected at most 3"), "{}", reason.message);
+    assert!(world.store.list(ListRequest::all("parts/b/")).await.unwrap().objects.is_empty());
+
+    world.upload("scripts/a/1.txt", &script(1, 3)).await;
+    assert_eq!(world.manifest("a").await.head.status, Status::Done, "at the limit");
+    world.upload("scripts/a/2.txt", &script(2, 1)).await;
+    let head = world.manifest("a").await.head;
+    assert_eq!((head.status, head.total), (Status::Failed, 4));
+    let message = head.excess.unwrap().message;
+    assert!(message.starts_with("the animation has 4 frames: expected at most 3"), "{message}");
+    assert_eq!(world.gif("a").await, None, "it is failed, not shortened");
+    for number in 3..9 {
+        let outcome = world.upload(&format!("scripts/a/{number}.txt"), &script(number, 1)).await;
+        assert_eq!(outcome, Outcome::TooMany);
+    }
+    let head = world.manifest("a").await.head;
+    assert_eq!((head.status, head.total, head.pending), (Status::Failed, 10, 6));
+    world.clock.sleep(Duration::from_secs(48 * 3600)).await;
+    assert_eq!(world.sweep().await, Visit::default(), "the sweep wakes none of them");
+
+    for number in (1..9).filter(|number| *number != 4 && *number != 5) {
+        world.remove(&format!("scripts/a/{number}.txt")).await;
+    }
+    assert_eq!(world.manifest("a").await.head.status, Status::Rendering);
+    world.clock.sleep(Duration::from_secs(48 * 3600)).await;
+    assert_eq!(world.sweep().await.woken, 2, "now there is room for them");
+    assert!(world.gif("a").await.unwrap() == local_gif(&[script(4, 1), script(5, 1)], 10.0));
+}
+
+/// What an older function could not read stayed a fault for good, though a newer one can.
+#[tokio::test]
+async fn settings_that_could_not_be_read_are_read_again() {
+    let mut world = World::new();
+    world.upload("scripts/a/animation.json", r#"{"fps": 20}"#).await;
+    world.upload("scripts/a/1.txt", &script(1, 1)).await;
+    let manifest = world.store.get("manifests/a.json").await.unwrap().body;
+    let text = std::str::from_utf8(&manifest).unwrap();
+    let value = text.find("\"value\":{").unwrap();
+    let end = value + text[value..].find('}').unwrap() + 1;
+    let older = format!("{}\"fault\":{{\"message\":\"unknown\"}}{}", &text[..value], &text[end..]);
+    world.put("manifests/a.json", older.replace("\"status\":\"done\"", "\"status\":\"failed\"")).await;
+    assert!(world.manifest("a").await.head.settings.fault.is_some());
+    world.sweep().await;
+    let head = world.manifest("a").await.head;
+    assert_eq!((head.status, head.settings.fault), (Status::Done, None));
+}
+
+/// Three restarts counted as three attempts: then 75 s of a busy store failed a frame for good, and so did the next sweep.
+#[tokio::test]
+async fn restarts_are_no_attempts_at_a_frame() {
+    let world = World::new();
+    world.put("scripts/a/1.txt", script(1, 1)).await;
+    let catch_up = Policy { stuck_after: Duration::ZERO, attempts_count: false, ..world.policy.clone() };
+    let begun_attempts = async |world: &World| {
+        let receipts = world.store.list(ListRequest::all("frames/a/")).await.unwrap().objects;
+        receipts.iter().filter(|listed| listed.key.contains(".begun-")).count()
+    };
+    for restart in 1..=5 {
+        let id = format!("catch-up-{restart}");
+        let invocation = Invocation::new(&world.store, &world.clock, &world.random, &catch_up, &id);
+        let swept = sweep(&invocation).await.unwrap();
+        let visit = *swept.visits[0].1.as_ref().unwrap();
+        assert_eq!((visit.woken, visit.given_up), (1, 0), "restart {restart}");
+        assert_eq!(begun_attempts(&world).await, 0, "restart {restart}");
+        // The woken invocation begins, and is cut off with the next restart.
+        let retries = world.store.list(ListRequest::all("retries/")).await.unwrap().objects;
+        world.put(&begun(&retries.last().unwrap().key), "").await;
+    }
+    let key = "scripts/a/1.txt".to_owned();
+    let failure = |end: End| Failure { key: key.clone(), version: None, attempts: 3, end };
+    for _ in 0..5 {
+        let invocation = Invocation::new(&world.store, &world.clock, &world.random, &world.policy, "record");
+        let recorded = record_failure(&invocation, &failure(End::Error("busy".into()))).await.unwrap();
+        assert!(matches!(recorded, Recorded::Woken { .. } | Recorded::LeftToSweep), "{recorded:?}");
+    }
+    // Attempts that did begin count.
+    for retry in world.store.list(ListRequest::all("retries/")).await.unwrap().objects {
+        world.put(&begun(&retry.key), "").await;
+    }
+    let invocation = Invocation::new(&world.store, &world.clock, &world.random, &world.policy, "record");
+    let recorded = record_failure(&invocation, &failure(End::Error("busy".into()))).await.unwrap();
+    assert!(matches!(recorded, Recorded::GivenUp(_)), "{recorded:?}");
 }

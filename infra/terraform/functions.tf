@@ -15,7 +15,7 @@ locals {
   # What a script may ask for. The defaults fit the render function's memory, as measured with spheres, boxes and
   # triangles: a megabyte holds 1,700 objects with their part of the script and of the search tree, and an image takes six
   # bytes a pixel with its PNG.
-  limits = {
+  limits_of_scripts = {
     RAYFOLD_MAX_FRAMES       = tostring(var.limits.max_frames)
     RAYFOLD_MAX_LIGHTS       = tostring(var.limits.max_lights)
     RAYFOLD_MAX_SCRIPT_BYTES = tostring(var.limits.max_script_bytes)
@@ -23,6 +23,11 @@ locals {
       var.limits.max_objects,
       max(10000, min(4000000, (var.render.memory_mb - 700) * 1700)),
     ))
+  }
+
+  # What every function knows: those that assemble read frames, and all of them write manifests.
+  limits_of_animations = {
+    RAYFOLD_MAX_ANIMATION_FRAMES = tostring(var.limits.max_animation_frames)
     RAYFOLD_MAX_PIXELS = tostring(coalesce(
       var.limits.max_pixels,
       min(64000000, var.render.memory_mb * 50000),
@@ -75,7 +80,8 @@ resource "aws_lambda_function" "this" {
     variables = merge(
       # Events name their bucket; the sweep and the failure queue's records are told which one to look at.
       { RAYFOLD_BUCKET = aws_s3_bucket.this.bucket },
-      each.value.program == "render" ? local.limits : {},
+      local.limits_of_animations,
+      each.value.program == "render" ? local.limits_of_scripts : {},
     )
   }
 

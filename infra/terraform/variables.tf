@@ -227,13 +227,14 @@ variable "record" {
 }
 
 variable "limits" {
-  description = "What a script may ask for: Traces (each is an invocation), pixels of an image, objects, lights, bytes. Null pixels and objects are as many as fit render.memory_mb: 64,000,000 and 1,817,300 with its default"
+  description = "What a script may ask for: Traces (each is an invocation), pixels of an image, objects, lights, bytes; and how many frames an animation may have, beyond which no more are drawn. Null pixels and objects are as many as fit render.memory_mb: 64,000,000 and 1,817,300 with its default"
   type = object({
-    max_frames       = optional(number, 10000)
-    max_pixels       = optional(number)
-    max_objects      = optional(number)
-    max_lights       = optional(number, 1024)
-    max_script_bytes = optional(number, 268435456)
+    max_animation_frames = optional(number, 100000)
+    max_frames           = optional(number, 10000)
+    max_pixels           = optional(number)
+    max_objects          = optional(number)
+    max_lights           = optional(number, 1024)
+    max_script_bytes     = optional(number, 268435456)
   })
   default  = {}
   nullable = false

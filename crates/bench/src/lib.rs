@@ -11,6 +11,8 @@ pub mod backends;
 #[cfg(feature = "bucket")]
 pub mod cold_start;
 pub mod cpu_time;
+#[cfg(feature = "bucket")]
+pub mod explore;
 pub mod fingerprints;
 pub mod gif;
 pub mod hard_cases;

@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use rayfold_bench::{accuracy, fingerprints, gif, measure, needs, parsing, sampling, speed};
 #[cfg(feature = "bucket")]
-use rayfold_bench::{cold_start, pipeline, simulate};
+use rayfold_bench::{cold_start, explore, pipeline, simulate};
 
 #[derive(Debug, Parser)]
 #[command(name = "rayfold-bench", about = "Measures rayfold and writes the reports in docs/reports")]
@@ -27,6 +27,9 @@ enum Measurement {
     /// The pipeline's protocol in a simulated world: seeds, broken rules, requests at scale
     #[cfg(feature = "bucket")]
     Simulate(simulate::Args),
+    /// The pipeline's protocol in small worlds: every interleaving, and schedules that provoke
+    #[cfg(feature = "bucket")]
+    Explore(explore::Args),
     /// Time, memory, size and quality of GIFs, beside those of other encoders
     Gif(gif::Args),
     /// A line for each of many pictures, by which the program before a change is compared with the one after
@@ -52,6 +55,8 @@ fn main() -> anyhow::Result<()> {
         Measurement::Parsing(args) => parsing::run(&args),
         #[cfg(feature = "bucket")]
         Measurement::Simulate(args) => simulate::run(&args),
+        #[cfg(feature = "bucket")]
+        Measurement::Explore(args) => explore::run(&args),
         Measurement::Gif(args) => gif::run(&args),
         Measurement::Fingerprints(args) => fingerprints::run(&args),
         Measurement::Measure(args) => measure::run(&args),

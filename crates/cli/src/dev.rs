@@ -51,9 +51,9 @@ pub(crate) struct Args {
     /// Where objects and credentials are kept [default: rayfold/dev in the user's data folder]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// How many processes of a function run at once
-    #[arg(long, value_name = "N", default_value = "10", value_parser = values::count::<u16>)]
-    concurrency: u16,
+    /// How many processes of a function run at once [default: one a core, two at least]
+    #[arg(long, value_name = "N", value_parser = values::count::<u16>)]
+    concurrency: Option<u16>,
     /// Where S3 listens; port 0 stands for any [default: 127.0.0.1:9000, or any port when that is taken]
     #[arg(long, value_name = "IP:PORT")]
     address: Option<SocketAddr>,
@@ -91,9 +91,9 @@ async fn serve(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let plan =
         Plan { store: args.store, data: data.clone(), address, bucket: args.bucket.clone(), functions };
     let settings = |settings: &mut Settings| {
-        settings.concurrency = usize::from(args.concurrency);
-        // An animation in which nothing has happened for so long has lost an event.
-        settings.environment.push(("RAYFOLD_STUCK_AFTER_MS".into(), "60000".into()));
+        settings.concurrency = args.concurrency.map_or_else(usual_concurrency, usize::from);
+        let stuck_after_ms = stuck_after(settings.timeout).as_millis().to_string();
+        settings.environment.push(("RAYFOLD_STUCK_AFTER_MS".into(), stuck_after_ms));
     };
     let start = Platform::start(&plan, settings, &mut say);
     let mut platform = tokio::select! {
@@ -172,8 +172,35 @@ fn default_data() -> anyhow::Result<PathBuf> {
     Ok(base.context("no home folder: say where the data goes by --data")?.join("rayfold/dev"))
 }
 
+/// A drawing takes all the time of a core: more processes than cores only make each other late.
+fn usual_concurrency() -> usize {
+    std::thread::available_parallelism().map_or(2, usize::from).max(2)
+}
+
+/// An animation in which nothing has happened for so long has lost an event: longer than a frame may be drawn, so that
+/// none is drawn twice at once.
+fn stuck_after(timeout: Duration) -> Duration {
+    timeout + timeout / 10
+}
+
 /// MinIO's usual port, for either store, so that what another terminal has exported stays right from run to run.
 fn usual_address() -> SocketAddr {
     let usual = SocketAddr::from(([127, 0, 0, 1], 9000));
     if std::net::TcpListener::bind(usual).is_ok() { usual } else { rayfold_local::any_port() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Frames that were drawn for more than a minute were woken, and drawn twice at once; ten at a time, on two cores.
+    #[test]
+    fn frames_are_not_woken_while_they_may_be_drawn() {
+        for seconds in [1, 300, 900] {
+            let timeout = Duration::from_secs(seconds);
+            assert!(stuck_after(timeout) > timeout);
+        }
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        assert_eq!(usual_concurrency(), cores.max(2));
+    }
 }

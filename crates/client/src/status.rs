@@ -25,6 +25,8 @@ pub fn obstacles(manifest: &Manifest) -> Vec<Obstacle<'_>> {
     let head = &manifest.head;
     let settings = head.settings.fault.as_ref();
     let settings = settings.map(|reason| Obstacle { what: SETTINGS_FILE.to_owned(), reason: Some(reason) });
+    let excess = head.excess.as_ref();
+    let excess = excess.map(|reason| Obstacle { what: head.animation.to_string(), reason: Some(reason) });
     let frames = manifest.frames.iter().filter_map(|frame| match &frame.state {
         FrameState::Failed(fault) => {
             Some(Obstacle { what: frame_name(frame), reason: fault.reason.as_ref() })
@@ -36,7 +38,7 @@ pub fn obstacles(manifest: &Manifest) -> Vec<Obstacle<'_>> {
         what: format!("the GIF of {}", head.animation),
         reason: fault.reason.as_ref(),
     });
-    settings.into_iter().chain(frames).chain(refusal).collect()
+    settings.into_iter().chain(excess).chain(frames).chain(refusal).collect()
 }
 
 /// The script of a frame, and which of its frames it is, for people.
@@ -72,7 +74,7 @@ impl<'a, S: Store, C: Clock> Client<'a, S, C> {
         Ok(names)
     }
 
-    /// A first look at each of these animations, in their order.
+    /// A first look at each of these animations, in their order, and whether it is behind their scripts.
     ///
     /// # Errors
     /// Those of the store.
@@ -81,6 +83,7 @@ impl<'a, S: Store, C: Clock> Client<'a, S, C> {
             let mut watch = Watch::new(*self, animation.clone());
             async move {
                 watch.look().await?;
+                watch.compare().await?;
                 Ok::<_, Error>(watch)
             }
         });
@@ -107,6 +110,32 @@ mod tests {
         let looks = world.client().look(&names).await.unwrap();
         let seen: Vec<_> = looks.iter().map(|watch| (watch.is_settled(), watch.is_current())).collect();
         assert_eq!(seen, [(true, true), (true, true), (false, false)]);
+    }
+
+    /// "Done, GIF current" stood there while the functions could not read what had been uploaded.
+    #[tokio::test]
+    async fn what_the_functions_have_not_seen_is_not_done() {
+        let world = World::new();
+        world.put("scripts/film/1.txt", "frame").await;
+        world.put("scripts/film/notes.md", "not ours").await;
+        world.functions().await;
+        let seen = async |world: &World| {
+            let looks = world.client().look(&[world.film()]).await.unwrap();
+            (looks[0].is_behind(), looks[0].is_settled(), looks[0].is_current())
+        };
+        assert_eq!(seen(&world).await, (false, true, true));
+        for (key, text) in [
+            ("scripts/film/animation.json", "[]"),
+            ("scripts/film/animation.json", r#"{"fps": 20}"#),
+            ("scripts/film/1.txt", "other"),
+            ("scripts/film/2.txt", "more"),
+        ] {
+            world.put(key, text).await;
+            assert_eq!(seen(&world).await, (true, false, false), "{key}");
+            world.functions().await;
+            let (is_behind, is_settled, is_current) = seen(&world).await;
+            assert_eq!((is_behind, is_settled, is_current), (false, true, text != "[]"), "{key}");
+        }
     }
 
     #[tokio::test]

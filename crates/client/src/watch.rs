@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use rayfold_pipeline::assemble::generation_of;
-use rayfold_pipeline::keys::Animation;
+use rayfold_pipeline::keys::{Animation, Key};
 use rayfold_pipeline::manifest::{Manifest, Status};
 use rayfold_pipeline::store::{ETag, ListRequest, ObjectInfo, Store};
 use rayfold_pipeline::{Clock, Timestamp, found};
@@ -31,6 +31,7 @@ pub struct Watch<'a, S, C> {
     manifest: Option<Manifest>,
     is_unreadable: bool,
     gif: Option<ObjectInfo>,
+    is_behind: bool,
     has_looked: bool,
     started: Timestamp,
 }
@@ -69,6 +70,7 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
             manifest: None,
             is_unreadable: false,
             gif: None,
+            is_behind: false,
             has_looked: false,
             started,
         }
@@ -132,6 +134,23 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
         Ok(changed)
     }
 
+    /// Looks whether the manifest is about the scripts that there are: until the functions have seen an upload it is about
+    /// older ones, and so is the GIF.
+    ///
+    /// # Errors
+    /// Those of the store.
+    pub async fn compare(&mut self) -> Result<()> {
+        let Some(manifest) = &self.manifest else { return Ok(()) };
+        let versions = self.client.versions(&self.animation).await?;
+        self.is_behind = !stands_for(manifest, &self.animation, &versions);
+        Ok(())
+    }
+
+    /// The functions have not seen the newest scripts, as the last comparison found.
+    pub fn is_behind(&self) -> bool {
+        self.is_behind
+    }
+
     /// The same, but a store that is busy or out of reach for a moment is no reason to give up.
     ///
     /// # Errors
@@ -164,15 +183,16 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
         }
     }
 
-    /// The GIF shows what the manifest says.
+    /// The GIF shows what the manifest says, and the manifest is about the newest scripts.
     pub fn is_current(&self) -> bool {
         let generation = self.manifest.as_ref().map(|manifest| manifest.head.generation.as_str());
-        generation.is_some() && generation_of(self.gif.as_ref()) == generation
+        !self.is_behind && generation.is_some() && generation_of(self.gif.as_ref()) == generation
     }
 
     /// Nothing more will happen unless somebody changes something.
     pub fn is_settled(&self) -> bool {
         match self.manifest.as_ref().map(|manifest| manifest.head.status) {
+            _ if self.is_behind => false,
             None | Some(Status::Waiting | Status::Rendering) => false,
             Some(Status::Done) => self.is_current(),
             Some(Status::Empty) => self.gif.is_none(),
@@ -193,6 +213,14 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
 }
 
 impl<S: Store, C: Clock> Client<'_, S, C> {
+    /// The versions of the animation's scripts and settings by key.
+    async fn versions(&self, animation: &Animation) -> Result<BTreeMap<String, ETag>> {
+        let listing = self.list(ListRequest::level(animation.scripts())).await?;
+        let is_ours = |key: &str| matches!(key.parse::<Key>(), Ok(Key::Script { .. } | Key::Settings { .. }));
+        let ours = listing.objects.into_iter().filter(|object| is_ours(&object.key));
+        Ok(ours.map(|object| (object.key, object.etag)).collect())
+    }
+
     /// Waits until what was submitted has become a GIF, or the manifest says why it will not.
     ///
     /// # Errors

@@ -14,7 +14,7 @@ use rayfold_pipeline::store::{
     ETag, ListPage, ListRequest, Listing, MemoryStore, MemoryUpload, Object, ObjectInfo, PutOptions, Store,
 };
 use rayfold_pipeline::{
-    Animator, Clock, Drawing, Encoding, Invocation, Policy, Randomness, Renderer, Result, Timestamp,
+    Animator, Clock, Drawing, Encoding, Invocation, Policy, Randomness, Renderer, Result, Timestamp, Unfit,
     assemble, render_frame,
 };
 use rayfold_scene::AnimationSettings;
@@ -210,7 +210,11 @@ impl World {
         if matches!(key.parse(), Ok(Key::Claim { .. })) {
             assemble(&invocation, &Joiner, key).await.unwrap();
         } else {
-            render_frame(&invocation, &OneLine, key).await.unwrap();
+            match render_frame(&invocation, &OneLine, key).await {
+                // What is no script is nobody's.
+                Err(rayfold_pipeline::Error::Key { .. }) => {}
+                rendered => drop(rendered.unwrap()),
+            }
         }
     }
 }
@@ -246,7 +250,7 @@ impl Animator for Joiner {
 }
 
 impl Encoding for Joined {
-    async fn push(&mut self, frame: Bytes) -> Result<Bytes, Reason> {
+    async fn push(&mut self, frame: Bytes) -> Result<Bytes, Unfit> {
         self.0.extend_from_slice(&frame);
         Ok(Bytes::new())
     }

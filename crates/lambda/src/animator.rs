@@ -6,14 +6,23 @@ use std::sync::{Arc, Mutex, PoisonError};
 use bytes::Bytes;
 use rayfold_gif::Encoder;
 use rayfold_pipeline::manifest::Reason;
-use rayfold_pipeline::{Animator, Encoding};
-use rayfold_scene::AnimationSettings;
+use rayfold_pipeline::{Animator, Encoding, Unfit};
+use rayfold_scene::{AnimationSettings, Limits};
 
 use crate::{png, pool};
 
 /// Makes GIFs.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct GifAnimator;
+#[derive(Debug, Clone, Copy)]
+pub struct GifAnimator {
+    /// Of a frame; what claims to have more is none that was drawn here.
+    pub most_pixels: u64,
+}
+
+impl Default for GifAnimator {
+    fn default() -> Self {
+        Self { most_pixels: Limits::PIXELS }
+    }
+}
 
 impl Animator for GifAnimator {
     type Encoding = GifEncoding;
@@ -22,7 +31,7 @@ impl Animator for GifAnimator {
         let ready = Shelf::default();
         let settings = rayfold_gif::Settings::new(settings.fps(), settings.loops());
         let encoder = Encoder::new(ready.clone(), settings).map_err(reason)?;
-        Ok(GifEncoding { encoder: Some(encoder), ready })
+        Ok(GifEncoding { encoder: Some(encoder), ready, most_pixels: self.most_pixels })
     }
 }
 
@@ -31,17 +40,20 @@ pub struct GifEncoding {
     /// `None` while a frame is worked on, and after a failure.
     encoder: Option<Encoder<Shelf>>,
     ready: Shelf,
+    most_pixels: u64,
 }
 
 impl Encoding for GifEncoding {
-    async fn push(&mut self, frame: Bytes) -> Result<Bytes, Reason> {
-        let mut encoder = self.encoder.take().ok_or_else(failed_before)?;
+    async fn push(&mut self, frame: Bytes) -> Result<Bytes, Unfit> {
+        let failed = || Unfit::Unlike(failed_before());
+        let mut encoder = self.encoder.take().ok_or_else(failed)?;
+        let most_pixels = self.most_pixels;
         let work = move || {
-            let image = png::decode(&frame).map_err(reason)?;
-            encoder.push(image).map_err(reason)?;
+            let image = png::decode(&frame, most_pixels).map_err(|error| Unfit::Corrupt(reason(error)))?;
+            encoder.push(image).map_err(|error| Unfit::Unlike(reason(error)))?;
             Ok(encoder)
         };
-        self.encoder = Some(pool::run(work).await.unwrap_or_else(|| Err(failed_before()))?);
+        self.encoder = Some(pool::run(work).await.unwrap_or_else(|| Err(failed()))?);
         Ok(self.ready.take())
     }
 

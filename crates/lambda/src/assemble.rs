@@ -117,7 +117,7 @@ async fn clean<S: Store>(context: &Context<S>, call: &Call, how: Sweep) -> Resul
     let policy = match how {
         Sweep::Patient => context.policy.clone(),
         Sweep::CatchUp => {
-            Policy { stuck_after: std::time::Duration::ZERO, attempts: u64::MAX, ..context.policy.clone() }
+            Policy { stuck_after: std::time::Duration::ZERO, attempts_count: false, ..context.policy.clone() }
         }
     };
     let swept = match sweep(&context.invocation(&policy, call)).await {
@@ -228,7 +228,7 @@ mod tests {
             store: Faulty(store),
             bucket: "films".into(),
             renderer: RayTracer::default(),
-            animator: GifAnimator,
+            animator: GifAnimator::default(),
             policy: Policy { request_attempts: 1, ..Policy::new(1) },
             random: Randomness::seeded(1),
         }

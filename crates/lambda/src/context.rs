@@ -9,7 +9,7 @@ use rayfold_pipeline::store::{S3Store, Store};
 use rayfold_pipeline::{Invocation, Policy, Randomness, SystemClock, Timestamp};
 
 use crate::animator::GifAnimator;
-use crate::limits::limits;
+use crate::limits::{limits, most_frames};
 use crate::raytracer::RayTracer;
 
 /// The store's client and what the steps are given.
@@ -59,12 +59,14 @@ impl Context<S3Store> {
         if let Some(attempts) = number("RAYFOLD_ATTEMPTS")? {
             policy.attempts = attempts;
         }
+        policy.most_frames = most_frames(|name| env::var(name).ok())?;
         let seed = match number("RAYFOLD_SEED")? {
             Some(seed) => seed,
             None => getrandom::u64().context("no randomness from the system")?,
         };
         let renderer = RayTracer { limits: limits(|name| env::var(name).ok())? };
-        Ok(Self { store, bucket, renderer, animator: GifAnimator, policy, random: Randomness::seeded(seed) })
+        let animator = GifAnimator { most_pixels: renderer.limits.max_pixels };
+        Ok(Self { store, bucket, renderer, animator, policy, random: Randomness::seeded(seed) })
     }
 }
 

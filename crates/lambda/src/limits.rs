@@ -16,12 +16,7 @@ use rayfold_scene::Limits;
 /// The variable that is no whole number of at least 1.
 pub(crate) fn limits(variable: impl Fn(&str) -> Option<String>) -> anyhow::Result<Limits> {
     let default = Limits::default();
-    let number = |name: &str| -> anyhow::Result<Option<u64>> {
-        let Some(text) = variable(name) else { return Ok(None) };
-        let number: NonZeroU64 =
-            text.parse().with_context(|| format!("{name}={text}: expected a whole number of at least 1"))?;
-        Ok(Some(number.get()))
-    };
+    let number = |name: &str| number(&variable, name);
     let size =
         |name: &str| Ok::<_, anyhow::Error>(number(name)?.map(|n| usize::try_from(n).unwrap_or(usize::MAX)));
     Ok(Limits {
@@ -29,9 +24,25 @@ pub(crate) fn limits(variable: impl Fn(&str) -> Option<String>) -> anyhow::Resul
         max_objects: size("RAYFOLD_MAX_OBJECTS")?.unwrap_or(default.max_objects),
         max_lights: size("RAYFOLD_MAX_LIGHTS")?.unwrap_or(default.max_lights),
         max_pixels: number("RAYFOLD_MAX_PIXELS")?.unwrap_or(default.max_pixels),
-        max_frames: size("RAYFOLD_MAX_FRAMES")?.or(default.max_frames),
+        // Each is an invocation, also where nobody has set a limit.
+        max_frames: size("RAYFOLD_MAX_FRAMES")?.or(usize::try_from(Limits::FRAMES).ok()),
         max_described: default.max_described,
     })
+}
+
+/// How many frames an animation may have, by `RAYFOLD_MAX_ANIMATION_FRAMES`; without it any number.
+///
+/// # Errors
+/// When the variable is no whole number of at least 1.
+pub(crate) fn most_frames(variable: impl Fn(&str) -> Option<String>) -> anyhow::Result<Option<u64>> {
+    number(&variable, "RAYFOLD_MAX_ANIMATION_FRAMES")
+}
+
+fn number(variable: impl Fn(&str) -> Option<String>, name: &str) -> anyhow::Result<Option<u64>> {
+    let Some(text) = variable(name) else { return Ok(None) };
+    let number: NonZeroU64 =
+        text.parse().with_context(|| format!("{name}={text}: expected a whole number of at least 1"))?;
+    Ok(Some(number.get()))
 }
 
 #[cfg(test)]
@@ -44,12 +55,14 @@ mod tests {
 
     #[test]
     fn without_variables_the_defaults_hold() {
-        assert_eq!(limits(|_| None).unwrap(), Limits::default());
+        let expected = Limits { max_frames: Some(1_000_000), ..Limits::default() };
+        assert_eq!(limits(|_| None).unwrap(), expected);
+        assert_eq!(most_frames(|_| None).unwrap(), None);
     }
 
     #[test]
     fn each_variable_sets_its_limit_and_no_other() {
-        let default = Limits::default();
+        let default = limits(|_| None).unwrap();
         for (name, expected) in [
             ("RAYFOLD_MAX_SCRIPT_BYTES", Limits { max_script_bytes: 7, ..default }),
             ("RAYFOLD_MAX_OBJECTS", Limits { max_objects: 7, ..default }),
@@ -59,6 +72,8 @@ mod tests {
         ] {
             assert_eq!(with(name, "7").unwrap(), expected, "{name}");
         }
+        let of_animations = |name: &str| (name == "RAYFOLD_MAX_ANIMATION_FRAMES").then(|| "7".to_owned());
+        assert_eq!((limits(of_animations).unwrap(), most_frames(of_animations).unwrap()), (default, Some(7)));
     }
 
     #[test]
@@ -80,11 +95,12 @@ mod tests {
             stack.split_whitespace().filter(|word| word.starts_with("RAYFOLD_MAX_")).collect();
         set.sort_unstable();
         let read = std::cell::RefCell::new(Vec::new());
-        limits(|name| {
+        let note = |name: &str| {
             read.borrow_mut().push(name.to_owned());
             None
-        })
-        .unwrap();
+        };
+        limits(note).unwrap();
+        most_frames(note).unwrap();
         let mut read = read.into_inner();
         read.sort_unstable();
         assert_eq!(set, read);

@@ -47,6 +47,7 @@ fn described(outcome: &Came) -> String {
         Came::Drawn => "drawn".into(),
         Came::Split(parts) => format!("split into {parts}"),
         Came::Faulty(_) => "faulty".into(),
+        Came::TooMany => "one too many".into(),
     }
 }
 

@@ -37,7 +37,7 @@ impl Minio {
     /// Starts `binary` on the folder `objects` and waits until it answers.
     ///
     /// # Errors
-    /// [`Error::MinioStart`] with the log's place, [`Error::File`].
+    /// [`Error::Listen`] for a port that is taken, [`Error::MinioStart`] with the log's place, [`Error::File`].
     pub(crate) async fn start(
         binary: &Path,
         objects: &Path,
@@ -47,6 +47,11 @@ impl Minio {
         webhook: Option<&Webhook>,
     ) -> Result<Self> {
         let start = Instant::now();
+        let may_choose = address.port() == 0;
+        if !may_choose {
+            // Not whatever else answers there, and not another port than the one that was asked for.
+            free(address).await?;
+        }
         loop {
             if address.port() == 0 {
                 address = free(address).await?;
@@ -68,7 +73,9 @@ impl Minio {
                 Err(reason) if start.elapsed() >= START_TIMEOUT => {
                     return Err(Error::MinioStart { reason, log: log.to_owned() });
                 }
-                Err(reason) if fs::read_to_string(log).is_ok_and(|text| text.contains("in use")) => {
+                Err(reason)
+                    if may_choose && fs::read_to_string(log).is_ok_and(|text| text.contains("in use")) =>
+                {
                     // Someone took the free port in between.
                     fs::write(log, reason).map_err(Error::file(log))?;
                     address.set_port(0);
@@ -111,9 +118,8 @@ fn environment(credentials: &Credentials, webhook: Option<&Webhook>) -> Vec<(Str
     env
 }
 
-/// A port that nobody listens on, of the given address.
-async fn free(mut address: SocketAddr) -> Result<SocketAddr> {
-    address.set_port(0);
+/// The address, if nobody listens there; with port 0 one with a port that nobody listens on.
+async fn free(address: SocketAddr) -> Result<SocketAddr> {
     let listener = tokio::net::TcpListener::bind(address)
         .await
         .map_err(|source| Error::Listen { address: address.to_string(), source })?;
@@ -160,5 +166,20 @@ mod tests {
         let start = Minio::start(Path::new("/bin/false"), data.path(), &log, any_port(), &credentials, None);
         let error = start.await.unwrap_err();
         assert!(error.to_string().contains("minio.log"), "{error}");
+    }
+
+    /// Another port was taken without a word.
+    #[tokio::test]
+    async fn a_port_that_was_asked_for_and_is_taken_is_named() {
+        let data = tempfile::tempdir().unwrap();
+        let (log, credentials) = (data.path().join("minio.log"), Credentials::random().unwrap());
+        let taken = tokio::net::TcpListener::bind(any_port()).await.unwrap();
+        let address = taken.local_addr().unwrap();
+        let start = Minio::start(Path::new("/bin/false"), data.path(), &log, address, &credentials, None);
+        let error = start.await.unwrap_err();
+        assert!(
+            matches!(&error, Error::Listen { address: named, .. } if *named == address.to_string()),
+            "{error}"
+        );
     }
 }

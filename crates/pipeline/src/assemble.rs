@@ -21,6 +21,7 @@ use crate::keys::{Animation, Generation, Key, Receipt, Tag};
 use crate::manifest::{Frame, FrameState, Head, Manifest, Reason, Status};
 use crate::observe::Observation;
 use crate::store::{Condition, ObjectInfo, PutOptions, Store, Upload};
+use crate::sweep::Wakings;
 use crate::{Clock, Error, Result, Timestamp};
 
 /// The name of the GIF's metadata that holds its generation.
@@ -41,15 +42,24 @@ pub trait Encoding: Send {
     ///
     /// # Errors
     ///
-    /// The reason why these frames make no animation; it would be the same next time.
-    fn push(&mut self, frame: Bytes) -> impl Future<Output = Result<Bytes, Reason>> + Send;
+    /// What is wrong with this frame, or with all of them together.
+    fn push(&mut self, frame: Bytes) -> impl Future<Output = Result<Bytes, Unfit>> + Send;
 
     /// Gives the rest of the file.
     ///
     /// # Errors
     ///
-    /// As for [`push`](Encoding::push).
+    /// The reason why these frames make no animation; it would be the same next time.
     fn finish(self) -> impl Future<Output = Result<Bytes, Reason>> + Send;
+}
+
+/// Why a frame cannot be added to an animation.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Unfit {
+    /// The frame is none: someone has put something else in its place. Drawn again it may be one.
+    Corrupt(Reason),
+    /// The frame does not go with the others; it would be the same next time.
+    Unlike(Reason),
 }
 
 /// What an invocation of the assembler did.
@@ -113,11 +123,13 @@ pub(crate) fn due(head: &Head, gif: Option<&ObjectInfo>) -> Due {
 }
 
 /// How a build ended.
-enum Built {
+enum Built<'a> {
     /// The GIF is put.
     Put,
     /// A frame is gone, or someone else's GIF came first: look again.
     Stale,
+    /// This frame cannot be read.
+    Corrupt(&'a Frame, Reason),
     /// These frames make no GIF.
     Refused(Reason),
 }
@@ -277,19 +289,20 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 }
             }
             Built::Stale => {}
+            Built::Corrupt(frame, reason) => self.draw_anew(observation, frame, &reason).await?,
             Built::Refused(reason) => self.refuse(observed, &reason).await?,
         }
         Ok(Next::Round)
     }
 
     /// Writes the GIF of a manifest that is done over the version that was there, or fails to.
-    async fn build<A: Animator>(
+    async fn build<'m, A: Animator>(
         &self,
         animator: &A,
-        manifest: &Manifest,
+        manifest: &'m Manifest,
         gif: Option<ObjectInfo>,
         began: Timestamp,
-    ) -> Result<Built> {
+    ) -> Result<Built<'m>> {
         let head = &manifest.head;
         let animation = &head.animation;
         let mut encoding = match animator.begin(&head.settings.value.unwrap_or_default()) {
@@ -337,25 +350,27 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
 
     /// Fetches the frames, a few ahead of the encoder, and sends what it writes; says why, if it does not come to the
     /// end.
-    async fn encode<E: Encoding, U: Upload>(
+    async fn encode<'m, E: Encoding, U: Upload>(
         &self,
         encoding: &mut E,
-        manifest: &Manifest,
+        manifest: &'m Manifest,
         upload: &mut U,
         began: Timestamp,
-    ) -> Result<Option<Built>> {
+    ) -> Result<Option<Built<'m>>> {
         let animation = &manifest.head.animation;
-        let keys = manifest.frames.iter().filter_map(|frame| frame_key(animation, frame));
-        let fetches: Vec<_> = keys.map(|key| async move { self.get(&key).await }).collect();
+        let keys = manifest.frames.iter().filter_map(|frame| Some((frame, frame_key(animation, frame)?)));
+        let fetches: Vec<_> =
+            keys.map(|(frame, key)| async move { Ok::<_, Error>((frame, self.get(&key).await?)) }).collect();
         let mut images = stream::iter(fetches).buffered(self.policy.prefetch);
         let start = self.clock.now();
         let mut pushed = 0_u64;
         while let Some(image) = images.next().await {
-            let Some(image) = image? else { return Ok(Some(Built::Stale)) };
+            let (frame, Some(image)) = image? else { return Ok(Some(Built::Stale)) };
             match encoding.push(image.body).await {
                 Ok(piece) if piece.is_empty() => {}
                 Ok(piece) => upload.write(piece).await?,
-                Err(reason) => return Ok(Some(Built::Refused(reason))),
+                Err(Unfit::Corrupt(reason)) => return Ok(Some(Built::Corrupt(frame, reason))),
+                Err(Unfit::Unlike(reason)) => return Ok(Some(Built::Refused(reason))),
             }
             pushed += 1;
             if self.is_out_of_time() {
@@ -375,6 +390,23 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     fn is_out_of_time_in(&self, wait: Duration) -> bool {
         let then = self.clock.now().after(wait).after(self.policy.margin);
         self.deadline.is_some_and(|deadline| then >= deadline)
+    }
+
+    /// Has a frame drawn again that cannot be read; after a bounded number of attempts it gets an error receipt.
+    async fn draw_anew(&self, observation: &Observation, frame: &Frame, reason: &Reason) -> Result<()> {
+        let animation = &observation.manifest.head.animation;
+        let Some(key) = frame_key(animation, frame) else { return Ok(()) };
+        let wakings = self.wakings(animation, observation).await?;
+        let subject = (frame.script.clone(), frame.version.clone(), frame.part);
+        let Wakings { attempts, begun, .. } = wakings.get(&subject).copied().unwrap_or_default();
+        self.delete(&key).await?;
+        let tag = Tag { version: frame.version.clone(), pixels: self.policy.pixels };
+        if begun >= self.policy.attempts {
+            let why =
+                Reason::new(format!("{key} is no frame, though drawn {begun} times: {}", reason.message));
+            return self.put_fault(animation, &frame.script, &tag, frame.part, &why).await.map(drop);
+        }
+        self.put_retry(animation, &frame.script, tag, frame.part, attempts + 1).await
     }
 
     /// Writes down that this generation gives no GIF.

@@ -10,9 +10,9 @@ use serde::Deserialize;
 use crate::assemble::generation_of;
 use crate::fold::{Age, Folded};
 use crate::invocation::Invocation;
-use crate::keys::{Animation, Generation, Key, Part, ScriptName, Tag, decode_event_key};
+use crate::keys::{Animation, Generation, Key, Part, Receipt, ScriptName, Tag, decode_event_key};
 use crate::manifest::{Fact, Reason, Status};
-use crate::store::{ETag, Store};
+use crate::store::{ETag, ListRequest, Store};
 use crate::{Clock, Error, Result};
 
 /// One failed event.
@@ -55,7 +55,7 @@ pub enum Recorded {
     GivenUp(Folded),
     /// The set of frames is refused now.
     Refused(Folded),
-    /// The sweep will see to it.
+    /// The sweep will see to it: of an assembly, and of a frame that was woken often enough.
     LeftToSweep,
 }
 
@@ -138,14 +138,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             let fact = standing.fact(name, version, part);
             return self.fold(&animation, &fact, Age::Old).await.map(Recorded::Resolved);
         }
-        let mut attempts = 0;
-        for listed in self.retries(&animation).await? {
-            if let Ok(Key::Retry { name: of, tag, part: of_part, attempt, .. }) = listed.key.parse()
-                && (&of, &tag.version, of_part) == (&name, &version, part)
-            {
-                attempts = attempts.max(attempt.get());
-            }
-        }
+        let (attempts, begun) = self.attempts(&animation, &name, &version, part).await?;
         let tag = Tag { version: version.clone(), pixels: self.policy.pixels };
         let tries = failure.attempts;
         let hopeless = match &failure.end {
@@ -155,13 +148,18 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             End::Died if tried.as_ref() == Some(&version) => Some(format!(
                 "the render function died in each of {tries} attempts, most likely for lack of memory"
             )),
-            _ if attempts < self.policy.attempts => None,
             // It has not been tried.
             End::TooOld => None,
-            End::TimedOut | End::Died => Some(format!("no result in each of {attempts} attempts")),
-            End::Error(message) => Some(format!("no result in each of {attempts} attempts: {message}")),
+            _ if begun < self.policy.attempts => None,
+            End::TimedOut | End::Died => Some(format!("no result in each of {begun} attempts")),
+            End::Error(message) => Some(format!("no result in each of {begun} attempts: {message}")),
         };
         match hopeless {
+            // The store may be busy for long: the sweep is more patient with every waking.
+            None if attempts >= self.policy.attempts && failure.end != End::TooOld => {
+                self.fold(&animation, &Fact::Fold, Age::Old).await?;
+                Ok(Recorded::LeftToSweep)
+            }
             None => {
                 self.put_retry(&animation, &name, tag, part, attempts + 1).await?;
                 Ok(Recorded::Woken { attempt: attempts + 1 })
@@ -172,6 +170,34 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 self.fold(&animation, &fact, Age::Old).await.map(Recorded::GivenUp)
             }
         }
+    }
+
+    /// The number of a frame's last waking, and to how many wakings an invocation has begun.
+    async fn attempts(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        version: &ETag,
+        part: Part,
+    ) -> Result<(u64, u64)> {
+        let (mut attempts, mut begun) = (0, 0);
+        for listed in self.retries(animation).await? {
+            if let Ok(Key::Retry { name: of, tag, part: of_part, attempt, .. }) = listed.key.parse()
+                && (&of, &tag.version, of_part) == (name, version, part)
+            {
+                attempts = attempts.max(attempt.get());
+            }
+        }
+        let prefix = format!("{}{}", animation.frames(), Tag::receipts_of(name, version));
+        for listed in self.list_ranges(ListRequest::all(prefix), Vec::new()).await? {
+            if let Ok(Key::Receipt { receipt: Receipt::Begun { name: of, tag, part: of_part, .. }, .. }) =
+                listed.key.parse()
+                && (&of, &tag.version, of_part) == (name, version, part)
+            {
+                begun += 1;
+            }
+        }
+        Ok((attempts, begun))
     }
 
     async fn record_assembly(

@@ -89,6 +89,9 @@ fn status_follows(next: &Manifest, _: Option<&Manifest>) -> bool {
     let expected = head.settings.value.as_ref().and_then(|settings| settings.frames()).unwrap_or(0);
     let sound = head.failed == 0 && head.settings.value.is_some() && head.rejected.is_empty();
     let complete = head.total > 0 && head.pending == 0 && head.total >= expected;
+    if head.excess.is_some() {
+        return head.status == Status::Failed && head.total > 0;
+    }
     match head.status {
         Status::Empty => head.total == 0 && head.rejected.is_empty(),
         Status::Waiting => head.total < expected,

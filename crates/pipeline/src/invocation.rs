@@ -30,11 +30,17 @@ pub struct Policy {
     pub pause_cap: Duration,
     /// How many bytes of a manifest are read to see whether it covers a result. 32 KiB: all of it up to some 300 frames.
     pub glimpse: u64,
+    /// The most frames that an animation may have; with `None` any number. With more it is failed, and no more of them
+    /// are drawn. A bound on what whoever may upload makes others pay.
+    pub most_frames: Option<u64>,
     /// How long nothing may happen before the sweep wakes pending frames; doubles with each attempt. 15 min: as long
     /// as an invocation may run.
     pub stuck_after: Duration,
     /// After how many wakings a pending frame is given up.
     pub attempts: u64,
+    /// Whether attempts that have begun and gave no result count. Not when the functions themselves have just been
+    /// started anew: what was cut off with them was not tried.
+    pub attempts_count: bool,
     /// How old a superseded frame must be before the sweep deletes it. A week: a script that is changed back finds
     /// its old frame.
     pub superseded_after: Duration,
@@ -61,8 +67,10 @@ impl Policy {
             pause_per_frame: Duration::from_millis(3),
             pause_cap: Duration::from_millis(500),
             glimpse: 32 * 1024,
+            most_frames: None,
             stuck_after: Duration::from_secs(15 * 60),
             attempts: 3,
+            attempts_count: true,
             superseded_after: Duration::from_secs(7 * 24 * 3600),
             request_attempts: 5,
             request_pause: Duration::from_millis(50),

@@ -21,8 +21,10 @@ pub mod retry;
 pub mod simulation;
 pub mod store;
 pub mod sweep;
+#[cfg(test)]
+mod tests;
 
-pub use assemble::{Animator, Encoding, assemble};
+pub use assemble::{Animator, Encoding, Unfit, assemble};
 pub use clock::{Clock, Randomness, SystemClock, Timestamp};
 pub use error::{Cause, Error, Result, found};
 pub use failure::record_failure;

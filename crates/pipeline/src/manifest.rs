@@ -71,6 +71,9 @@ pub struct Head {
     /// Why this generation gives no GIF though all its frames are there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refusal: Option<Fault>,
+    /// That there are more frames than an animation may have.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub excess: Option<Reason>,
     /// When a script was last found to be gone, by the clock of the function that found it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub removed_at: Option<Timestamp>,
@@ -212,6 +215,7 @@ impl Manifest {
             && a.generation == b.generation
             && a.settings == b.settings
             && a.rejected == b.rejected
+            && a.excess == b.excess
             && receipt(&a.refusal) == receipt(&b.refusal)
             && self.frames.len() == other.frames.len()
             && self.frames.iter().zip(&other.frames).all(|(a, b)| a.agrees_with(b))
@@ -223,6 +227,20 @@ impl Manifest {
         let mut parts = frames.filter_map(|frame| Some((frame.part?, &frame.state))).peekable();
         parts.peek()?;
         Some(parts.filter(|(_, state)| **state == FrameState::Pending).map(|(part, _)| part).collect())
+    }
+
+    /// The same where an animation may have at most so many frames: with more it is failed, and nothing is waited for.
+    pub(crate) fn bounded(mut self, most: Option<u64>) -> Self {
+        let total = self.head.total;
+        if let Some(most) = most.filter(|most| total > *most) {
+            let message = format!(
+                "the animation has {total} frames: expected at most {most}, the limit of this bucket"
+            );
+            self.head.excess = Some(Reason::new(message));
+            self.head.refusal = None;
+            self.head.status = Status::Failed;
+        }
+        self
     }
 
     /// When a script was last found to be gone, if this manifest is written `now` over `before`.

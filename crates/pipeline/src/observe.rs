@@ -14,6 +14,9 @@ use crate::reconcile::{MARK_EVERY, ReceiptFound, Results, ScriptFound, Scripts, 
 use crate::store::{ETag, ListRequest, Listed, Listing, Object, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
+/// How often an animation is listed whose receipts are replaced between the listing and their reading.
+const LOOKS: u32 = 8;
+
 /// A listing of an animation and what it amounts to.
 #[derive(Debug)]
 pub(crate) struct Observation {
@@ -34,8 +37,13 @@ impl Observation {
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
     /// Lists an animation and reconciles the listing. `known` is the manifest as last read: it saves requests, and
     /// has no say in the outcome.
+    ///
+    /// # Errors
+    ///
+    /// Those of the store, and [`Error::Conflict`] for a receipt that is never the one that was listed.
     pub(crate) async fn observe(&self, animation: &Animation, known: Option<&Known>) -> Result<Observation> {
-        loop {
+        let mut pause = self.policy.request_pause;
+        for _ in 0..LOOKS {
             let marks = known.map_or(&[][..], |known| &known.manifest.head.marks);
             let (scripts, (receipts, has_lease)) =
                 try_join(self.list_scripts(animation, marks), self.list_receipts(animation, marks)).await?;
@@ -43,11 +51,15 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             let settings = self.settings(animation, settings, known).await?;
             let mut results = Results { receipts };
             self.add_parts(animation, &scripts, &mut results).await?;
-            let mut manifest = reconcile(animation, &scripts, &results, &settings);
+            let manifest = reconcile(animation, &scripts, &results, &settings);
+            let mut manifest = manifest.bounded(self.policy.most_frames);
             if self.add_reasons(animation, &results, known, &mut manifest).await? {
                 return Ok(Observation { scripts, results, manifest, has_lease });
             }
+            self.clock.sleep(self.random.up_to(pause)).await;
+            pause = pause.saturating_mul(2);
         }
+        Err(Error::Conflict { key: animation.frames() })
     }
 
     pub(crate) async fn list_scripts(
@@ -112,7 +124,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Listing::read(request, end.as_deref(), |request| self.list(request)).await?.objects)
     }
 
-    /// Reads `animation.json`, unless the manifest has it in this version.
+    /// Reads `animation.json`, unless the manifest has it in this version and could read it: what an older function took
+    /// for faulty need not be.
     async fn settings(
         &self,
         animation: &Animation,
@@ -120,8 +133,10 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         known: Option<&Known>,
     ) -> Result<Settings> {
         let Some(version) = version else { return Ok(Settings::absent()) };
-        if let Some(known) = known.filter(|known| known.manifest.head.settings.version == Some(version)) {
-            return Ok(known.manifest.head.settings.clone());
+        let known = known.map(|known| &known.manifest.head.settings);
+        if let Some(settings) = known.filter(|known| known.version == Some(version) && known.fault.is_none())
+        {
+            return Ok(settings.clone());
         }
         Ok(match self.get_start(&animation.settings(), MOST_SETTINGS_BYTES).await? {
             None => Settings::absent(),

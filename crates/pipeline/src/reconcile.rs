@@ -143,6 +143,7 @@ pub fn reconcile(
         settings: settings.clone(),
         rejected: scripts.rejected.clone(),
         refusal: refusal.filter(|_| status == Status::Refused),
+        excess: None,
         removed_at: None,
         marks: marks(scripts),
     };

@@ -84,6 +84,8 @@ pub enum Outcome {
     Split(NonZeroU64),
     /// The script gives no frame, as the receipt now says.
     Faulty(Reason),
+    /// Nothing was drawn: the animation has more frames than it may have.
+    TooMany,
 }
 
 /// Time by stage of an invocation.
@@ -190,7 +192,9 @@ impl Outcome {
     fn age(&self) -> Age {
         match self {
             Outcome::Drawn | Outcome::Split(_) | Outcome::Faulty(_) => Age::New,
-            Outcome::Gone | Outcome::Settings | Outcome::Superseded | Outcome::Present => Age::Old,
+            Outcome::Gone | Outcome::Settings | Outcome::Superseded | Outcome::Present | Outcome::TooMany => {
+                Age::Old
+            }
         }
     }
 }
@@ -221,6 +225,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 Some(standing) => {
                     (Outcome::Present, standing.fact(subject.name.clone(), script.version, subject.part))
                 }
+                None if self.has_too_many(&subject.animation).await? => {
+                    (Outcome::TooMany, Fact::Version(subject.name.clone(), script.version))
+                }
                 None => self.draw_and_put(renderer, &subject, script, &mut stages).await?,
             },
         };
@@ -229,6 +236,14 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let folded = self.fold(&subject.animation, &fact, outcome.age()).await?;
         stages.fold = self.clock.now().since(before_fold);
         Ok(Rendered { animation: subject.animation, script: Some(subject.name), outcome, folded, stages })
+    }
+
+    /// Whether the manifest says that the animation has more frames than it may have.
+    async fn has_too_many(&self, animation: &Animation) -> Result<bool> {
+        if self.policy.most_frames.is_none() {
+            return Ok(false);
+        }
+        Ok(self.glimpse(animation).await?.head().is_some_and(|head| head.excess.is_some()))
     }
 
     async fn standing_of(&self, subject: &Subject, version: &ETag) -> Result<Option<Standing>> {
@@ -298,20 +313,36 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 self.put_receipt(&animation.receipt(&receipt), image, "image/png").await?;
                 (Outcome::Drawn, Fact::Drawn(name, version, part, self.policy.pixels))
             }
+            Drawing::Split(count) if self.policy.most_frames.is_some_and(|most| count.get() > most) => {
+                let most = self.policy.most_frames.unwrap_or_default();
+                let reason = Reason::new(format!(
+                    "{name}.txt has {count} frames: expected at most {most}, the limit of this bucket for an animation"
+                ));
+                return self.put_drawing_fault(subject, version, &tag, reason).await;
+            }
             Drawing::Split(count) => {
                 self.put_parts(animation, &name, &tag, count, uploaded).await?;
                 let receipt = Receipt::Split { name: name.clone(), tag, count };
                 self.put_receipt(&animation.receipt(&receipt), Bytes::new(), "text/plain").await?;
                 (Outcome::Split(count), Fact::Split(name, version))
             }
-            Drawing::Fault(reason) => {
-                let fact = match self.put_fault(animation, &name, &tag, part, &reason).await? {
-                    Some(receipt) => Fact::Faulty(name, version, part, receipt),
-                    None => Fact::Fold,
-                };
-                (Outcome::Faulty(reason), fact)
-            }
+            Drawing::Fault(reason) => return self.put_drawing_fault(subject, version, &tag, reason).await,
         })
+    }
+
+    async fn put_drawing_fault(
+        &self,
+        subject: &Subject,
+        version: ETag,
+        tag: &Tag,
+        reason: Reason,
+    ) -> Result<(Outcome, Fact)> {
+        let Subject { animation, name, part, .. } = subject;
+        let fact = match self.put_fault(animation, name, tag, *part, &reason).await? {
+            Some(receipt) => Fact::Faulty(name.clone(), version, *part, receipt),
+            None => Fact::Fold,
+        };
+        Ok((Outcome::Faulty(reason), fact))
     }
 
     /// Puts an error receipt; `None` when there is one already.

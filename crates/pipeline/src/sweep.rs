@@ -49,12 +49,12 @@ pub struct Visit {
 
 /// How often and when last a frame was woken.
 #[derive(Clone, Copy, Default)]
-struct Wakings {
+pub(crate) struct Wakings {
     /// The last one's number.
-    attempts: u64,
+    pub(crate) attempts: u64,
     last: Timestamp,
     /// To how many of them an invocation has begun. The others may wait behind a thousand frames.
-    begun: u64,
+    pub(crate) begun: u64,
 }
 
 /// The pause between wakings doubles no more than so often.
@@ -155,8 +155,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             observation.manifest.frames.iter().filter(|frame| frame.state == FrameState::Pending).collect();
         let now = self.clock.now();
         let last = self.last_progress(observation);
-        if pending.is_empty() || now.since(last) < self.policy.stuck_after {
+        let is_hopeless = observation.manifest.head.excess.is_some();
+        if pending.is_empty() || is_hopeless || now.since(last) < self.policy.stuck_after {
             return Ok(());
+        }
+        if !self.policy.attempts_count {
+            self.forget_attempts(animation, observation, &pending).await?;
         }
         let wakings = self.wakings(animation, observation).await?;
         let steps = pending.into_iter().map(|frame| {
@@ -170,6 +174,24 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             visit.given_up += u64::from(step == Step::GivenUp);
         }
         Ok(())
+    }
+
+    /// Deletes what says that attempts at these frames have begun.
+    async fn forget_attempts(
+        &self,
+        animation: &Animation,
+        observation: &Observation,
+        pending: &[&Frame],
+    ) -> Result<()> {
+        let pending: BTreeSet<_> =
+            pending.iter().map(|frame| (&frame.script, &frame.version, frame.part)).collect();
+        let begun = observation.results.receipts.iter().filter(|found| match &found.receipt {
+            Receipt::Begun { name, tag, part, .. } => pending.contains(&(name, &tag.version, *part)),
+            _ => false,
+        });
+        let begun: Vec<String> = begun.map(|found| animation.receipt(&found.receipt)).collect();
+        let deletions: Vec<_> = begun.iter().map(|key| self.delete(key)).collect();
+        stream::iter(deletions).buffer_unordered(self.policy.concurrency).try_collect().await
     }
 
     /// When a script was uploaded or a result written last: while that goes on nothing is stuck, only queued.
@@ -192,7 +214,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             return Ok(Step::Patient);
         }
         let tag = Tag { version: frame.version.clone(), pixels: self.policy.pixels };
-        if begun >= self.policy.attempts {
+        if begun >= self.policy.attempts && self.policy.attempts_count {
             let reason = Reason::new(format!("no result in each of {begun} attempts"));
             self.put_fault(animation, &frame.script, &tag, frame.part, &reason).await?;
             return Ok(Step::GivenUp);
@@ -256,7 +278,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 
     /// How often each frame of an animation was woken.
-    async fn wakings(
+    pub(crate) async fn wakings(
         &self,
         animation: &Animation,
         observation: &Observation,

@@ -173,19 +173,24 @@ run "functions" {
 run "limits_fit_the_memory" {
   assert {
     condition = aws_lambda_function.this["render"].environment[0].variables == tomap({
-      RAYFOLD_BUCKET           = "demo-123456789012-eu-central-1"
-      RAYFOLD_MAX_FRAMES       = "10000"
-      RAYFOLD_MAX_LIGHTS       = "1024"
-      RAYFOLD_MAX_OBJECTS      = "1817300"
-      RAYFOLD_MAX_PIXELS       = "64000000"
-      RAYFOLD_MAX_SCRIPT_BYTES = "268435456"
+      RAYFOLD_BUCKET               = "demo-123456789012-eu-central-1"
+      RAYFOLD_MAX_ANIMATION_FRAMES = "100000"
+      RAYFOLD_MAX_FRAMES           = "10000"
+      RAYFOLD_MAX_LIGHTS           = "1024"
+      RAYFOLD_MAX_OBJECTS          = "1817300"
+      RAYFOLD_MAX_PIXELS           = "64000000"
+      RAYFOLD_MAX_SCRIPT_BYTES     = "268435456"
     })
     error_message = "4 million spheres take 1,971 MiB, and the function has 1,769 MB"
   }
   assert {
     condition = alltrue([
       for function in ["assemble", "record"] :
-      aws_lambda_function.this[function].environment[0].variables == tomap({ RAYFOLD_BUCKET = "demo-123456789012-eu-central-1" })
+      aws_lambda_function.this[function].environment[0].variables == tomap({
+        RAYFOLD_BUCKET               = "demo-123456789012-eu-central-1"
+        RAYFOLD_MAX_ANIMATION_FRAMES = "100000"
+        RAYFOLD_MAX_PIXELS           = "64000000"
+      })
     ])
     error_message = "only the render function reads scripts"
   }

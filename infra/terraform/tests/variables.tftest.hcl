@@ -666,11 +666,12 @@ run "record_timeout_too_long" {
 run "limits" {
   variables {
     limits = {
-      max_frames       = 50
-      max_pixels       = 1000000
-      max_objects      = 2000
-      max_lights       = 4
-      max_script_bytes = 1048576
+      max_animation_frames = 70
+      max_frames           = 50
+      max_pixels           = 1000000
+      max_objects          = 2000
+      max_lights           = 4
+      max_script_bytes     = 1048576
     }
   }
 
@@ -678,11 +679,12 @@ run "limits" {
     condition = {
       for name, value in aws_lambda_function.this["render"].environment[0].variables : name => value if name != "RAYFOLD_BUCKET"
       } == {
-      RAYFOLD_MAX_FRAMES       = "50"
-      RAYFOLD_MAX_LIGHTS       = "4"
-      RAYFOLD_MAX_OBJECTS      = "2000"
-      RAYFOLD_MAX_PIXELS       = "1000000"
-      RAYFOLD_MAX_SCRIPT_BYTES = "1048576"
+      RAYFOLD_MAX_ANIMATION_FRAMES = "70"
+      RAYFOLD_MAX_FRAMES           = "50"
+      RAYFOLD_MAX_LIGHTS           = "4"
+      RAYFOLD_MAX_OBJECTS          = "2000"
+      RAYFOLD_MAX_PIXELS           = "1000000"
+      RAYFOLD_MAX_SCRIPT_BYTES     = "1048576"
     }
     error_message = "the render function must be told the limits given"
   }

@@ -53,6 +53,8 @@ struct Report<'a> {
 struct Entry<'a> {
     #[serde(flatten)]
     known: Known<'a>,
+    /// There are scripts, or versions of them, that the functions have not seen.
+    behind: bool,
     gif: Option<Gif<'a>>,
     faults: Vec<FaultEntry<'a>>,
 }
@@ -125,6 +127,7 @@ async fn follow(
     let mut last = String::new();
     loop {
         watches[0].look_for().await?;
+        watches[0].compare().await?;
         show_if_new(&watches, format, &mut last, console)?;
         if watches[0].is_settled() {
             show_faults(&watches, format, console);
@@ -188,7 +191,8 @@ fn table(watches: &[Watch<'_>], with_age: bool) -> String {
             Some(gif) => format!("last GIF of {}{}", Size(gif.size), age.unwrap_or_default()),
             None => "no GIF".to_owned(),
         };
-        let _ = writeln!(text, "{name:width$}  {status:9}  {}, {gif}", report::count(manifest));
+        let behind = if watch.is_behind() { "; newer scripts wait to be seen" } else { "" };
+        let _ = writeln!(text, "{name:width$}  {status:9}  {}, {gif}{behind}", report::count(manifest));
     }
     text
 }
@@ -208,6 +212,7 @@ fn document(watches: &[Watch<'_>], one_line: bool) -> anyhow::Result<String> {
             Some(manifest) => Known::Seen(&manifest.head),
             None => Known::New { animation: watch.animation(), status: unknown(watch).0 },
         },
+        behind: watch.is_behind(),
         gif: watch.gif().map(|gif| Gif {
             key: watch.animation().gif(),
             size: gif.size,

@@ -19,14 +19,14 @@ use rayfold_scene::AnimationSettings;
 use super::bucket::{Fate, Grounds};
 use super::engine::Engine;
 use crate::Result;
-use crate::assemble::{Animator, Encoding};
+use crate::assemble::{Animator, Encoding, Unfit};
 use crate::keys::{Part, ScriptName};
 use crate::manifest::Reason;
 use crate::render::{Drawing, Renderer};
 
 /// What a script asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Play {
+pub(crate) enum Play {
     Frame,
     Split(NonZeroU64),
     Bad,
@@ -35,7 +35,7 @@ pub(super) enum Play {
 }
 
 impl Play {
-    pub(super) fn of(script: &[u8]) -> Play {
+    pub(crate) fn of(script: &[u8]) -> Play {
         let text = String::from_utf8_lossy(script);
         let mut words = text.split(' ');
         match words.next() {
@@ -48,14 +48,17 @@ impl Play {
     }
 }
 
+/// What strangers put in the place of a frame.
+pub(super) const GARBLED: &str = "garbled";
+
 /// The picture of a frame.
-pub(super) fn picture(name: &ScriptName, script: &[u8], part: Part) -> String {
+pub(crate) fn picture(name: &ScriptName, script: &[u8], part: Part) -> String {
     let number = part.map_or(0, NonZeroU64::get);
     format!("{name}:{number}:{}", String::from_utf8_lossy(script))
 }
 
 /// The file of an animation.
-pub(super) fn film(settings: &AnimationSettings, pictures: &[String]) -> String {
+pub(crate) fn film(settings: &AnimationSettings, pictures: &[String]) -> String {
     let mut file = format!("fps {} loop {}\n", settings.fps(), settings.loops());
     for picture in pictures {
         file.push_str(picture);
@@ -125,8 +128,11 @@ impl Animator for Lister {
 }
 
 impl Encoding for List {
-    async fn push(&mut self, frame: Bytes) -> Result<Bytes, Reason> {
+    async fn push(&mut self, frame: Bytes) -> Result<Bytes, Unfit> {
         self.engine.sleep(self.push).await;
+        if frame == GARBLED {
+            return Err(Unfit::Corrupt(Reason::new("no picture")));
+        }
         self.pictures.push(String::from_utf8_lossy(&frame).into_owned());
         Ok(Bytes::new())
     }

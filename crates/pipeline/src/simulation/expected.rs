@@ -7,24 +7,33 @@ use rayfold_scene::{AnimationSettings, SETTINGS_FILE, parse_settings};
 use super::acting::{Play, film, picture};
 use crate::keys::{Animation, Key, Part, ScriptName};
 use crate::manifest::{FrameState, Manifest, Status};
-use crate::store::Bucket;
+use crate::store::{Bucket, ETag, Object};
 
 /// What an animation must have come to.
 pub(super) struct Expected {
-    /// Frames in order, each with its picture or `None` when it cannot be drawn.
-    frames: Vec<(ScriptName, Part, Option<String>)>,
+    /// Frames in order.
+    frames: Vec<Shot>,
     settings: Option<AnimationSettings>,
+}
+
+/// A frame as it must be.
+struct Shot {
+    script: ScriptName,
+    version: ETag,
+    part: Part,
+    /// `None` when it cannot be drawn.
+    picture: Option<String>,
 }
 
 impl Expected {
     pub(super) fn of(bucket: &Bucket, animation: &Animation) -> Self {
-        let mut scripts: Vec<(ScriptName, Vec<u8>)> = Vec::new();
+        let mut scripts: Vec<(ScriptName, ETag, Vec<u8>)> = Vec::new();
         let mut settings = Some(AnimationSettings::default());
         for key in bucket.keys().filter(|key| key.starts_with("scripts/")) {
-            let body = bucket.get(key).map(|object| object.body).unwrap_or_default();
+            let Ok(Object { info, body }) = bucket.get(key) else { continue };
             match key.parse() {
                 Ok(Key::Script { animation: of, name }) if of == *animation => {
-                    scripts.push((name, body.to_vec()));
+                    scripts.push((name, info.etag, body.to_vec()));
                 }
                 Ok(Key::Settings { animation: of }) if of == *animation => {
                     settings = parse_settings(SETTINGS_FILE, &body).settings;
@@ -33,20 +42,24 @@ impl Expected {
             }
         }
         // The names in these stories are numbers, with letters after them at most.
-        scripts.sort_by_key(|(name, _)| {
+        scripts.sort_by_key(|(name, ..)| {
             let digits: String = name.as_str().chars().take_while(char::is_ascii_digit).collect();
             (digits.parse::<u64>().unwrap_or(u64::MAX), name.clone())
         });
         let mut frames = Vec::new();
-        for (name, body) in scripts {
+        for (script, version, body) in scripts {
+            let shot = |part: Part, is_drawn: bool| Shot {
+                script: script.clone(),
+                version: version.clone(),
+                part,
+                picture: is_drawn.then(|| picture(&script, &body, part)),
+            };
             match Play::of(&body) {
-                Play::Frame => frames.push((name.clone(), None, Some(picture(&name, &body, None)))),
+                Play::Frame => frames.push(shot(None, true)),
                 Play::Split(count) => {
-                    for number in (1..=count.get()).map(NonZeroU64::new) {
-                        frames.push((name.clone(), number, Some(picture(&name, &body, number))));
-                    }
+                    frames.extend((1..=count.get()).map(|number| shot(NonZeroU64::new(number), true)));
                 }
-                Play::Bad | Play::Hang | Play::Crash => frames.push((name, None, None)),
+                Play::Bad | Play::Hang | Play::Crash => frames.push(shot(None, false)),
             }
         }
         Expected { frames, settings }
@@ -58,7 +71,7 @@ impl Expected {
             Status::Empty
         } else if (self.frames.len() as u64) < expects {
             Status::Waiting
-        } else if self.settings.is_none() || self.frames.iter().any(|(_, _, picture)| picture.is_none()) {
+        } else if self.settings.is_none() || self.frames.iter().any(|shot| shot.picture.is_none()) {
             Status::Failed
         } else {
             Status::Done
@@ -68,7 +81,7 @@ impl Expected {
     /// Frames that the manifest says cannot be drawn though they can, and a GIF that cannot be made though it can.
     pub(super) fn wrongly_given_up(&self, manifest: &Manifest) -> usize {
         let good =
-            |name: &ScriptName| self.frames.iter().any(|(of, _, picture)| of == name && picture.is_some());
+            |name: &ScriptName| self.frames.iter().any(|shot| shot.script == *name && shot.picture.is_some());
         let failed = |state: &FrameState| matches!(state, FrameState::Failed(_));
         let refused = usize::from(manifest.head.status == Status::Refused);
         refused + manifest.frames.iter().filter(|frame| failed(&frame.state) && good(&frame.script)).count()
@@ -91,12 +104,14 @@ impl Expected {
         let listed: Vec<_> = manifest
             .frames
             .iter()
-            .map(|frame| (frame.script.clone(), frame.part, matches!(frame.state, FrameState::Done { .. })))
+            .map(|frame| {
+                (&frame.script, &frame.version, frame.part, matches!(frame.state, FrameState::Done { .. }))
+            })
             .collect();
         let wanted: Vec<_> = self
             .frames
             .iter()
-            .map(|(name, part, picture)| (name.clone(), *part, picture.is_some()))
+            .map(|shot| (&shot.script, &shot.version, shot.part, shot.picture.is_some()))
             .collect();
         if listed != wanted {
             return Err(format!("the manifest has the frames {listed:?}, not {wanted:?}"));
@@ -108,8 +123,7 @@ impl Expected {
             return Err(format!("the manifest is {:?}, not {status:?}", manifest.head.status));
         }
         let film = self.settings.filter(|_| status == Status::Done).map(|settings| {
-            let pictures: Vec<String> =
-                self.frames.iter().filter_map(|(_, _, picture)| picture.clone()).collect();
+            let pictures: Vec<String> = self.frames.iter().filter_map(|shot| shot.picture.clone()).collect();
             film(&settings, &pictures)
         });
         match (film, gif) {

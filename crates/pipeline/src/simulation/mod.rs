@@ -20,10 +20,11 @@ use std::sync::Arc;
 
 use crate::Mutation;
 
-mod acting;
+pub(crate) mod acting;
 mod bucket;
 mod engine;
 mod expected;
+pub mod explore;
 mod platform;
 mod scale;
 mod slow;

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 
+use super::acting::GARBLED;
 use super::bucket::{Actor, Faults, Grounds, Moment};
 use super::engine::{Engine, WorldClock, lock};
 use super::expected::Expected;
@@ -332,9 +333,28 @@ impl Judge {
     /// Someone overwrites the manifest with what is none. No function is woken by that.
     fn garble(&self, random: &Randomness) {
         let delay = Duration::from_micros(random.below(TROUBLES.as_micros() as u64));
+        if random.one_in(2) {
+            self.garble_a_frame(random.bits(), delay);
+            return;
+        }
         let text = ["", "garbage\n", "{\"schema\":9},\n\"frames\":[\n\n]}\n"][pick(random, 3)];
         act(&self.grounds, delay, self.animation.manifest(), Some(text.to_owned()));
         self.platform.only_the_sweep_heals("the manifest was garbled");
+    }
+
+    /// Someone overwrites a frame with what is none.
+    fn garble_a_frame(&self, lot: u64, delay: Duration) {
+        let world = self.grounds.clone();
+        self.engine.after(delay, move || {
+            let now = WorldClock::exact(&world.engine).now();
+            let mut bucket = lock(&world.bucket);
+            let frames: Vec<String> =
+                bucket.keys().filter(|key| key.ends_with(".png")).map(str::to_owned).collect();
+            let Some(key) = frames.get(pick(&Randomness::seeded(lot), frames.len().max(1))) else { return };
+            world.note(|| format!("someone garbles {key}"));
+            let _ = bucket.put(now, key, GARBLED.into(), PutOptions::always());
+        });
+        self.platform.only_the_sweep_heals("a frame was garbled");
     }
 
     /// From now on nothing goes wrong.

@@ -1,0 +1,438 @@
+//! An invocation as a function: from the answers that it has got to the requests that it waits on, or to its end.
+//!
+//! The real steps run against a store that answers nothing by itself. What an invocation asks for next depends on its
+//! event, its request id, and the answers so far with the moments they came at; on nothing else. So what it has come to
+//! is known by a hash of these, is worked out once ([`Memo`]), and states of the world can be copied and compared.
+//! Pauses end at once: whoever pauses is one whose next request takes effect later, and that is searched anyway.
+
+use std::collections::BTreeMap;
+use std::future::Future;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::ops::Range;
+use std::pin::Pin;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::task::{Context, Poll, Wake, Waker};
+use std::time::Duration;
+
+use bytes::{Bytes, BytesMut};
+use rayfold_scene::AnimationSettings;
+
+use crate::assemble::{Animator, Encoding, Unfit};
+use crate::keys::{Part, ScriptName};
+use crate::manifest::Reason;
+use crate::render::{Drawing, Renderer};
+use crate::simulation::PIXELS;
+use crate::simulation::acting::{Play, film, picture};
+use crate::simulation::engine::lock;
+use crate::store::{ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, Upload};
+use crate::{
+    Clock, Error, Invocation, Mutation, Policy, Randomness, Result, Timestamp, assemble, render_frame, sweep,
+};
+
+/// What an invocation works on.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) enum Work {
+    /// An object event of the render function.
+    Render(String),
+    /// A claim.
+    Assemble(String),
+    /// The schedule.
+    Sweep,
+}
+
+/// A request that waits to take effect.
+#[derive(Debug, Clone)]
+pub(super) enum Request {
+    Get(String, Range<u64>),
+    Put(String, Bytes, PutOptions),
+    Delete(String),
+    List(ListRequest),
+}
+
+/// What a request answers.
+#[derive(Debug, Clone)]
+pub(super) enum Answer {
+    Object(Object),
+    ETag(ETag),
+    Deleted,
+    Page(ListPage),
+    NotFound,
+    PreconditionFailed,
+    /// The connection broke: the request may have taken effect.
+    Lost,
+}
+
+/// What an invocation has come to.
+#[derive(Debug)]
+pub(super) struct Standing {
+    /// The requests that it waits on, each with its number.
+    pub(super) requests: Vec<(u32, Request)>,
+    /// How it ended; an error is what the platform sees.
+    pub(super) end: Option<Result<(), End>>,
+}
+
+/// How an invocation ended that did not succeed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum End {
+    /// The platform tries again.
+    TryAgain,
+    /// No invocation should end so.
+    Bug(String),
+}
+
+/// An answer, to which request, and when it came.
+#[derive(Debug, Clone)]
+pub(super) struct Event {
+    slot: u32,
+    answer: Answer,
+    now: Timestamp,
+}
+
+/// An invocation: its event, and all that has happened to it.
+#[derive(Debug, Clone)]
+pub(super) struct Process {
+    pub(super) work: Work,
+    /// Shared by the platform's attempts at the event.
+    pub(super) request_id: Arc<str>,
+    /// Counted from 1.
+    pub(super) attempt: u32,
+    start: Timestamp,
+    history: Vec<Event>,
+    /// Of all the above.
+    pub(super) hash: u64,
+    pub(super) standing: Arc<Standing>,
+    /// When it last listed the scripts.
+    pub(super) listed: Timestamp,
+}
+
+/// What is known of invocations by the hash of what has happened to them.
+#[derive(Debug, Default)]
+pub(super) struct Memo {
+    standings: BTreeMap<u64, Arc<Standing>>,
+    mutation: Option<Mutation>,
+}
+
+impl Memo {
+    pub(super) fn new(mutation: Option<Mutation>) -> Self {
+        Memo { standings: BTreeMap::new(), mutation }
+    }
+
+    /// Begins an invocation.
+    pub(super) fn begin(
+        &mut self,
+        work: Work,
+        request_id: Arc<str>,
+        attempt: u32,
+        now: Timestamp,
+    ) -> Process {
+        let mut hasher = DefaultHasher::new();
+        (&work, &request_id, attempt, now).hash(&mut hasher);
+        let standing = Arc::new(Standing { requests: Vec::new(), end: None });
+        let (history, hash) = (Vec::new(), hasher.finish());
+        let mut process =
+            Process { work, request_id, attempt, start: now, history, hash, standing, listed: Timestamp(0) };
+        process.standing = self.standing(&process);
+        process
+    }
+
+    /// Gives an invocation the answer to one of its requests.
+    pub(super) fn answer(&mut self, process: &Process, slot: u32, answer: Answer, now: Timestamp) -> Process {
+        let mut next = process.clone();
+        let asked = process.standing.requests.iter().find(|(of, _)| *of == slot);
+        if let Some((_, Request::List(request))) = asked
+            && request.prefix.starts_with("scripts/")
+        {
+            next.listed = now;
+        }
+        let mut hasher = DefaultHasher::new();
+        (process.hash, slot, now).hash(&mut hasher);
+        answer.hash_into(&mut hasher);
+        next.hash = hasher.finish();
+        next.history.push(Event { slot, answer, now });
+        next.standing = self.standing(&next);
+        next
+    }
+
+    fn standing(&mut self, process: &Process) -> Arc<Standing> {
+        if let Some(known) = self.standings.get(&process.hash) {
+            return known.clone();
+        }
+        let standing = Arc::new(relive(process, self.mutation));
+        self.standings.insert(process.hash, standing.clone());
+        standing
+    }
+}
+
+impl Answer {
+    fn hash_into(&self, hasher: &mut impl Hasher) {
+        match self {
+            Answer::Object(Object { info, body }) => {
+                (0_u8, info.etag.as_str(), info.size, info.modified, &info.metadata).hash(hasher);
+                body.hash(hasher);
+            }
+            Answer::ETag(etag) => (1_u8, etag.as_str()).hash(hasher),
+            Answer::Deleted => 2_u8.hash(hasher),
+            Answer::Page(page) => {
+                3_u8.hash(hasher);
+                for object in &page.objects {
+                    (&object.key, object.etag.as_str(), object.modified).hash(hasher);
+                }
+                page.prefixes.hash(hasher);
+            }
+            Answer::NotFound => 4_u8.hash(hasher),
+            Answer::PreconditionFailed => 5_u8.hash(hasher),
+            Answer::Lost => 6_u8.hash(hasher),
+        }
+    }
+
+    fn outcome(self, key: &str) -> Result<Answer> {
+        let key = || key.to_owned();
+        match self {
+            Answer::NotFound => Err(Error::NotFound { key: key() }),
+            Answer::PreconditionFailed => Err(Error::PreconditionFailed { key: key() }),
+            Answer::Lost => Err(Error::Ambiguous { key: key(), source: "connection reset".into() }),
+            answer => Ok(answer),
+        }
+    }
+}
+
+/// Runs the real step again from its beginning, giving it the answers in their order.
+fn relive(process: &Process, mutation: Option<Mutation>) -> Standing {
+    let board = Board(Arc::new(Mutex::new(Slots { now: process.start, ..Slots::default() })));
+    let mut task = step(process.work.clone(), process.request_id.clone(), board.clone(), mutation);
+    let mut end = poll(&mut task);
+    for Event { slot, answer, now } in &process.history {
+        board.answer(*slot, answer.clone(), *now);
+        end = poll(&mut task);
+    }
+    let requests = std::mem::take(&mut lock(&board.0).waiting);
+    let requests = requests.into_iter().map(|(slot, (request, _))| (slot, request)).collect();
+    Standing { requests, end }
+}
+
+type Task = Pin<Box<dyn Future<Output = Result<(), End>> + Send>>;
+
+fn step(work: Work, request_id: Arc<str>, board: Board, mutation: Option<Mutation>) -> Task {
+    Box::pin(async move {
+        let (random, policy) = (Randomness::seeded(1), Policy::new(PIXELS));
+        let clock = BoardClock(board.clone());
+        let store = BoardStore(board);
+        let deadline = clock.now().after(Duration::from_secs(900));
+        let invocation =
+            Invocation::new(&store, &clock, &random, &policy, &request_id).until(deadline).breaking(mutation);
+        let result = match &work {
+            Work::Render(key) => render_frame(&invocation, &Drawer, key).await.map(drop),
+            Work::Assemble(key) => assemble(&invocation, &Joiner, key).await.map(drop),
+            Work::Sweep => match sweep(&invocation).await {
+                Ok(swept) => swept.visits.into_iter().try_for_each(|(_, visit)| visit.map(drop)),
+                Err(error) => Err(error),
+            },
+        };
+        result.map_err(|error| match error {
+            Error::Key { .. } | Error::Invariant { .. } | Error::Malformed { .. } | Error::Refused { .. } => {
+                End::Bug(error.to_string())
+            }
+            _ => End::TryAgain,
+        })
+    })
+}
+
+/// Polls a step until it waits for an answer.
+fn poll(task: &mut Task) -> Option<Result<(), End>> {
+    struct Flag(AtomicBool);
+    impl Wake for Flag {
+        fn wake(self: Arc<Self>) {
+            self.0.store(true, Ordering::Relaxed);
+        }
+    }
+    let flag = Arc::new(Flag(AtomicBool::new(true)));
+    let waker = Waker::from(flag.clone());
+    while flag.0.swap(false, Ordering::Relaxed) {
+        if let Poll::Ready(end) = task.as_mut().poll(&mut Context::from_waker(&waker)) {
+            return Some(end);
+        }
+    }
+    None
+}
+
+/// Where a step leaves its requests and finds the answers.
+#[derive(Clone)]
+struct Board(Arc<Mutex<Slots>>);
+
+#[derive(Default)]
+struct Slots {
+    now: Timestamp,
+    next: u32,
+    waiting: BTreeMap<u32, (Request, Waker)>,
+    answers: BTreeMap<u32, Answer>,
+}
+
+impl Board {
+    async fn request(&self, key: &str, request: Request) -> Result<Answer> {
+        let mut slot = None;
+        let mut request = Some(request);
+        let answer = std::future::poll_fn(|context| {
+            let mut slots = lock(&self.0);
+            if let Some(request) = request.take() {
+                slots.next += 1;
+                let number = slots.next;
+                slot = Some(number);
+                slots.waiting.insert(number, (request, context.waker().clone()));
+                return Poll::Pending;
+            }
+            match slot.and_then(|slot| slots.answers.remove(&slot)) {
+                Some(answer) => Poll::Ready(answer),
+                None => {
+                    if let Some((_, waker)) = slot.and_then(|slot| slots.waiting.get_mut(&slot)) {
+                        waker.clone_from(context.waker());
+                    }
+                    Poll::Pending
+                }
+            }
+        });
+        answer.await.outcome(key)
+    }
+
+    fn answer(&self, slot: u32, answer: Answer, now: Timestamp) {
+        let waiting = {
+            let mut slots = lock(&self.0);
+            slots.now = now;
+            slots.answers.insert(slot, answer);
+            slots.waiting.remove(&slot)
+        };
+        if let Some((_, waker)) = waiting {
+            waker.wake();
+        }
+    }
+}
+
+struct BoardClock(Board);
+
+impl Clock for BoardClock {
+    fn now(&self) -> Timestamp {
+        lock(&self.0.0).now
+    }
+
+    async fn sleep(&self, _: Duration) {}
+}
+
+struct BoardStore(Board);
+
+fn wrong_answer(key: &str) -> Error {
+    Error::Refused { key: key.to_owned(), source: "an answer to another request".into() }
+}
+
+impl Store for BoardStore {
+    type Upload = BoardUpload;
+
+    async fn get(&self, key: &str) -> Result<Object> {
+        self.get_range(key, 0..u64::MAX).await
+    }
+
+    async fn get_range(&self, key: &str, range: Range<u64>) -> Result<Object> {
+        match self.0.request(key, Request::Get(key.to_owned(), range)).await? {
+            Answer::Object(object) => Ok(object),
+            _ => Err(wrong_answer(key)),
+        }
+    }
+
+    async fn head(&self, key: &str) -> Result<ObjectInfo> {
+        self.get_range(key, 0..0).await.map(|object| object.info)
+    }
+
+    async fn put(&self, key: &str, body: Bytes, options: PutOptions) -> Result<ETag> {
+        match self.0.request(key, Request::Put(key.to_owned(), body, options)).await? {
+            Answer::ETag(etag) => Ok(etag),
+            _ => Err(wrong_answer(key)),
+        }
+    }
+
+    async fn delete(&self, key: &str) -> Result<()> {
+        self.0.request(key, Request::Delete(key.to_owned())).await.map(drop)
+    }
+
+    async fn list(&self, request: ListRequest) -> Result<ListPage> {
+        let prefix = request.prefix.clone();
+        match self.0.request(&prefix, Request::List(request)).await? {
+            Answer::Page(page) => Ok(page),
+            _ => Err(wrong_answer(&prefix)),
+        }
+    }
+
+    /// Beginning an upload and sending its parts changes nothing that anyone sees, so it is no request here.
+    async fn upload(&self, key: &str, options: PutOptions) -> Result<BoardUpload> {
+        let (store, key) = (BoardStore(self.0.clone()), key.to_owned());
+        Ok(BoardUpload { store, key, options, body: BytesMut::new() })
+    }
+}
+
+struct BoardUpload {
+    store: BoardStore,
+    key: String,
+    options: PutOptions,
+    body: BytesMut,
+}
+
+impl Upload for BoardUpload {
+    async fn write(&mut self, bytes: Bytes) -> Result<()> {
+        self.body.extend_from_slice(&bytes);
+        Ok(())
+    }
+
+    async fn finish(self) -> Result<ETag> {
+        self.store.put(&self.key, self.body.freeze(), self.options).await
+    }
+
+    async fn abort(self) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// Draws at once.
+struct Drawer;
+
+impl Renderer for Drawer {
+    fn most_bytes(&self) -> u64 {
+        1_000
+    }
+
+    async fn draw(&self, name: &ScriptName, script: Bytes, part: Part) -> Result<Drawing> {
+        Ok(match (Play::of(&script), part) {
+            (Play::Frame, None) | (Play::Split(_), Some(_)) => {
+                Drawing::Frame(picture(name, &script, part).into())
+            }
+            (Play::Split(count), None) => Drawing::Split(count),
+            (Play::Bad | Play::Hang | Play::Crash | Play::Frame, _) => {
+                Drawing::Fault(Reason::new(format!("{name}.txt:1:1: bad")))
+            }
+        })
+    }
+}
+
+/// Lists frames at once.
+struct Joiner;
+
+struct Joined {
+    settings: AnimationSettings,
+    pictures: Vec<String>,
+}
+
+impl Animator for Joiner {
+    type Encoding = Joined;
+
+    fn begin(&self, settings: &AnimationSettings) -> Result<Joined, Reason> {
+        Ok(Joined { settings: *settings, pictures: Vec::new() })
+    }
+}
+
+impl Encoding for Joined {
+    async fn push(&mut self, frame: Bytes) -> Result<Bytes, Unfit> {
+        self.pictures.push(String::from_utf8_lossy(&frame).into_owned());
+        Ok(Bytes::new())
+    }
+
+    async fn finish(self) -> Result<Bytes, Reason> {
+        Ok(film(&self.settings, &self.pictures).into())
+    }
+}

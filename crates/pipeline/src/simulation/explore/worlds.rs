@@ -1,0 +1,108 @@
+//! The small worlds: what users do in them, and what may go wrong.
+
+use super::Budget;
+
+/// A small world.
+#[derive(Debug, Clone)]
+pub struct World {
+    /// What it is called in reports.
+    pub name: &'static str,
+    /// What the user puts, or deletes, in this order: keys and texts.
+    pub(super) acts: Vec<(String, Option<&'static str>)>,
+    /// How many of the acts are past: all has come to rest after each.
+    pub(super) past: usize,
+    /// What may go wrong.
+    pub budget: Budget,
+}
+
+/// Nothing goes wrong but the order.
+const CALM: Budget = Budget { kills: 0, ghosts: 0, losses: 0, doubles: 0, drops: 0 };
+
+/// A script of one frame.
+const A: Option<&str> = Some("frame 0");
+/// Another one.
+const B: Option<&str> = Some("frame 1");
+/// A third one.
+const C: Option<&str> = Some("frame 2");
+/// It goes.
+const GONE: Option<&str> = None;
+
+fn world(name: &'static str, past: usize, budget: Budget, acts: &[(&str, Option<&'static str>)]) -> World {
+    let acts = acts.iter().map(|(file, text)| (format!("scripts/a/{file}"), *text)).collect();
+    World { name, acts, past, budget }
+}
+
+/// All of them.
+pub fn worlds() -> Vec<World> {
+    let kill = Budget { kills: 1, ..CALM };
+    let late = Budget { kills: 1, ghosts: 1, ..CALM };
+    let loss = Budget { losses: 1, ..CALM };
+    let twice = Budget { doubles: 1, ..CALM };
+    let lost = Budget { drops: 1, ..CALM };
+    let one = [("1.txt", A)];
+    let two = [("1.txt", A), ("2.txt", A)];
+    let three = [("1.txt", A), ("2.txt", A), ("3.txt", A)];
+    let overwrite = [("1.txt", A), ("1.txt", B)];
+    let revert = [("1.txt", A), ("1.txt", B), ("1.txt", A)];
+    let delete = [("1.txt", A), ("2.txt", A), ("2.txt", GONE)];
+    let emptied = [("1.txt", A), ("1.txt", GONE)];
+    let flicker = [("1.txt", A), ("2.txt", A), ("2.txt", B), ("2.txt", A)];
+    let fault = [("1.txt", Some("bad 0")), ("1.txt", A)];
+    let split = [("1.txt", Some("split 2 0"))];
+    let thrice = [("1.txt", A), ("1.txt", B), ("1.txt", C)];
+    let again = [("1.txt", A), ("1.txt", B), ("1.txt", C), ("1.txt", B)];
+    let waiting = [("animation.json", Some("{\"frames\": 2}")), ("1.txt", A), ("1.txt", B), ("1.txt", A)];
+    let returning = [
+        ("animation.json", Some("{\"frames\": 2}")),
+        ("1.txt", A),
+        ("2.txt", A),
+        ("2.txt", GONE),
+        ("2.txt", A),
+    ];
+    let announced = [("animation.json", Some("{\"frames\": 2}")), ("1.txt", A), ("2.txt", A)];
+    vec![
+        world("one frame, a kill", 0, kill, &one),
+        world("one frame, a kill and a late write", 0, late, &one),
+        world("one frame, a lost answer", 0, loss, &one),
+        world("one frame, an event twice", 0, twice, &one),
+        world("one frame, an event lost", 0, lost, &one),
+        world("one frame, overwritten", 0, CALM, &overwrite),
+        world("one frame, overwritten when done, a kill", 1, kill, &overwrite),
+        world("one frame, overwritten when done, a late write", 1, late, &overwrite),
+        world("one frame, changed and changed back", 0, CALM, &revert),
+        world("one frame, changed and changed back when done", 1, CALM, &revert),
+        world("one frame, changed and changed back when done, a kill", 1, kill, &revert),
+        world("one frame, deleted", 0, CALM, &emptied),
+        world("one frame, deleted when done, a lost answer", 1, loss, &emptied),
+        world("a fault that is mended", 0, CALM, &fault),
+        world("one script of two frames", 0, CALM, &split),
+        world("two frames", 0, CALM, &two),
+        world("two frames, a kill", 0, kill, &two),
+        world("two frames, a lost answer", 0, loss, &two),
+        world("two frames, announced", 1, CALM, &announced),
+        world("two frames, one deleted when done", 2, CALM, &delete),
+        world("two frames, one deleted when done, a kill", 2, kill, &delete),
+        world("two frames, one changed and changed back when done", 2, CALM, &flicker),
+        world("one frame, overwritten twice when done, a late write", 1, late, &thrice),
+        world("one frame, changed thrice when done", 1, CALM, &again),
+        world("one of two frames, changed and changed back", 2, CALM, &waiting),
+        world("the second of two frames comes, goes and comes back", 2, CALM, &returning),
+        world("three frames, the last one new", 2, kill, &three),
+        world("three frames", 1, CALM, &three),
+    ]
+}
+
+/// Those in which few schedules show much: what [`super::provoke`] is best given.
+pub fn provoking() -> Vec<World> {
+    const NAMES: [&str; 8] = [
+        "one frame, a kill",
+        "one frame, an event twice",
+        "one frame, deleted when done, a lost answer",
+        "one frame, changed and changed back when done, a kill",
+        "one frame, overwritten twice when done, a late write",
+        "one frame, changed thrice when done",
+        "one of two frames, changed and changed back",
+        "the second of two frames comes, goes and comes back",
+    ];
+    worlds().into_iter().filter(|world| NAMES.contains(&world.name)).collect()
+}

@@ -1,0 +1,374 @@
+//! Steps on a store in memory in which somebody meddles at the worst moment: one test for each rule that only then shows.
+
+use std::ops::Range;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use bytes::Bytes;
+
+use crate::failure::{End, Failure, Recorded};
+use crate::keys::{Animation, Key, Part, ScriptName};
+use crate::manifest::{FrameState, Manifest, Reason, Status};
+use crate::render::{Drawing, Outcome, Renderer};
+use crate::retry::{Scope, retry};
+use crate::simulation::acting::{Play, film, picture};
+use crate::store::{Bucket, ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, Upload};
+use crate::sweep::{Visit, visit};
+use crate::{
+    Animator, Clock, Encoding, Error, Invocation, Policy, Randomness, Result, Timestamp, Unfit, assemble,
+    record_failure, render_frame,
+};
+
+/// Jumps to wherever someone waits for.
+#[derive(Debug)]
+struct JumpingClock(AtomicU64);
+
+impl Clock for JumpingClock {
+    fn now(&self) -> Timestamp {
+        Timestamp(self.0.load(Ordering::Relaxed))
+    }
+
+    async fn sleep(&self, duration: Duration) {
+        self.0.fetch_add(duration.as_millis() as u64, Ordering::Relaxed);
+    }
+}
+
+type Meddler = Box<dyn FnMut(&str, &mut Bucket, Timestamp) + Send>;
+
+/// A bucket in which somebody does something before a request that is named like `put frames/…`.
+struct Meddled {
+    bucket: Mutex<Bucket>,
+    clock: JumpingClock,
+    meddler: Mutex<Option<Meddler>>,
+}
+
+impl Meddled {
+    fn meet(&self, action: &str, key: &str) -> std::sync::MutexGuard<'_, Bucket> {
+        let mut bucket = self.bucket.lock().unwrap();
+        if let Some(meddler) = self.meddler.lock().unwrap().as_mut() {
+            meddler(&format!("{action} {key}"), &mut bucket, self.clock.now());
+        }
+        bucket
+    }
+}
+
+impl Store for Meddled {
+    type Upload = Pieces;
+
+    async fn get(&self, key: &str) -> Result<Object> {
+        self.meet("get", key).get(key)
+    }
+
+    async fn get_range(&self, key: &str, range: Range<u64>) -> Result<Object> {
+        self.meet("get", key).get_range(key, range)
+    }
+
+    async fn head(&self, key: &str) -> Result<ObjectInfo> {
+        self.meet("head", key).head(key)
+    }
+
+    async fn put(&self, key: &str, body: Bytes, options: PutOptions) -> Result<ETag> {
+        self.meet("put", key).put(self.clock.now(), key, body, options)
+    }
+
+    async fn delete(&self, key: &str) -> Result<()> {
+        self.meet("delete", key).delete(key);
+        Ok(())
+    }
+
+    async fn list(&self, request: ListRequest) -> Result<ListPage> {
+        Ok(self.meet("list", &request.prefix).list(&request))
+    }
+
+    async fn upload(&self, _: &str, _: PutOptions) -> Result<Pieces> {
+        Ok(Pieces)
+    }
+}
+
+/// What is uploaded in pieces: here only whether it comes to an end.
+struct Pieces;
+
+impl Upload for Pieces {
+    async fn write(&mut self, _: Bytes) -> Result<()> {
+        Ok(())
+    }
+
+    async fn finish(self) -> Result<ETag> {
+        Err(Error::Refused { key: "the GIF".into(), source: "it was built".into() })
+    }
+
+    async fn abort(self) -> Result<()> {
+        Ok(())
+    }
+}
+
+struct Drawer;
+
+impl Renderer for Drawer {
+    fn most_bytes(&self) -> u64 {
+        1_000
+    }
+
+    async fn draw(&self, name: &ScriptName, script: Bytes, part: Part) -> Result<Drawing> {
+        Ok(match (Play::of(&script), part) {
+            (Play::Frame, None) | (Play::Split(_), Some(_)) => {
+                Drawing::Frame(picture(name, &script, part).into())
+            }
+            (Play::Split(count), None) => Drawing::Split(count),
+            _ => Drawing::Fault(Reason::new("bad")),
+        })
+    }
+}
+
+struct Joiner(Vec<String>);
+
+impl Animator for Joiner {
+    type Encoding = Joiner;
+
+    fn begin(&self, _: &rayfold_scene::AnimationSettings) -> Result<Joiner, Reason> {
+        Ok(Joiner(Vec::new()))
+    }
+}
+
+impl Encoding for Joiner {
+    async fn push(&mut self, frame: Bytes) -> Result<Bytes, Unfit> {
+        self.0.push(String::from_utf8_lossy(&frame).into_owned());
+        Ok(Bytes::new())
+    }
+
+    async fn finish(self) -> Result<Bytes, Reason> {
+        Ok(film(&Default::default(), &self.0).into())
+    }
+}
+
+struct World {
+    store: Meddled,
+    random: Randomness,
+    policy: Policy,
+    requests: AtomicU64,
+}
+
+impl World {
+    fn new() -> Self {
+        let clock = JumpingClock(AtomicU64::new(1_000_000));
+        let store = Meddled { bucket: Mutex::default(), clock, meddler: Mutex::default() };
+        World { store, random: Randomness::seeded(1), policy: Policy::new(1), requests: AtomicU64::new(0) }
+    }
+
+    fn film() -> Animation {
+        Animation::new("film").unwrap()
+    }
+
+    fn put(&self, key: &str, text: &str) -> ETag {
+        let body = Bytes::copy_from_slice(text.as_bytes());
+        let mut bucket = self.store.bucket.lock().unwrap();
+        bucket.put(self.store.clock.now(), key, body, PutOptions::always()).unwrap()
+    }
+
+    fn keys(&self, prefix: &str) -> Vec<String> {
+        let bucket = self.store.bucket.lock().unwrap();
+        bucket.keys().filter(|key| key.starts_with(prefix)).map(str::to_owned).collect()
+    }
+
+    fn meddle(&self, meddler: impl FnMut(&str, &mut Bucket, Timestamp) + Send + 'static) {
+        *self.store.meddler.lock().unwrap() = Some(Box::new(meddler));
+    }
+
+    async fn with<T>(&self, step: impl AsyncFnOnce(&Invocation<'_, Meddled, JumpingClock>) -> T) -> T {
+        let id = format!("request-{}", self.requests.fetch_add(1, Ordering::Relaxed));
+        step(&Invocation::new(&self.store, &self.store.clock, &self.random, &self.policy, &id)).await
+    }
+
+    async fn render(&self, key: &str) -> Outcome {
+        self.with(async |invocation| render_frame(invocation, &Drawer, key).await.unwrap().outcome).await
+    }
+
+    async fn upload(&self, file: &str, text: &str) -> Outcome {
+        let key = format!("scripts/film/{file}");
+        self.put(&key, text);
+        self.render(&key).await
+    }
+
+    async fn visit(&self) -> Visit {
+        self.with(async |invocation| visit(invocation, &World::film()).await.unwrap()).await
+    }
+
+    async fn record(&self, key: &str, version: Option<ETag>, end: End) -> Recorded {
+        let failure = Failure { key: key.to_owned(), version, attempts: 3, end };
+        self.with(async |invocation| record_failure(invocation, &failure).await.unwrap()).await
+    }
+
+    fn manifest(&self) -> Manifest {
+        let body = self.store.bucket.lock().unwrap().get("manifests/film.json").unwrap().body;
+        Manifest::decode(&World::film(), &body).unwrap()
+    }
+}
+
+#[tokio::test]
+async fn a_gif_skips_no_frame_that_is_gone() {
+    let world = World::new();
+    world.upload("1.txt", "frame 1").await;
+    world.upload("2.txt", "frame 2").await;
+    let claim = world.keys("assemblies/").pop().unwrap();
+    // Between the listing and the reading of a frame it goes; then it is not looked for again.
+    world.meddle(|request, bucket, _| {
+        if request.starts_with("get frames/film/1@") {
+            let key = request.strip_prefix("get ").unwrap();
+            bucket.delete(key);
+        }
+    });
+    let assembled =
+        world.with(async |invocation| assemble(invocation, &Joiner(Vec::new()), &claim).await).await;
+    let assembled = assembled.expect("nothing was built");
+    assert_eq!((assembled.built, assembled.status), (0, Status::Rendering));
+}
+
+#[tokio::test]
+async fn what_comes_back_while_its_results_are_tidied_away_is_woken() {
+    let world = World::new();
+    world.upload("1.txt", "frame 1").await;
+    world.upload("1.txt", "frame 2").await;
+    world.store.clock.sleep(Duration::from_secs(8 * 24 * 3600)).await;
+    world.meddle(|request, bucket, now| {
+        if request.starts_with("delete frames/film/1@") {
+            bucket.put(now, "scripts/film/1.txt", "frame 1".into(), PutOptions::always()).unwrap();
+        }
+    });
+    let visit = world.visit().await;
+    assert_eq!((visit.deleted, visit.woken), (1, 1));
+    let [retry] = &world.keys("retries/")[..] else { panic!("{:?}", world.keys("retries/")) };
+    assert_eq!(world.render(retry).await, Outcome::Drawn);
+}
+
+#[tokio::test]
+async fn a_time_out_is_blamed_on_no_other_version() {
+    let world = World::new();
+    let before = world.put("scripts/film/1.txt", "hang 1");
+    let now = world.put("scripts/film/1.txt", "frame 1");
+    for (end, why) in [(End::TimedOut, "timed out"), (End::Died, "died")] {
+        let recorded = world.record("scripts/film/1.txt", Some(before.clone()), end.clone()).await;
+        assert!(matches!(recorded, Recorded::Woken { .. }), "{why}: {recorded:?}");
+        assert!(world.keys("frames/film/1@").is_empty(), "{why}");
+    }
+    let recorded = world.record("scripts/film/1.txt", Some(now), End::TimedOut).await;
+    assert!(matches!(recorded, Recorded::GivenUp(_)), "{recorded:?}");
+    let FrameState::Failed(fault) = &world.manifest().frames[0].state else { panic!() };
+    assert_eq!(fault.reason.as_ref().unwrap().message, "timed out in each of 3 attempts");
+}
+
+#[tokio::test]
+async fn a_failure_record_of_what_has_a_result_changes_nothing() {
+    let world = World::new();
+    world.upload("1.txt", "frame 1").await;
+    let version = world.store.bucket.lock().unwrap().head("scripts/film/1.txt").unwrap().etag;
+    let before = world.keys("");
+    for end in [End::TimedOut, End::Died, End::TooOld, End::Error("busy".into())] {
+        let recorded = world.record("scripts/film/1.txt", Some(version.clone()), end).await;
+        assert!(matches!(recorded, Recorded::Resolved(_)), "{recorded:?}");
+    }
+    assert_eq!(world.keys(""), before);
+    assert_eq!(world.manifest().head.status, Status::Done);
+}
+
+#[tokio::test]
+async fn a_retry_counts_anew_and_the_manifest_says_so_at_once() {
+    let world = World::new();
+    world.upload("1.txt", "bad 1").await;
+    world.upload("2.txt", "frame 2").await;
+    assert_eq!(world.manifest().head.status, Status::Failed);
+    let version = world.store.bucket.lock().unwrap().head("scripts/film/1.txt").unwrap().etag;
+    for attempt in 1..=3 {
+        world.put(&format!("retries/film/1@{version}-p1/{attempt}"), "");
+        world.put(&format!("frames/film/1@{version}-p1.begun-{attempt}"), "");
+        world.put(&format!("retries/film/9@{version}-p1/{attempt}"), "another's");
+    }
+    let retried =
+        world.with(async |invocation| retry(invocation, &World::film(), Scope::Failed).await.unwrap()).await;
+    assert_eq!((retried.deleted, retried.woken), (1, 1));
+    assert_eq!(world.keys("retries/film/1@"), [format!("retries/film/1@{version}-p1/1")]);
+    assert_eq!(world.keys("retries/film/9@").len(), 3);
+    assert!(world.keys("frames/film/1@").is_empty());
+    let head = world.manifest().head;
+    assert_eq!((head.status, head.pending), (Status::Rendering, 1), "not failed any more");
+}
+
+/// Their events came while another version of the script was current, and drew nothing.
+#[tokio::test]
+async fn parts_from_before_the_upload_are_put_again() {
+    let world = World::new();
+    let version = world.put("scripts/film/1.txt", "split 3 1");
+    let part = |number: u32| format!("parts/film/1@{version}-p1/{number}.json");
+    for number in [1, 2] {
+        world.put(&part(number), "{}");
+    }
+    world.store.clock.sleep(Duration::from_secs(9)).await;
+    world.put("scripts/film/1.txt", "split 3 1");
+    world.store.clock.sleep(Duration::from_secs(9)).await;
+    world.put(&part(2), "{}");
+    let put_at =
+        |world: &World, number| world.store.bucket.lock().unwrap().head(&part(number)).unwrap().modified;
+    let before = [1, 2].map(|number| put_at(&world, number));
+    world.store.clock.sleep(Duration::from_secs(9)).await;
+    assert!(matches!(world.render("scripts/film/1.txt").await, Outcome::Split(_)));
+    let after = [1, 2, 3].map(|number| put_at(&world, number));
+    assert!(after[0] > before[0], "the first one's event may have come too early");
+    assert_eq!(after[1], before[1], "the second one was put since");
+}
+
+#[tokio::test]
+async fn a_reason_that_cannot_be_had_is_waited_for_and_not_left_out() {
+    let world = World::new();
+    let replace = |bucket: &mut Bucket, now: Timestamp, key: &str, number: u64| {
+        let reason = format!(r#"{{"message":"reason {number}"}}"#);
+        bucket.put(now, key, reason.into(), PutOptions::always()).unwrap();
+    };
+    // Twice the receipt is another one when it is read; then it is the one that was listed.
+    let mut times = 0;
+    world.meddle(move |request, bucket, now| {
+        if let Some(key) = request.strip_prefix("get ").filter(|key| key.ends_with(".error.json"))
+            && times < 2
+        {
+            times += 1;
+            replace(bucket, now, key, times);
+        }
+    });
+    world.upload("1.txt", "bad 1").await;
+    let FrameState::Failed(fault) = &world.manifest().frames[0].state else { panic!() };
+    assert_eq!(fault.reason.as_ref().unwrap().message, "reason 2");
+
+    // One that is another each time is asked for no more than a few times, with pauses.
+    let mut times = 10;
+    world.meddle(move |request, bucket, now| {
+        if let Some(key) = request.strip_prefix("get ").filter(|key| key.ends_with(".error.json")) {
+            times += 1;
+            assert!(times < 40, "asked for without bound");
+            replace(bucket, now, key, times);
+        }
+    });
+    world.put("scripts/film/1.txt", "bad 2");
+    let before = world.store.clock.now();
+    let rendering =
+        world.with(async |invocation| render_frame(invocation, &Drawer, "scripts/film/1.txt").await).await;
+    assert!(rendering.unwrap_err().is_retryable());
+    assert!(world.store.clock.now().since(before) > Duration::from_millis(500));
+}
+
+#[tokio::test]
+async fn ranges_of_a_listing_share_no_name() {
+    let world = World::new();
+    for number in 0..2_300 {
+        world.put(&format!("scripts/film/{number}.txt"), "frame 1");
+    }
+    let folding = async |invocation: &Invocation<'_, Meddled, JumpingClock>| {
+        crate::fold::fold(invocation, &World::film()).await.unwrap()
+    };
+    world.with(folding).await;
+    assert_eq!(world.manifest().head.marks.len(), 2);
+    // Now that there are marks the listing comes in ranges.
+    world.put("scripts/film/9999.txt", "frame 1");
+    world.with(folding).await;
+    assert_eq!((world.manifest().head.total, world.manifest().frames.len()), (2_301, 2_301));
+    let claims = world.keys("assemblies/");
+    assert!(claims.iter().all(|key| matches!(key.parse(), Ok(Key::Claim { .. }))));
+}
