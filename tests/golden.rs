@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use image::{GenericImage as _, Rgb, RgbImage};
-use rayfold_scene::{Limits, Scene, Screen, parse};
+use rayfold_scene::{Limits, Samples, Scene, Screen, parse};
 use rayfold_tracer::{RenderOptions, reference, render};
 
 /// Levels that a channel may be off: a result that lies on the border between two levels may round either way.
@@ -131,6 +131,8 @@ fn load(script: &str, k: usize) -> Scene {
     let parsed_script = parsed.script.unwrap_or_else(|| panic!("{script}: {:?}", parsed.diagnostics));
     let mut scene = parsed_script.frame(k).unwrap();
     scene.screen = Screen::new(SIDE, SIDE).unwrap();
+    // One ray a pixel: of means `tests/sampled.rs` tells.
+    scene.samples = Samples::default();
     scene
 }
 

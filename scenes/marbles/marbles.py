@@ -96,9 +96,11 @@ STAGE = """\
 
 Screen 320 240
 Tone srgb
+Samples 32 1.5
+Shutter 0.4
 Look  2.6 3.7 11.5   -0.15 1.72 0   34
 Background  0.5 0.48 0.45   0.3 0.42 0.6
-Ilight  1.3 1.15 0.95   -0.55 -1.5 -0.75
+Ilight  1.3 1.15 0.95   -0.55 -1.5 -0.75   3
 
 Material grain   diffuse 0.22 0.09 0.035
 Material wood    ambient 0.01 0.006 0.004   diffuse 0.4 0.21 0.09   mirror 0.04 0.04 0.04   noise 0.13 grain

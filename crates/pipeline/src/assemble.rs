@@ -21,7 +21,7 @@ use crate::keys::{Animation, Generation, Key, Receipt, Tag};
 use crate::manifest::{Frame, FrameState, Head, Manifest, Reason, Status};
 use crate::observe::Observation;
 use crate::store::{Condition, ObjectInfo, PutOptions, Store, Upload};
-use crate::sweep::Wakings;
+use crate::wakings::Wakings;
 use crate::{Clock, Error, Result, Timestamp};
 
 /// The name of the GIF's metadata that holds its generation.

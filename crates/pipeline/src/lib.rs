@@ -23,6 +23,7 @@ pub mod store;
 pub mod sweep;
 #[cfg(test)]
 mod tests;
+mod wakings;
 
 pub use assemble::{Animator, Encoding, Unfit, assemble};
 pub use clock::{Clock, Randomness, SystemClock, Timestamp};

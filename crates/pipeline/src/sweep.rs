@@ -17,7 +17,8 @@ use crate::keys::{Animation, Key, MANIFESTS, Part, Receipt, SCRIPTS, ScriptName,
 use crate::manifest::{Fault, Frame, FrameState, Manifest, Reason, Status};
 use crate::observe::Observation;
 use crate::reconcile::ReceiptFound;
-use crate::store::{ETag, ListRequest, Listed, Store};
+use crate::store::{ETag, ListRequest, Store};
+use crate::wakings::Wakings;
 use crate::{Clock, Error, Result, Timestamp};
 
 /// How many animations are visited side by side.
@@ -45,16 +46,6 @@ pub struct Visit {
     pub claimed: bool,
     /// Superseded objects that were deleted.
     pub deleted: u64,
-}
-
-/// How often and when last a frame was woken.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Wakings {
-    /// The last one's number.
-    pub(crate) attempts: u64,
-    last: Timestamp,
-    /// To how many of them an invocation has begun. The others may wait behind a thousand frames.
-    pub(crate) begun: u64,
 }
 
 /// The pause between wakings doubles no more than so often.
@@ -275,35 +266,6 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let key = Key::Retry { animation, name, tag, part, attempt }.to_string();
         let body = serde_json::json!({ "woken_by": self.request_id() });
         self.put(&key, body.to_string().into()).await.map(drop)
-    }
-
-    /// How often each frame of an animation was woken.
-    pub(crate) async fn wakings(
-        &self,
-        animation: &Animation,
-        observation: &Observation,
-    ) -> Result<BTreeMap<(ScriptName, ETag, Part), Wakings>> {
-        let mut wakings: BTreeMap<_, Wakings> = BTreeMap::new();
-        for listed in self.retries(animation).await? {
-            if let Ok(Key::Retry { name, tag, part, attempt, .. }) = listed.key.parse() {
-                let waking = wakings.entry((name, tag.version, part)).or_default();
-                waking.attempts = waking.attempts.max(attempt.get());
-                waking.last = waking.last.max(listed.modified);
-            }
-        }
-        for found in &observation.results.receipts {
-            if let Receipt::Begun { name, tag, part, .. } = &found.receipt {
-                wakings.entry((name.clone(), tag.version.clone(), *part)).or_default().begun += 1;
-            }
-        }
-        Ok(wakings)
-    }
-
-    /// The objects below `retries/<animation>/` that are this animation's, not one's below it.
-    pub(crate) async fn retries(&self, animation: &Animation) -> Result<Vec<Listed>> {
-        let mut listed = self.list_ranges(ListRequest::all(animation.retries()), Vec::new()).await?;
-        listed.retain(|listed| listed.key.parse::<Key>().is_ok_and(|key| key.animation() == animation));
-        Ok(listed)
     }
 
     /// Deletes results of versions that are no longer current, once they are old, and the parts that led to them.

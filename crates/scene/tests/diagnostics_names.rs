@@ -476,12 +476,6 @@ fn what_a_clear_removes_of_groups() {
               |
               = help: `Trace` renders a frame of everything that stands before it
 
-            warning: this version draws one ray a pixel, whatever is asked for
-             --> a.txt:7:1
-              |
-            7 | Samples 4
-              | ^^^^^^^ expected `Samples 1`, or edges, shadows, lens and motion will be sharp
-
             warning: this has no effect: no `Trace` follows
              --> a.txt:9:1
               |

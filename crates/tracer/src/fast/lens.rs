@@ -4,7 +4,6 @@ use fearless_simd::Simd;
 use glam::DVec3;
 use rayfold_scene::{Camera, Scene};
 
-use super::geometry::{Geometry, View};
 use super::placed::Placed;
 use super::real::{Lanes, Real, Vec3, splat};
 use super::shapes::Shape;
@@ -56,11 +55,11 @@ pub(super) struct Aperture<E> {
 }
 
 impl<E: Real> Aperture<E> {
-    pub(super) fn new(geometry: &Geometry) -> Option<Self> {
-        let (lens, View::Pinhole { right, up, .. }) = (geometry.lens?, geometry.view) else { return None };
+    /// `right` and `up` are unit vectors, square to the gaze.
+    pub(super) fn new(lens: Lens, right: DVec3, up: DVec3) -> Self {
         let narrow = |v: DVec3| v.to_array().map(E::narrow);
         let power = E::narrow(1.0 / lens.distance);
-        Some(Self { radius: lens.radius, right: narrow(right), up: narrow(up), power })
+        Self { radius: lens.radius, right: narrow(right), up: narrow(up), power }
     }
 
     /// The rays from points of the lens, and their directions of any length; `along` are the eye's own, which go as far as 1

@@ -23,7 +23,7 @@ mod worlds;
 use std::collections::BTreeSet;
 
 use crate::{Mutation, Randomness};
-use order::Order;
+use order::{Order, pick};
 use process::Memo;
 use state::{Choice, Fate, State};
 pub use worlds::{World, provoking, worlds};
@@ -177,10 +177,6 @@ fn schedule(
         state = state.after(world, &mut memo, choice).map_err(|what| failed(what, &steps))?;
     }
     state.judge(world, &mut memo).map_err(|what| failed(what, &steps))
-}
-
-fn pick<'a, T>(from: &'a [T], random: &Randomness) -> Option<&'a T> {
-    from.get(usize::try_from(random.below(from.len() as u64)).unwrap_or(0))
 }
 
 /// Whether nothing goes wrong in it.

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::pick;
 use super::state::{Choice, State};
 use crate::Randomness;
 
@@ -78,4 +77,9 @@ impl Order {
             }
         }
     }
+}
+
+/// Any of them; none if there is none.
+pub(super) fn pick<'a, T>(from: &'a [T], random: &Randomness) -> Option<&'a T> {
+    from.get(usize::try_from(random.below(from.len() as u64)).unwrap_or(0))
 }

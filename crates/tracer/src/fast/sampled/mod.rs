@@ -20,7 +20,7 @@ use super::dispatch::on;
 #[cfg(target_arch = "x86_64")]
 use super::features::Unfitted;
 use super::features::{Fitted, Kernel};
-use super::geometry::Geometry;
+use super::geometry::{Geometry, View};
 use super::lens::Aperture;
 use super::prepare::Prepared;
 use super::real::Real;
@@ -157,7 +157,11 @@ impl<E: Real> Moment<E> {
         let window = Window::new(geometry.view, &shapes, &grid, E::ROUNDOFF);
         let few = prepared.tree.is_none().then_some(&shapes[..]);
         let extents = Extents::new::<E>(scene, geometry, few, dimensions);
-        Ok(Self { prepared, window, extents, lens: Aperture::new(geometry) })
+        let lens = match geometry.view {
+            View::Pinhole { right, up, .. } => geometry.lens.map(|lens| Aperture::new(lens, right, up)),
+            View::Parallel { .. } => None,
+        };
+        Ok(Self { prepared, window, extents, lens })
     }
 }
 
