@@ -142,8 +142,8 @@ mod tests {
             rng.shuffle(&mut mixed);
             let found = Crowds::find(&mixed).expect("a crowd");
             let crowded: usize = found.ranges.iter().map(Range::len).sum();
-            // In chunks of a few hundred.
-            assert!((17_000..22_000).contains(&crowded), "{crowded} of 20000, {half}");
+            // Most of it: at the ends of chunks, boxes without a size are of several places.
+            assert!((15_000..22_000).contains(&crowded), "{crowded} of 20000, {half}");
             let mut order = found.order.clone();
             order.sort_unstable();
             assert!(order.into_iter().eq(0..40_000), "each once");
