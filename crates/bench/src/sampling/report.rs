@@ -54,7 +54,8 @@ pub(super) fn write(
          Written by `rayfold-bench sampling`; all figures are in [sampling.csv](sampling.csv). Pictures of {width} x {height}, one \
          thread, processor time of preparing and drawing, the shortest of three runs. An error is the root mean square over pixels \
          and channels, in levels (0..255) before rounding, from the truth: the same picture in `f64` with {truth} samples in every \
-         pixel.\n\n"
+         pixel. Pairs of dimensions and independent samples are there for their errors: their points are worked out one by one, so \
+         that their times say little.\n\n"
     );
     page.push_str(&slopes(drawn));
     page.push_str(&rays_saved(drawn));
