@@ -4,11 +4,11 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use super::beyond::Beyond;
-use super::bounce::{Hits, Queue};
+use super::bounce::{Columns, Hits, Queue};
 use super::candidates::{Candidates, Found, Masks, Picked};
 use super::dimming::{Arriving, Shadow};
 use super::features::{BUILT, Features};
-use super::finish::{Finishes, Lit};
+use super::finish::{Finishes, Gloss, Lit};
 use super::kind::ByKind;
 use super::lights::buffer::{LightBuffer, Seen};
 use super::lights::lamp::Rays;
@@ -130,7 +130,7 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>
     simd.vectorize(
         #[inline(always)]
         || {
-            let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
+            let zero = constant::<S, E>(simd, 0.0);
             let far = constant::<S, E>(simd, E::FAR);
             for &(at, others) in &hits.packets {
                 let normal = Vec3::load(simd, &hits.normal, at);
@@ -196,28 +196,42 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                         gloss.add(lit, (seen, normal), orders);
                     }
                 }
-                let diffuse = Vec3::load(simd, &hits.diffuse, at);
-                let color = Vec3::load(simd, &hits.color, at);
-                let lit = Vec3::<S, E>::new(
-                    diffuse.x.mul_add(sum.x, color.x),
-                    diffuse.y.mul_add(sum.y, color.y),
-                    diffuse.z.mul_add(sum.z, color.z),
-                );
-                let lit = match gloss {
-                    Some(gloss) if gloss.is_seen => {
-                        let sum = gloss.sum::<S, E>(simd);
-                        if EYE {
-                            sum.scale_add(one, lit)
-                        } else {
-                            sum.mul(Vec3::load(simd, &queue.weight, at)).scale_add(one, lit)
-                        }
-                    }
-                    Some(_) | None => lit,
-                };
-                lit.store(&mut hits.color, at);
+                let colors = (&hits.diffuse, &mut hits.color);
+                add_light::<S, E, EYE>(simd, queue, at, colors, (sum, gloss));
             }
         },
     );
+}
+
+/// Adds to the colours of a packet's hits the `sum` of the lights that reach them, and their highlights.
+#[inline(always)]
+pub(super) fn add_light<S: Simd, E: Real, const EYE: bool>(
+    simd: S,
+    queue: &Queue<E>,
+    at: usize,
+    (diffuse, colors): (&Columns<E>, &mut Columns<E>),
+    (sum, gloss): (Vec3<S, E>, Option<Gloss>),
+) {
+    let diffuse = Vec3::load(simd, diffuse, at);
+    let color = Vec3::load(simd, colors, at);
+    let lit = Vec3::<S, E>::new(
+        diffuse.x.mul_add(sum.x, color.x),
+        diffuse.y.mul_add(sum.y, color.y),
+        diffuse.z.mul_add(sum.z, color.z),
+    );
+    let lit = match gloss {
+        Some(gloss) if gloss.is_seen => {
+            let one = constant::<S, E>(simd, 1.0);
+            let sum = gloss.sum::<S, E>(simd);
+            if EYE {
+                sum.scale_add(one, lit)
+            } else {
+                sum.mul(Vec3::load(simd, &queue.weight, at)).scale_add(one, lit)
+            }
+        }
+        Some(_) | None => lit,
+    };
+    lit.store(colors, at);
 }
 
 /// The box of the points that wait for light; there is at least one.

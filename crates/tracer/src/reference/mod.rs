@@ -36,7 +36,7 @@ pub use sampled::{Estimate, estimate, render_exposed};
 pub(crate) use shading::{FAINT, FAINT_LINEAR};
 pub use shapes::Surface;
 pub(crate) use shapes::{normal_and_width, power, triangle_normal};
-pub(crate) use tone::levels;
+pub(crate) use tone::{encoded, levels};
 
 use crate::camera::Ray;
 use crate::parallel::{CHANNELS, bands};

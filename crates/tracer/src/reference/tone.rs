@@ -14,7 +14,7 @@ pub(crate) fn toned(tone: Tone, color: DVec3) -> [u8; CHANNELS] {
 }
 
 /// The sRGB curve (IEC 61966-2-1) of a channel of linear light, which is clamped.
-fn encoded(light: f64) -> f64 {
+pub(crate) fn encoded(light: f64) -> f64 {
     let light = light.clamp(0.0, 1.0);
     if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * libm::pow(light, 1.0 / 2.4) - 0.055 }
 }

@@ -14,6 +14,7 @@ use rayfold_scene::{Samples, Tone};
 use rayon::prelude::*;
 
 use crate::parallel::CHANNELS;
+use crate::reference::encoded;
 
 /// A channel's sums count in parts of this, so that no order of adding makes a difference.
 const ONE: f64 = 65535.0;
@@ -111,11 +112,6 @@ impl Pixel {
 fn slope(light: f64, apart: f64) -> f64 {
     let (low, high) = ((light - 0.5 * apart).max(0.0), (light + 0.5 * apart).min(1.0));
     if high - low < 1e-9 { 12.92 } else { (encoded(high) - encoded(low)) / (high - low) }
-}
-
-/// The sRGB curve (IEC 61966-2-1).
-fn encoded(light: f64) -> f64 {
-    if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * libm::pow(light, 1.0 / 2.4) - 0.055 }
 }
 
 /// An image of samples, its first row at the top.

@@ -12,7 +12,7 @@ use crate::fast::dimming::{Arriving, Shadow};
 use crate::fast::features::Features;
 use crate::fast::finish::{Finishes, Lit};
 use crate::fast::geometry::Geometry;
-use crate::fast::light::{InTheWay, region};
+use crate::fast::light::{InTheWay, add_light, region};
 use crate::fast::lights::lamp::Rays;
 use crate::fast::packet::Ray;
 use crate::fast::prepare::Prepared;
@@ -281,30 +281,8 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                         gloss.add(lit, (seen, normal), orders);
                     }
                 }
-                let diffuse = Vec3::load(simd, &hits.diffuse, at);
-                let color = Vec3::load(simd, &hits.color, at);
-                let lit = Vec3::<S, E>::new(
-                    diffuse.x.mul_add(sum.x, color.x),
-                    diffuse.y.mul_add(sum.y, color.y),
-                    diffuse.z.mul_add(sum.z, color.z),
-                );
-                let lit = match gloss {
-                    Some(gloss) if gloss.is_seen => {
-                        let sum = gloss.sum::<S, E>(simd);
-                        let weight = if EYE {
-                            Vec3::splat(simd, [E::narrow(1.0); 3])
-                        } else {
-                            Vec3::load(simd, &queue.weight, at)
-                        };
-                        Vec3::<S, E>::new(
-                            sum.x.mul_add(weight.x, lit.x),
-                            sum.y.mul_add(weight.y, lit.y),
-                            sum.z.mul_add(weight.z, lit.z),
-                        )
-                    }
-                    Some(_) | None => lit,
-                };
-                lit.store(&mut hits.color, at);
+                let colors = (&hits.diffuse, &mut hits.color);
+                add_light::<S, E, EYE>(simd, queue, at, colors, (sum, gloss));
             }
         },
     );
