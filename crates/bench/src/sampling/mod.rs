@@ -5,6 +5,7 @@
 
 mod report;
 mod scenes;
+mod targets;
 
 use std::path::PathBuf;
 
@@ -12,7 +13,7 @@ use anyhow::{Context, Result};
 use glam::DVec3;
 use rayfold_scene::{Samples, Scene};
 use rayfold_tracer::reference::estimate;
-use rayfold_tracer::{Drawing, Exposure, Precision, RenderOptions, Sampler};
+use rayfold_tracer::{Drawing, Exposure, Means, Precision, RenderOptions, Sampler};
 
 use self::scenes::{EFFECTS, Effect, Picture};
 use crate::cpu_time;
@@ -32,6 +33,9 @@ pub struct Args {
     /// Independent samples of the plain tracer that the truth is held against
     #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(2..))]
     independent: u32,
+    /// The scene of the report on speed instead: the time to an error, at the sizes of the targets
+    #[arg(long)]
+    targets: bool,
     /// Only this effect
     #[arg(long)]
     only: Option<String>,
@@ -80,12 +84,15 @@ struct Agreement {
 /// # Errors
 /// When a picture cannot be drawn or a file not written.
 pub fn run(args: &Args) -> Result<()> {
+    if args.targets {
+        return targets::run(args);
+    }
     let size = (args.width, args.width * 3 / 4);
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let (mut drawn, mut agreements) = (vec![], vec![]);
     for effect in EFFECTS.iter().filter(|effect| args.only.as_ref().is_none_or(|only| only == effect.name)) {
         let picture = effect.picture(size)?;
-        let truth = means(&picture, Samples::new(args.truth, 0.0)?, Precision::F64, Sampler::Sobol)?;
+        let truth = truth(&picture, args.truth)?;
         agreements.push(agreement(effect, args)?);
         let mut ways = vec![];
         for (way, sampler) in
@@ -96,7 +103,8 @@ pub fn run(args: &Args) -> Result<()> {
         ways.extend(ERRORS.map(|asked| ("adaptive", Sampler::Sobol, asked)));
         for (way, sampler, (most, error)) in ways {
             let asked = Samples::new(most, error)?;
-            let row = one.install(|| measure(effect, way, &picture, asked, sampler, &truth.means))?;
+            let options = RenderOptions { sampler, ..RenderOptions::default() };
+            let row = one.install(|| measure(effect.name, way, &picture, asked, &options, &truth.means))?;
             eprintln!(
                 "{:8} {:12} {most:5} {error:5}: {:8.2} ms {:7.2} rays, error {:6.3}, {:.3} % off, blocks {:.3}",
                 row.effect,
@@ -114,43 +122,51 @@ pub fn run(args: &Args) -> Result<()> {
 }
 
 /// The picture of a scene, before it becomes levels.
-fn means(
-    picture: &Picture,
-    samples: Samples,
-    precision: Precision,
-    sampler: Sampler,
-) -> Result<rayfold_tracer::Means> {
+fn means(picture: &Picture, samples: Samples, options: &RenderOptions) -> Result<Means> {
     let scene = Scene { samples, ..picture.scene.clone() };
     let after = |frames| picture.after(frames);
-    let options = RenderOptions { precision, sampler, ..RenderOptions::default() };
-    let drawing = Drawing::exposed(Exposure::moving(&scene, &after), &options)?;
+    let drawing = Drawing::exposed(Exposure::moving(&scene, &after), options)?;
     drawing.draw_means()?.context("no kernels for this picture")
 }
 
+/// The same as exactly as the kernels can.
+fn truth(picture: &Picture, samples: u32) -> Result<Means> {
+    let options = RenderOptions { precision: Precision::F64, ..RenderOptions::default() };
+    means(picture, Samples::new(samples, 0.0)?, &options)
+}
+
+/// Processor time of preparing and drawing, in seconds: the shortest of several.
+fn shortest(picture: &Picture, asked: Samples, options: &RenderOptions) -> Result<f64> {
+    let scene = Scene { samples: asked, ..picture.scene.clone() };
+    let after = |frames| picture.after(frames);
+    let mut shortest = f64::INFINITY;
+    for _ in 0..ROUNDS {
+        let (seconds, drawn) =
+            cpu_time::of(|| Drawing::exposed(Exposure::moving(&scene, &after), options)?.draw())?;
+        drawn?;
+        shortest = shortest.min(seconds);
+    }
+    Ok(shortest)
+}
+
 fn measure(
-    effect: &Effect,
+    effect: &'static str,
     way: &'static str,
     picture: &Picture,
     asked: Samples,
-    sampler: Sampler,
+    options: &RenderOptions,
     truth: &[DVec3],
 ) -> Result<Drawn> {
-    let mut shortest = f64::INFINITY;
-    let mut last = None;
-    for _ in 0..ROUNDS {
-        let (seconds, drawn) = cpu_time::of(|| means(picture, asked, Precision::Auto, sampler))?;
-        shortest = shortest.min(seconds);
-        last = Some(drawn?);
-    }
-    let drawn = last.context("no round")?;
+    let seconds = shortest(picture, asked, options)?;
+    let drawn = means(picture, asked, options)?;
     let errors: Vec<DVec3> = drawn.means.iter().zip(truth).map(|(a, b)| 255.0 * (*a - *b)).collect();
     let pixels = errors.len() as f64;
     let width = picture.scene.screen.width() as usize;
     Ok(Drawn {
-        effect: effect.name,
+        effect,
         way,
         asked,
-        seconds: shortest,
+        seconds,
         rays: drawn.counts.iter().map(|&count| f64::from(count)).sum::<f64>() / pixels,
         error: root_mean_square(&errors),
         off: errors.iter().filter(|e| e.abs().max_element() > 4.0).count() as f64 / pixels,
@@ -178,7 +194,7 @@ fn blocks(errors: &[DVec3], width: usize) -> Vec<DVec3> {
 /// A small picture by the plain tracer, beside the kernels' truth at that size.
 fn agreement(effect: &Effect, args: &Args) -> Result<Agreement> {
     let picture = effect.picture((48, 36))?;
-    let truth = means(&picture, Samples::new(args.truth, 0.0)?, Precision::F64, Sampler::Sobol)?;
+    let truth = truth(&picture, args.truth)?;
     let scene = Scene { samples: Samples::new(2, 0.0)?, ..picture.scene.clone() };
     let after = |frames| picture.after(frames);
     let plain = estimate(Exposure::moving(&scene, &after), args.independent, 1);

@@ -17,6 +17,14 @@ pub(super) struct Picture {
 }
 
 impl Picture {
+    /// The first frame of a script.
+    pub(super) fn new(name: &str, text: &str) -> Result<Self> {
+        let parsed = parse(name, text.as_bytes(), &Limits::default());
+        let script = parsed.script.with_context(|| format!("{name}: {:?}", parsed.diagnostics))?;
+        let scene = script.frame(0).context("no frame")?;
+        Ok(Self { script, scene })
+    }
+
     /// So many frames after the middle of the exposure.
     pub(super) fn after(&self, frames: f64) -> Scene {
         let moment = self.script.frame_after(0, frames).unwrap_or_else(|| self.scene.clone());
@@ -26,11 +34,7 @@ impl Picture {
 
 impl Effect {
     pub(super) fn picture(&self, (width, height): (u32, u32)) -> Result<Picture> {
-        let text = format!("Screen {width} {height}\n{}Trace\n", self.text);
-        let parsed = parse(self.name, text.as_bytes(), &Limits::default());
-        let script = parsed.script.with_context(|| format!("{}: {:?}", self.name, parsed.diagnostics))?;
-        let scene = script.frame(0).context("no frame")?;
-        Ok(Picture { script, scene })
+        Picture::new(self.name, &format!("Screen {width} {height}\n{}Trace\n", self.text))
     }
 }
 

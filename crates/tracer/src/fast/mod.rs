@@ -136,7 +136,7 @@ impl<'a> Drawing<'a> {
     /// # Errors
     /// Those of [`crate::render`].
     pub fn draw(&self) -> Result<RgbImage, RenderError> {
-        self.draw_progressively(|_| ())
+        self.draw_with(None)
     }
 
     /// The same; `each` gets the picture after each pass over the image but the last. Each is an estimate of the whole picture,
@@ -144,7 +144,11 @@ impl<'a> Drawing<'a> {
     ///
     /// # Errors
     /// Those of [`crate::render`].
-    pub fn draw_progressively(&self, each: impl FnMut(RgbImage)) -> Result<RgbImage, RenderError> {
+    pub fn draw_progressively(&self, mut each: impl FnMut(RgbImage)) -> Result<RgbImage, RenderError> {
+        self.draw_with(Some(&mut each))
+    }
+
+    fn draw_with(&self, each: Option<&mut dyn FnMut(RgbImage)>) -> Result<RgbImage, RenderError> {
         match &self.0 {
             Backend::Single(setup) => setup.draw::<Robust>(),
             Backend::Double(setup) => setup.draw::<Robust>(),
@@ -177,8 +181,7 @@ impl Drawing<'_> {
             Backend::SampledDouble(sampled) => sampled.expose(|_| Ok(()))?,
             Backend::Single(_) | Backend::Double(_) | Backend::Reference(..) => return Ok(None),
         };
-        let means = film.pixels.iter().map(crate::sampling::film::Pixel::mean).collect();
-        let counts = film.pixels.iter().map(crate::sampling::film::Pixel::count).collect();
+        let (means, counts) = film.means().unzip();
         Ok(Some(Means { means, counts }))
     }
 }

@@ -28,7 +28,7 @@ use super::shape::Robust;
 use super::shapes::Shape;
 use super::window::{Grid, Window};
 use crate::parallel::{CHANNELS, image};
-use crate::sampling::film::{Film, Goals, Pixel};
+use crate::sampling::film::{Band, Film, Wanted};
 use crate::sampling::{Dimensions, Points};
 use crate::{RenderError, RenderOptions};
 
@@ -81,11 +81,14 @@ impl<'a, E: Real> Sampled<'a, E> {
     }
 
     /// Draws all passes; `each` sees the picture so far after each but the last.
-    pub(super) fn draw(&self, mut each: impl FnMut(RgbImage)) -> Result<RgbImage, RenderError> {
-        let film = self.expose(|film| {
-            each(self.develop(film)?);
-            Ok(())
-        })?;
+    pub(super) fn draw(&self, each: Option<&mut dyn FnMut(RgbImage)>) -> Result<RgbImage, RenderError> {
+        let film = match each {
+            None => self.expose(|_| Ok(()))?,
+            Some(each) => self.expose(|film| {
+                each(self.develop(film)?);
+                Ok(())
+            })?,
+        };
         self.develop(&film)
     }
 
@@ -97,9 +100,9 @@ impl<'a, E: Real> Sampled<'a, E> {
         let scene = self.scene;
         let size = (scene.screen.width(), scene.screen.height());
         let too_large = || RenderError::TooLarge { width: size.0, height: size.1 };
-        let mut film = Film::new(size, scene.samples, scene.tone).ok_or_else(too_large)?;
+        let mut film = Film::new(size, self.side, scene.samples, scene.tone, PASS).ok_or_else(too_large)?;
         let mut passes = 0;
-        while let Some(span) = film.plan(PASS) {
+        while let Some(span) = film.plan() {
             if passes > 0 {
                 each(&film)?;
             }
@@ -113,27 +116,38 @@ impl<'a, E: Real> Sampled<'a, E> {
     fn pass(&self, film: &mut Film, (first, end): (u32, u32)) -> Result<(), RenderError> {
         let points = Points::new(&self.dimensions, self.options.sampler, first, end);
         let level = self.options.level.unwrap_or_else(Level::new);
-        let band = film.width * self.side.1 as usize;
-        let (pixels, goals) = film.split();
-        pixels.par_chunks_mut(band).zip(goals.counts.par_chunks(band)).enumerate().try_for_each_init(
+        let side = film.side();
+        let (bands, wanted) = film.split();
+        bands.into_par_iter().enumerate().try_for_each_init(
             || Box::new(Workspace::new(self.options.cancel)),
-            |workspace, (row, (pixels, counts))| {
+            |workspace, (row, mut band)| {
                 if self.options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
                     return Err(RenderError::Cancelled);
                 }
-                let job = Job { of: self, points: &points, goals, row };
-                draw::<E>(&job, level, (pixels, counts), workspace);
+                let job = Job { of: self, points: &points, wanted, side, row };
+                draw::<E>(&job, level, &mut band, workspace);
                 Ok(())
             },
         )
     }
 
     fn develop(&self, film: &Film) -> Result<RgbImage, RenderError> {
-        let tone: Tone = self.scene.tone;
-        image(self.scene.screen, |bytes| {
-            bytes.par_chunks_exact_mut(CHANNELS).zip(&film.pixels).for_each(|(bytes, pixel)| {
-                bytes.copy_from_slice(&super::tone::levels(pixel.mean(), tone));
-            });
+        let (screen, tone) = (self.scene.screen, self.scene.tone);
+        image(screen, |bytes| {
+            bytes.par_chunks_exact_mut(CHANNELS * screen.width() as usize).enumerate().for_each(
+                |(row, bytes)| {
+                    let mut bytes = bytes.chunks_exact_mut(CHANNELS);
+                    film.each_of_row(row, |color| {
+                        let levels = match tone {
+                            Tone::Plain => color.levels(),
+                            Tone::Srgb => super::tone::levels(color.unit(), tone),
+                        };
+                        if let Some(bytes) = bytes.next() {
+                            bytes.copy_from_slice(&levels);
+                        }
+                    });
+                },
+            );
         })
     }
 }
@@ -169,43 +183,43 @@ impl<E: Real> Moment<E> {
 struct Job<'a, E> {
     of: &'a Sampled<'a, E>,
     points: &'a Points,
-    goals: &'a Goals,
+    wanted: Wanted<'a>,
+    /// Columns and rows of a tile.
+    side: (usize, usize),
     /// Of tiles, from the top.
     row: usize,
 }
 
 impl<E: Real> Job<'_, E> {
     #[inline(always)]
-    fn draw<S: Simd, N: Kernel<E>>(
-        &self,
-        simd: S,
-        (pixels, goals): (&mut [Pixel], &[u32]),
-        workspace: &mut Workspace<E>,
-    ) {
+    fn draw<S: Simd, N: Kernel<E>>(&self, simd: S, band: &mut Band<'_>, workspace: &mut Workspace<E>) {
         simd.vectorize(
             #[inline(always)]
             || {
-                let Sampled { scene, options, dimensions, moments, side } = self.of;
-                let (width, height) = (scene.screen.width(), scene.screen.height());
+                let Sampled { scene, options, dimensions, moments, .. } = self.of;
+                let (width, height) = (scene.screen.width() as usize, scene.screen.height() as usize);
                 let pass = Pass {
                     moments,
                     points: self.points,
                     dimensions,
                     bounces: options.bounces(scene),
-                    height,
+                    wanted: self.wanted,
+                    height: height as u32,
                 };
-                let rows = (pixels.len() / width as usize) as u32;
-                for (column, left) in (0..width).step_by(side.0 as usize).enumerate() {
+                let top = self.row * self.side.1;
+                for (column, pixels) in band.tiles.iter_mut().enumerate() {
+                    let left = column * self.side.0;
                     let tile = SampledTile {
                         place: (column, self.row),
                         left,
-                        top: self.row as u32 * side.1,
-                        width: side.0.min(width - left),
-                        height: rows,
-                        stride: width as usize,
+                        top,
+                        width: self.side.0.min(width - left),
+                        height: self.side.1.min(height - top),
+                        side: self.side,
+                        stride: width,
                     };
-                    if self.goals.any(tile.columns(), tile.rows()) {
-                        tile::draw::<S, E, N>(simd, &pass, &tile, (pixels, goals), workspace);
+                    if self.wanted.pixels.has_any(tile.columns(), tile.rows()) {
+                        tile::draw::<S, E, N>(simd, &pass, &tile, (pixels, band.first.as_mut()), workspace);
                     }
                 }
             },
@@ -215,17 +229,17 @@ impl<E: Real> Job<'_, E> {
 
 /// Draws with the best kernel for the instructions.
 #[cfg(target_arch = "x86_64")]
-fn draw<E: Real>(job: &Job<E>, level: Level, film: (&mut [Pixel], &[u32]), workspace: &mut Workspace<E>) {
+fn draw<E: Real>(job: &Job<E>, level: Level, band: &mut Band<'_>, workspace: &mut Workspace<E>) {
     if let Some(simd) = level.as_avx512() {
-        job.draw::<_, Fitted<Robust>>(simd, film, workspace);
+        job.draw::<_, Fitted<Robust>>(simd, band, workspace);
     } else if let Some(simd) = level.as_avx2() {
-        job.draw::<_, Fitted<Robust>>(simd, film, workspace);
+        job.draw::<_, Fitted<Robust>>(simd, band, workspace);
     } else {
-        on!(narrow level, simd => job.draw::<_, Unfitted<Robust>>(simd, film, workspace));
+        on!(narrow level, simd => job.draw::<_, Unfitted<Robust>>(simd, band, workspace));
     }
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn draw<E: Real>(job: &Job<E>, level: Level, film: (&mut [Pixel], &[u32]), workspace: &mut Workspace<E>) {
-    on!(level, simd => job.draw::<_, Fitted<Robust>>(simd, film, workspace));
+fn draw<E: Real>(job: &Job<E>, level: Level, band: &mut Band<'_>, workspace: &mut Workspace<E>) {
+    on!(level, simd => job.draw::<_, Fitted<Robust>>(simd, band, workspace));
 }

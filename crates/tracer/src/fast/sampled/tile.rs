@@ -1,6 +1,6 @@
 //! The samples of a tile's pixels in a pass: where their rays go, and what comes of them.
 
-use std::ops::Range;
+use core::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use fearless_simd::Simd;
@@ -16,7 +16,7 @@ use crate::fast::rays::Rays;
 use crate::fast::real::{Lanes, Real, Vec3, constant};
 use crate::fast::tile::{Met, Scratch, shade};
 use crate::parallel::CHANNELS;
-use crate::sampling::film::{Pixel, quantised};
+use crate::sampling::film::{FirstRows, Pixel, Wanted, quantised};
 use crate::sampling::places::on_disc;
 use crate::sampling::{BATCH, Dimensions, Points, pixel_seed};
 
@@ -27,7 +27,7 @@ const NOTHING: u32 = u32::MAX;
 const ROOM: usize = BATCH;
 
 /// Columns and rows of the blocks in which a tile's pixels are taken, so that those of a packet lie side by side.
-const BLOCK: u32 = 4;
+const BLOCK: usize = 4;
 
 /// What all tiles of a pass have in common.
 pub(super) struct Pass<'a, E> {
@@ -35,6 +35,7 @@ pub(super) struct Pass<'a, E> {
     pub(super) points: &'a Points,
     pub(super) dimensions: &'a Dimensions,
     pub(super) bounces: u32,
+    pub(super) wanted: Wanted<'a>,
     /// Rows of the image.
     pub(super) height: u32,
 }
@@ -43,11 +44,13 @@ pub(super) struct Pass<'a, E> {
 pub(super) struct SampledTile {
     /// Columns and rows of tiles before it.
     pub(super) place: (usize, usize),
-    pub(super) left: u32,
-    pub(super) top: u32,
-    pub(super) width: u32,
-    pub(super) height: u32,
-    /// Pixels of a row of the image.
+    pub(super) left: usize,
+    pub(super) top: usize,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// Columns and rows of tiles in the middle of the image.
+    pub(super) side: (usize, usize),
+    /// Columns of the image.
     pub(super) stride: usize,
 }
 
@@ -55,9 +58,9 @@ pub(super) struct SampledTile {
 #[derive(Clone, Copy, Debug, Default)]
 struct Item {
     moment: u32,
-    /// Of the pixels of the tile's rows.
-    pixel: u32,
     sample: u32,
+    /// Column and row in the tile.
+    pixel: (u32, u32),
 }
 
 /// Memory of a worker, used again for each of its tiles.
@@ -91,40 +94,58 @@ impl<'a, E: Real> Workspace<'a, E> {
     }
 }
 
-/// Draws the samples that a tile's pixels lack; `pixels` and their goals are those of the tile's rows.
+/// What has been summed up of a tile, and the first samples of its row of tiles.
+type Drawn<'a, 'b> = (&'a mut Vec<Pixel>, Option<&'a mut FirstRows<'b>>);
+
+/// Draws the samples that a tile's pixels lack.
 #[inline(always)]
 pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     simd: S,
     pass: &Pass<E>,
     tile: &SampledTile,
-    (pixels, goals): (&mut [Pixel], &[u32]),
+    (pixels, mut first): Drawn,
     workspace: &mut Workspace<E>,
 ) {
     let mut items = core::mem::take(&mut workspace.items);
     items.clear();
     let still = if let [moment] = pass.moments { Some(moment) } else { None };
-    if let Some(moment) = still
-        && moment.shows_nothing(tile)
-    {
-        let color = moment.prepared.background.map(Real::widen);
-        tile.each_pixel(|place| {
-            let (pixel, goal) = (&mut pixels[place], goals[place]);
-            pixel.add_equal(color, goal.saturating_sub(pixel.count()));
-        });
+    let nothing = still.filter(|moment| moment.shows_nothing(tile));
+    let nothing = nothing.map(|moment| moment.prepared.background.map(|channel| quantised(channel.widen())));
+    if pass.wanted.is_first_look {
+        match (nothing, &mut first) {
+            (Some(color), Some(first)) => {
+                tile.each_pixel(|pixel| first.put(tile.in_rows(pixel), color, NOTHING));
+            }
+            _ => tile.each_pixel(|pixel| items.push(Item { moment: 0, sample: 0, pixel })),
+        }
     } else {
-        tile.each_pixel(|place| {
-            for sample in pixels[place].count()..goals[place] {
-                items.push(Item { moment: 0, pixel: place as u32, sample });
+        pixels.resize(tile.side.0 * tile.side.1, Pixel::default());
+        tile.each_wanted_pixel(pass.wanted, |at| {
+            let pixel = &mut pixels[tile.in_tile(at)];
+            if let (0, Some(first)) = (pixel.count(), &first) {
+                pixel.add_equal(first.color(tile.in_rows(at)), 1);
+            }
+            let goal = pass.wanted.goal(pixel.count());
+            match nothing {
+                Some(color) => pixel.add_equal(color, goal - pixel.count()),
+                None => {
+                    items.extend((pixel.count()..goal).map(|sample| Item { moment: 0, sample, pixel: at }))
+                }
             }
         });
-        if let Some(time) = pass.dimensions.time {
-            set_moments(pass, tile, time, &mut items);
-        }
-        for of_moment in items.chunk_by(|a, b| a.moment == b.moment) {
-            let moment = &pass.moments[of_moment[0].moment as usize];
-            for batch in of_moment.chunks(ROOM) {
-                draw_batch::<S, E, N>(simd, pass, (tile, moment), batch, workspace);
-                add_up::<S, E>(simd, batch, workspace, pixels);
+    }
+    if let Some(time) = pass.dimensions.time {
+        set_moments(pass, tile, time, &mut items);
+    }
+    for of_moment in items.chunk_by(|a, b| a.moment == b.moment) {
+        let moment = &pass.moments[of_moment[0].moment as usize];
+        for batch in of_moment.chunks(ROOM) {
+            draw_batch::<S, E, N>(simd, pass, (tile, moment), batch, workspace);
+            match &mut first {
+                Some(first) if pass.wanted.is_first_look => {
+                    put_first::<S, E>(simd, tile, batch, workspace, first);
+                }
+                Some(_) | None => add_up::<S, E>(simd, tile, batch, workspace, pixels),
             }
         }
     }
@@ -134,32 +155,62 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
 impl SampledTile {
     /// Of the image.
     pub(super) fn columns(&self) -> Range<usize> {
-        self.left as usize..(self.left + self.width) as usize
+        self.left..self.left + self.width
     }
 
     /// The same, from the top.
     pub(super) fn rows(&self) -> Range<usize> {
-        self.top as usize..(self.top + self.height) as usize
+        self.top..self.top + self.height
     }
 
-    /// Its pixels' places in its rows, block by block.
+    /// Columns and rows of its pixels in it, block by block.
     #[inline(always)]
-    fn each_pixel(&self, mut each: impl FnMut(usize)) {
-        for top in (0..self.height).step_by(BLOCK as usize) {
-            for left in (0..self.width).step_by(BLOCK as usize) {
+    fn each_pixel(&self, mut each: impl FnMut((u32, u32))) {
+        self.each_block(|left, row, columns| {
+            (left..left + columns).for_each(|column| each((column as u32, row as u32)));
+        });
+    }
+
+    /// The same of those that are wanted.
+    #[inline(always)]
+    fn each_wanted_pixel(&self, wanted: Wanted, mut each: impl FnMut((u32, u32))) {
+        self.each_block(|left, row, columns| {
+            let mut bits = wanted.pixels.run(self.left + left, self.top + row) & ((1 << columns) - 1);
+            while bits != 0 {
+                each((left as u32 + bits.trailing_zeros(), row as u32));
+                bits &= bits - 1;
+            }
+        });
+    }
+
+    /// The rows of each block: left column, row, and number of columns.
+    #[inline(always)]
+    fn each_block(&self, mut each: impl FnMut(usize, usize, usize)) {
+        for top in (0..self.height).step_by(BLOCK) {
+            for left in (0..self.width).step_by(BLOCK) {
                 for row in top..(top + BLOCK).min(self.height) {
-                    for column in left..(left + BLOCK).min(self.width) {
-                        each(row as usize * self.stride + (self.left + column) as usize);
-                    }
+                    each(left, row, BLOCK.min(self.width - left));
                 }
             }
         }
     }
 
+    /// A pixel's place in the tile.
+    #[inline(always)]
+    fn in_tile(&self, (column, row): (u32, u32)) -> usize {
+        row as usize * self.side.0 + column as usize
+    }
+
+    /// A pixel's place in the rows of the tile.
+    #[inline(always)]
+    fn in_rows(&self, (column, row): (u32, u32)) -> usize {
+        row as usize * self.stride + self.left + column as usize
+    }
+
     /// Column and row of the image; both count from the upper left corner.
     #[inline(always)]
-    fn pixel(&self, place: u32) -> (u32, u32) {
-        (place % self.stride as u32, self.top + place / self.stride as u32)
+    fn in_image(&self, (column, row): (u32, u32)) -> (u32, u32) {
+        (self.left as u32 + column, self.top as u32 + row)
     }
 }
 
@@ -179,7 +230,7 @@ fn set_moments<E: Real>(pass: &Pass<E>, tile: &SampledTile, time: usize, items: 
     for batch in items.chunks_mut(ROOM) {
         let (mut seeds, mut samples) = ([0; ROOM], [0; ROOM]);
         for (k, item) in batch.iter().enumerate() {
-            let (column, row) = tile.pixel(item.pixel);
+            let (column, row) = tile.in_image(item.pixel);
             seeds[k] = pixel_seed(column, row);
             samples[k] = item.sample;
         }
@@ -189,7 +240,7 @@ fn set_moments<E: Real>(pass: &Pass<E>, tile: &SampledTile, time: usize, items: 
             item.moment = (time * count) as u32;
         }
     }
-    items.sort_unstable_by_key(|item| (item.moment, item.pixel, item.sample));
+    items.sort_unstable_by_key(|item| (item.moment, item.pixel.1, item.pixel.0, item.sample));
 }
 
 /// Draws at most [`ROOM`] rays of one moment; their colours are those of the hits then.
@@ -234,31 +285,61 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
         let met = Met { kinds, background, queue, count, next: Some(&mut *next), waiting, soft };
         shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
     }
-    if batch.iter().any(|item| item.sample == 0) {
+    if pass.wanted.is_first_look {
         note_objects(hits, Lanes::<S, E>::LEN, objects);
     }
     scratch.follow::<S, N>(simd, scene, pass.bounces, soft);
 }
 
-/// Adds the colours of a batch to its pixels.
+/// The colours of a batch as parts.
+#[inline(always)]
+fn levels<E: Real>(count: usize, workspace: &Workspace<E>) -> [[u32; ROOM]; CHANNELS] {
+    let mut levels = [[0; ROOM]; CHANNELS];
+    for (levels, column) in levels.iter_mut().zip(&workspace.scratch.hits.color) {
+        for (level, color) in levels.iter_mut().zip(&column.0[..count]) {
+            *level = quantised(color.widen());
+        }
+    }
+    levels
+}
+
+/// Notes the colours of a batch as those of the first samples of its pixels.
 #[inline(never)]
-fn add_up<S: Simd, E: Real>(simd: S, batch: &[Item], workspace: &Workspace<E>, pixels: &mut [Pixel]) {
+fn put_first<S: Simd, E: Real>(
+    simd: S,
+    tile: &SampledTile,
+    batch: &[Item],
+    workspace: &Workspace<E>,
+    first: &mut FirstRows,
+) {
     simd.vectorize(
         #[inline(always)]
         || {
-            let mut levels = [[0; ROOM]; CHANNELS];
-            for (levels, column) in levels.iter_mut().zip(&workspace.scratch.hits.color) {
-                for (level, color) in levels.iter_mut().zip(&column.0[..batch.len()]) {
-                    *level = quantised(color.widen());
-                }
+            let [red, green, blue] = levels(batch.len(), workspace);
+            for (k, item) in batch.iter().enumerate() {
+                first.put(tile.in_rows(item.pixel), [red[k], green[k], blue[k]], workspace.objects[k]);
             }
+        },
+    );
+}
+
+/// Adds the colours of a batch to its pixels.
+#[inline(never)]
+fn add_up<S: Simd, E: Real>(
+    simd: S,
+    tile: &SampledTile,
+    batch: &[Item],
+    workspace: &Workspace<E>,
+    pixels: &mut [Pixel],
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let levels = levels(batch.len(), workspace);
             let mut from = 0;
             for of_pixel in batch.chunk_by(|a, b| a.pixel == b.pixel) {
                 let to = from + of_pixel.len();
-                let pixel = &mut pixels[of_pixel[0].pixel as usize];
-                if of_pixel[0].sample == 0 {
-                    pixel.note(workspace.objects[from]);
-                }
+                let pixel = &mut pixels[tile.in_tile(of_pixel[0].pixel)];
                 pixel.add(levels.each_ref().map(|levels| &levels[from..to]));
                 from = to;
             }
@@ -280,11 +361,16 @@ fn place<S: Simd, E: Real>(
         || {
             let Workspace { scratch, lights, seeds, samples, columns, rows, coordinates, .. } = workspace;
             let count = batch.len();
+            // In two loops, of which the second is done in packets.
+            let mut pixels = [[0; ROOM]; 2];
             for (k, item) in batch.iter().enumerate() {
-                let (column, row) = tile.pixel(item.pixel);
+                (pixels[0][k], pixels[1][k]) = tile.in_image(item.pixel);
+                samples[k] = item.sample;
+            }
+            for k in 0..count {
+                let (column, row) = (pixels[0][k], pixels[1][k]);
                 (columns[k], rows[k]) = (f64::from(column), f64::from(pass.height - 1 - row));
                 seeds[k] = pixel_seed(column, row);
-                samples[k] = item.sample;
             }
             let (seeds, samples) = (&seeds[..count], &samples[..count]);
             let [u, v, _] = coordinates;

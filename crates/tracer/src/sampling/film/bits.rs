@@ -1,0 +1,151 @@
+//! A bit for each pixel of an image, row by row in words of 64.
+
+/// Pixels in a word.
+pub(super) const WORD: usize = 64;
+
+/// A set of pixels; bits beyond a row's last column are never set.
+#[derive(Clone, Debug)]
+pub(crate) struct Bits {
+    pub(super) words: Vec<u64>,
+    /// Words of a row.
+    pub(super) stride: usize,
+    pub(super) columns: usize,
+}
+
+impl Bits {
+    /// No pixel of so many columns and rows; `None` where there is no memory for it.
+    pub(super) fn none((columns, rows): (usize, usize)) -> Option<Self> {
+        let stride = columns.div_ceil(WORD);
+        let words = super::zeroed(stride.checked_mul(rows)?)?;
+        Some(Self { words, stride, columns })
+    }
+
+    /// No pixel of as many columns and rows.
+    pub(super) fn empty(&self) -> Option<Self> {
+        Some(Self { words: super::zeroed(self.words.len())?, ..*self })
+    }
+
+    pub(super) fn rows(&self) -> usize {
+        self.words.len() / self.stride
+    }
+
+    /// The pixels of a word of a row that lie in the image.
+    #[inline(always)]
+    pub(super) fn inside(&self, word: usize) -> u64 {
+        u64::MAX >> (WORD - (self.columns - word * WORD).min(WORD))
+    }
+
+    pub(super) fn fill(&mut self) {
+        for word in 0..self.stride {
+            let inside = self.inside(word);
+            self.words.iter_mut().skip(word).step_by(self.stride).for_each(|word| *word = inside);
+        }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.words.fill(0);
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.words.iter().all(|&word| word == 0)
+    }
+
+    pub(super) fn add(&mut self, other: &Self) {
+        for (word, other) in self.words.iter_mut().zip(&other.words) {
+            *word |= other;
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn row(&self, row: usize) -> &[u64] {
+        &self.words[row * self.stride..(row + 1) * self.stride]
+    }
+
+    /// Whether it holds the pixel of a column and row.
+    #[inline(always)]
+    pub(crate) fn has(&self, column: usize, row: usize) -> bool {
+        self.words[row * self.stride + column / WORD] >> (column % WORD) & 1 != 0
+    }
+
+    /// Which of up to 32 pixels of a row from a column on it holds, as bits.
+    #[inline(always)]
+    pub(crate) fn run(&self, column: usize, row: usize) -> u32 {
+        let (word, shift) = (column / WORD, column % WORD);
+        let row = self.row(row);
+        let after = row.get(word + 1).map_or(0, |after| after << 1 << (WORD - 1 - shift));
+        (row[word] >> shift | after) as u32
+    }
+
+    /// Whether it holds one of a rectangle.
+    #[inline(always)]
+    pub(crate) fn has_any(&self, columns: core::ops::Range<usize>, rows: core::ops::Range<usize>) -> bool {
+        let (first, last) = (columns.start / WORD, (columns.end - 1) / WORD);
+        rows.clone().any(|row| {
+            let row = self.row(row);
+            (first..=last).any(|word| {
+                let mut bits = row[word];
+                if word == first {
+                    bits &= u64::MAX << (columns.start % WORD);
+                }
+                if word == last {
+                    bits &= u64::MAX >> (WORD - 1 - (columns.end - 1) % WORD);
+                }
+                bits != 0
+            })
+        })
+    }
+}
+
+/// The columns of the bits of a word of a row.
+pub(super) fn columns(word: usize, mut bits: u64) -> impl Iterator<Item = usize> {
+    core::iter::from_fn(move || {
+        let column = word * WORD + bits.trailing_zeros() as usize;
+        let more = bits != 0;
+        bits &= bits.wrapping_sub(1);
+        more.then_some(column)
+    })
+}
+
+/// The bits of a row and of those left and right of them.
+#[inline(always)]
+pub(super) fn widened(row: &[u64], word: usize) -> u64 {
+    let at = row[word];
+    let before = if word > 0 { row[word - 1] >> (WORD - 1) } else { 0 };
+    let after = row.get(word + 1).map_or(0, |after| after << (WORD - 1));
+    at | at << 1 | at >> 1 | before | after
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_are_found_where_they_were_put_and_beside_it() {
+        for columns_in_all in [1, 63, 64, 65, 150] {
+            let mut all = Bits::none((columns_in_all, 3)).unwrap();
+            all.fill();
+            let mut dice = fastrand::Rng::with_seed(columns_in_all as u64);
+            for _ in 0..200 {
+                let mut bits = Bits::none((columns_in_all, 3)).unwrap();
+                let (column, row) = (dice.usize(..columns_in_all), dice.usize(..3));
+                bits.words[row * bits.stride + column / WORD] |= 1 << (column % WORD);
+                let left = dice.usize(..columns_in_all);
+                let right = dice.usize(left + 1..=columns_in_all);
+                let within = (left..right).contains(&column);
+                assert_eq!(bits.has_any(left..right, 0..3), within, "{column} in {left}..{right}");
+                assert!(!bits.has_any(left..right, row + 1..3) && all.has_any(left..right, 1..2));
+                let near: Vec<usize> = (0..bits.stride)
+                    .flat_map(|word| columns(word, widened(bits.row(row), word) & bits.inside(word)))
+                    .collect();
+                let expected: Vec<usize> =
+                    (column.saturating_sub(1)..(column + 2).min(columns_in_all)).collect();
+                assert_eq!(near, expected);
+                assert!(
+                    (0..columns_in_all).all(|at| bits.has(at, row) == (at == column) && all.has(at, row))
+                );
+            }
+            let set: u32 = all.words.iter().map(|word| word.count_ones()).sum();
+            assert_eq!(set as usize, 3 * columns_in_all);
+        }
+    }
+}

@@ -1,0 +1,488 @@
+//! The samples of an image, summed up pixel by pixel, and which pixels get more.
+//!
+//! Passes are synchronous: what a pixel gets next follows from the counts and sums of the pass before, its own and its
+//! neighbours'. So a picture does not depend on tiles or threads, and a still part of an animation only on what is near it.
+//!
+//! Most pixels are done with after one sample. They are kept small ([`First`]), found by comparing rows, and all that is
+//! decided about pixels is decided for 64 at once ([`Bits`]); only those that go on get sums.
+
+mod bits;
+mod first;
+mod plan;
+
+use glam::DVec3;
+use rayfold_scene::{Samples, Tone};
+
+pub(crate) use self::bits::Bits;
+pub(crate) use self::first::{First, FirstRows};
+use self::plan::Plan;
+use crate::parallel::CHANNELS;
+use crate::reference::encoded;
+
+/// A channel's sums count in parts of this, so that no order of adding makes a difference.
+const ONE: f64 = 65535.0;
+
+/// So many times the error that is asked for, two neighbours with a sample each may differ by.
+const CONTRAST: f64 = 1.5;
+
+/// The error of a mean of n samples is taken for their deviation times n to this power: steeper than the -1/2 of independent
+/// samples, and less steep than what edges and penumbrae have (docs/reports/sampling.md).
+const SLOPE: f64 = -0.65;
+
+/// So many times the error that is asked for a pixel may have: most others have less.
+const SPARED: f64 = 3.0;
+
+/// What a pixel has got so far.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pixel {
+    sum: [u64; CHANNELS],
+    squares: [u64; CHANNELS],
+    count: u32,
+}
+
+/// 2^52: what is added to it is rounded to a whole number, which its lowest bits are.
+const WHOLE: f64 = 4_503_599_627_370_496.0;
+
+/// A channel of a colour as a part of [`ONE`]; what is not a number is black.
+#[inline(always)]
+pub(crate) fn quantised(channel: f64) -> u32 {
+    let channel = if channel > 0.0 { channel } else { 0.0 };
+    (channel.min(1.0) * ONE + WHOLE).to_bits() as u32
+}
+
+impl Pixel {
+    /// Adds samples: their [`quantised`] channels.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, channels: [&[u32]; CHANNELS]) {
+        for ((sum, squares), levels) in self.sum.iter_mut().zip(&mut self.squares).zip(channels) {
+            for &level in levels {
+                *sum += u64::from(level);
+                // At most 32 bits.
+                *squares += u64::from(level.wrapping_mul(level));
+            }
+        }
+        self.count += channels[0].len() as u32;
+    }
+
+    /// Adds as many of the same [`quantised`] colour.
+    pub(crate) fn add_equal(&mut self, color: [u32; CHANNELS], count: u32) {
+        for ((sum, squares), level) in self.sum.iter_mut().zip(&mut self.squares).zip(color) {
+            let level = u64::from(level);
+            *sum += level * u64::from(count);
+            *squares += level * level * u64::from(count);
+        }
+        self.count += count;
+    }
+
+    #[inline(always)]
+    pub(crate) fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// Of all samples.
+    pub(crate) fn mean(&self) -> DVec3 {
+        DVec3::from_array(self.sum.map(|sum| sum as f64)) / (ONE * f64::from(self.count.max(1)))
+    }
+
+    /// The variance of its samples in squares of levels: the mean over the channels.
+    fn variance(&self, tone: Tone) -> f64 {
+        let of_count = 1.0 / f64::from(self.count);
+        let mut sum = 0.0;
+        for channel in 0..CHANNELS {
+            let mean = self.sum[channel] as f64 * of_count;
+            let spread = (self.squares[channel] as f64 - self.sum[channel] as f64 * mean).max(0.0);
+            let spread = spread / (f64::from(self.count) - 1.0);
+            let slope = match tone {
+                Tone::Plain => 1.0,
+                Tone::Srgb => slope(mean / ONE, spread.sqrt() / ONE),
+            };
+            sum += spread * slope * slope;
+        }
+        (255.0 * 255.0) / (ONE * ONE) * sum / CHANNELS as f64
+    }
+}
+
+/// By how much the sRGB curve stretches differences of about `apart` there.
+fn slope(light: f64, apart: f64) -> f64 {
+    let (low, high) = ((light - 0.5 * apart).max(0.0), (light + 0.5 * apart).min(1.0));
+    if high - low < 1e-9 { 12.92 } else { (encoded(high) - encoded(low)) / (high - low) }
+}
+
+/// An image of samples, its first row at the top.
+#[derive(Debug)]
+pub(crate) struct Film {
+    size: (usize, usize),
+    /// Columns and rows of a tile.
+    side: (usize, usize),
+    tone: Tone,
+    /// None where all pixels get equally many samples.
+    first: Option<First>,
+    /// Tile by tile, row by row in each; a tile whose pixels have got but one sample has none, if there is a [`First`].
+    tiles: Vec<Vec<Pixel>>,
+    plan: Plan,
+}
+
+/// A row of tiles.
+pub(crate) struct Band<'a> {
+    /// Row by row in each; none yet of a tile that has got no sums.
+    pub(crate) tiles: &'a mut [Vec<Pixel>],
+    /// Row by row.
+    pub(crate) first: Option<FirstRows<'a>>,
+}
+
+/// What a pass gives to whom.
+#[derive(Clone, Copy)]
+pub(crate) struct Wanted<'a> {
+    plan: &'a Plan,
+    /// Who gets something.
+    pub(crate) pixels: &'a Bits,
+    /// Whether it is the first sample of pixels that may get no other.
+    pub(crate) is_first_look: bool,
+}
+
+impl Wanted<'_> {
+    /// How many samples a pixel that has so many, and gets something in this pass, shall have after it.
+    #[inline(always)]
+    pub(crate) fn goal(&self, count: u32) -> u32 {
+        self.plan.goal(count)
+    }
+}
+
+impl Film {
+    /// Nothing yet; `None` where there is no memory for it. No pass adds more than `step` samples to a pixel.
+    pub(crate) fn new(
+        size: (u32, u32),
+        side: (u32, u32),
+        samples: Samples,
+        tone: Tone,
+        step: u32,
+    ) -> Option<Self> {
+        let size = (size.0 as usize, size.1 as usize);
+        // No tile is larger than the image.
+        let side = ((side.0 as usize).min(size.0), (side.1 as usize).min(size.1));
+        let tiles = vec![Vec::new(); size.0.div_ceil(side.0).checked_mul(size.1.div_ceil(side.1))?];
+        let pixels = size.0.checked_mul(size.1)?;
+        let first = if samples.error() > 0.0 {
+            Some(First::new(pixels)?)
+        } else {
+            // All will be asked for.
+            Vec::<Pixel>::new().try_reserve_exact(pixels).ok()?;
+            None
+        };
+        Some(Self { size, side, tone, first, tiles, plan: Plan::new(size, samples, step)? })
+    }
+
+    /// Plans the next pass; `None` once all pixels have what they need. Gives the least and the largest number of samples
+    /// between which it is.
+    pub(crate) fn plan(&mut self) -> Option<(u32, u32)> {
+        let sums = Sums { tiles: &self.tiles, columns: self.size.0, side: self.side };
+        self.plan.goes_on().or_else(|| self.plan.next(self.first.as_ref(), &sums, self.tone))
+    }
+
+    /// The rows of tiles, from the top, and what they shall get in the pass that [`Self::plan`] planned.
+    pub(crate) fn split(&mut self) -> (Vec<Band<'_>>, Wanted<'_>) {
+        let tiles = self.tiles.chunks_mut(self.size.0.div_ceil(self.side.0));
+        let bands = match &mut self.first {
+            None => tiles.map(|tiles| Band { tiles, first: None }).collect(),
+            Some(first) => {
+                let first = first.bands(self.size.0 * self.side.1);
+                tiles.zip(first).map(|(tiles, first)| Band { tiles, first: Some(first) }).collect()
+            }
+        };
+        (bands, self.plan.wanted())
+    }
+
+    /// Columns and rows of a tile.
+    pub(crate) fn side(&self) -> (usize, usize) {
+        self.side
+    }
+
+    /// The colours of a row so far, from the left.
+    #[inline(always)]
+    pub(crate) fn each_of_row(&self, row: usize, mut each: impl FnMut(Color)) {
+        let (columns, (across, down)) = (self.size.0, self.side);
+        let first_tile = row / down * columns.div_ceil(across);
+        for (left, tile) in (0..columns).step_by(across).zip(&self.tiles[first_tile..]) {
+            let right = (left + across).min(columns);
+            let samples =
+                self.first.as_ref().map(|first| first.run(row * columns + left..row * columns + right));
+            let sums = if tile.is_empty() { &[] } else { &tile[row % down * across..][..right - left] };
+            match samples {
+                None => sums.iter().for_each(|pixel| each(Color::Mean(pixel.mean()))),
+                Some(samples) if sums.is_empty() => samples.for_each(|sample| each(Color::Sample(sample))),
+                Some(samples) => {
+                    for ((column, sample), pixel) in (left..).zip(samples).zip(sums) {
+                        let has_many = self.plan.has_many(column, row);
+                        each(if has_many { Color::Mean(pixel.mean()) } else { Color::Sample(sample) });
+                    }
+                }
+            }
+        }
+    }
+
+    /// The means of the pixels, and how many samples each has.
+    #[cfg(any(test, feature = "accuracy"))]
+    pub(crate) fn means(&self) -> impl Iterator<Item = (DVec3, u32)> {
+        let (width, height) = self.size;
+        let sums = Sums { tiles: &self.tiles, columns: width, side: self.side };
+        (0..height).flat_map(move |row| {
+            let mut of_row = Vec::with_capacity(width);
+            self.each_of_row(row, |color| {
+                let count = if let Color::Mean(_) = color { sums.pixel(of_row.len(), row).count } else { 1 };
+                of_row.push((color.unit(), count));
+            });
+            of_row
+        })
+    }
+}
+
+/// A colour of a pixel.
+pub(crate) enum Color {
+    /// Of its only sample, [`quantised`].
+    Sample([u16; CHANNELS]),
+    /// Of several.
+    Mean(DVec3),
+}
+
+impl Color {
+    /// In 0..1.
+    pub(crate) fn unit(&self) -> DVec3 {
+        match self {
+            Self::Sample(color) => DVec3::from_array(color.map(f64::from)) / ONE,
+            Self::Mean(mean) => *mean,
+        }
+    }
+
+    /// The nearest of 256 levels, without any curve.
+    #[inline(always)]
+    pub(crate) fn levels(&self) -> [u8; CHANNELS] {
+        match self {
+            // Of 65,536 levels, of which 257 are a step.
+            Self::Sample(color) => color.map(|channel| ((u32::from(channel) + 128) / 257) as u8),
+            Self::Mean(mean) => mean.to_array().map(|channel| (255.0 * channel + 0.5) as u8),
+        }
+    }
+}
+
+/// Sums by column and row of the image.
+#[derive(Clone, Copy)]
+struct Sums<'a> {
+    tiles: &'a [Vec<Pixel>],
+    columns: usize,
+    side: (usize, usize),
+}
+
+impl Sums<'_> {
+    #[inline(always)]
+    fn pixel(&self, column: usize, row: usize) -> &Pixel {
+        let (across, down) = self.side;
+        let tile = row / down * self.columns.div_ceil(across) + column / across;
+        &self.tiles[tile][row % down * across + column % across]
+    }
+}
+
+/// Zeros, which take no memory before they are written to; `None` where there is none for them.
+fn zeroed<T: Clone + Default>(count: usize) -> Option<Vec<T>> {
+    Vec::<T>::new().try_reserve_exact(count).ok()?;
+    Some(vec![T::default(); count])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn film(most: u32, error: f64, step: u32) -> Film {
+        Film::new((8, 4), (3, 2), Samples::new(most, error).unwrap(), Tone::Plain, step).unwrap()
+    }
+
+    fn counts(film: &Film) -> Vec<u32> {
+        film.means().map(|(_, count)| count).collect()
+    }
+
+    /// Gives all pixels what they shall have.
+    fn expose(film: &mut Film, mut color: impl FnMut(usize, u32) -> f64) -> Vec<(u32, u32)> {
+        let mut passes = vec![];
+        let (columns, side) = (film.size.0, film.side());
+        while let Some(span) = film.plan() {
+            passes.push(span);
+            let (bands, wanted) = film.split();
+            for (band, mut of_band) in bands.into_iter().enumerate() {
+                for (tile, pixels) in of_band.tiles.iter_mut().enumerate() {
+                    for place in 0..side.0 * side.1 {
+                        let at = (tile * side.0 + place % side.0, place / side.0);
+                        let (column, row) = (at.0, band * side.1 + at.1);
+                        if column >= columns || row >= film_rows(wanted) || !wanted.pixels.has(column, row) {
+                            continue;
+                        }
+                        let first = of_band.first.as_mut();
+                        let mut draw = |sample| {
+                            assert!((span.0..span.1).contains(&sample));
+                            quantised(color(row * columns + column, sample))
+                        };
+                        if wanted.is_first_look {
+                            first.unwrap().put(at.1 * columns + at.0, [draw(0); 3], 0);
+                            continue;
+                        }
+                        pixels.resize(side.0 * side.1, Pixel::default());
+                        let pixel = &mut pixels[place];
+                        if let (0, Some(first)) = (pixel.count, first) {
+                            pixel.add_equal(first.color(at.1 * columns + at.0), 1);
+                        }
+                        for sample in pixel.count..wanted.goal(pixel.count) {
+                            let level = [draw(sample)];
+                            pixel.add([&level; 3]);
+                        }
+                    }
+                }
+            }
+        }
+        passes
+    }
+
+    fn film_rows(wanted: Wanted<'_>) -> usize {
+        wanted.pixels.rows()
+    }
+
+    #[test]
+    fn without_an_error_all_get_all() {
+        let mut film = film(100, 0.0, 64);
+        assert_eq!(expose(&mut film, |_, _| 0.5), [(0, 64), (64, 100)]);
+        assert_eq!(counts(&film), [100; 32]);
+    }
+
+    #[test]
+    fn what_is_even_gets_one() {
+        let mut film = film(64, 1.0, 1024);
+        assert_eq!(expose(&mut film, |_, _| 0.5), [(0, 1)]);
+        assert_eq!(counts(&film), [1; 32]);
+    }
+
+    #[test]
+    fn rays_go_where_the_noise_is_and_fall_off_around_it() {
+        for step in [3, 16, 1024] {
+            let mut film = film(64, 1.0, step);
+            let noise = |place: usize, sample: u32| match place % 8 {
+                0 => f64::from(sobol_like(sample) % 2),
+                _ => 0.5,
+            };
+            expose(&mut film, noise);
+            assert_eq!(counts(&film)[..8], [64, 64, 32, 16, 8, 4, 1, 1]);
+        }
+    }
+
+    fn sobol_like(sample: u32) -> u32 {
+        sample.wrapping_mul(0x9e37_79b9) >> 7
+    }
+
+    /// A line of which few pixels see anything at first is found along its length.
+    #[test]
+    fn a_sliver_is_found_along_its_length() {
+        let samples = Samples::new(64, 1.0).unwrap();
+        let mut film = Film::new((64, 9), (16, 16), samples, Tone::Plain, 1024).unwrap();
+        let mut dice = fastrand::Rng::with_seed(3);
+        let mut seen = |place: usize, _| f64::from(u8::from(place / 64 == 4 && dice.f64() < 0.15));
+        expose(&mut film, &mut seen);
+        let counts = counts(&film);
+        let row = &counts[4 * 64..5 * 64];
+        assert!(row.iter().all(|&count| count >= 32), "{row:?}");
+        assert!(counts[..64].iter().all(|&count| count < 32));
+    }
+
+    /// The words are held against the rule, said pixel by pixel.
+    #[test]
+    fn who_goes_on_is_as_the_rule_says() {
+        for seed in 0..200 {
+            let mut dice = fastrand::Rng::with_seed(seed);
+            let size = (dice.u32(1..140), dice.u32(1..20));
+            let side = (dice.u32(1..40), dice.u32(1..20));
+            let (most, tone) = (dice.u32(2..70), [Tone::Plain, Tone::Srgb][dice.usize(..2)]);
+            let samples = Samples::new(most, 1.0).unwrap();
+            let mut film = Film::new(size, side, samples, tone, 256).unwrap();
+            let width = size.0 as usize;
+            let lively: Vec<f64> =
+                (0..size.0 * size.1).map(|_| if dice.u8(..) < 5 { 0.4 } else { 0.0 }).collect();
+            let drawn = |place: usize, sample: u32| {
+                0.3 + lively[place] * f64::from(sobol_like(sample.wrapping_add(17 * place as u32)) % 5) / 5.0
+            };
+            expose(&mut film, drawn);
+            let pixel = |place: usize, count: u32| {
+                let mut pixel = Pixel::default();
+                (0..count).for_each(|sample| pixel.add([&[quantised(drawn(place, sample))]; 3]));
+                pixel
+            };
+            let around = |place: usize| {
+                let (column, row) = ((place % width) as i64, (place / width) as i64);
+                let near = (-1..=1).flat_map(move |dy| (-1..=1).map(move |dx| (column + dx, row + dy)));
+                let inside = near.filter(move |&(x, y)| {
+                    (0..i64::from(size.0)).contains(&x) && (0..i64::from(size.1)).contains(&y)
+                });
+                inside.map(move |(x, y)| y as usize * width + x as usize).filter(move |&other| other != place)
+            };
+            let shown = |place: usize| {
+                let linear = f64::from(quantised(drawn(place, 0))) / ONE;
+                if tone == Tone::Plain { linear } else { encoded(linear) }
+            };
+            let mut counts = vec![1; lively.len()];
+            let mut unsettled: Vec<bool> = (0..lively.len())
+                .map(|place| {
+                    around(place).any(|other| (shown(other) - shown(place)).abs() > CONTRAST / 255.0)
+                })
+                .collect();
+            loop {
+                let next: Vec<u32> = (0..counts.len())
+                    .map(|place| {
+                        let goes_on = unsettled[place]
+                            || around(place).any(|other| {
+                                unsettled[other] && counts[other] >= counts[place]
+                                    || counts[other] > 2 * counts[place].max(2)
+                            });
+                        match counts[place] {
+                            count if !goes_on => count,
+                            1 => 4.min(most),
+                            count => (2 * count).min(most),
+                        }
+                    })
+                    .collect();
+                if next == counts {
+                    break;
+                }
+                for place in 0..counts.len() {
+                    if next[place] > counts[place] {
+                        let count = next[place];
+                        let limit = SPARED * f64::from(count).powf(-SLOPE);
+                        unsettled[place] = count < most && pixel(place, count).variance(tone) > limit * limit;
+                    }
+                }
+                counts = next;
+            }
+            assert_eq!(self::counts(&film), counts, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn sums_are_means_and_deviations() {
+        let mut pixel = Pixel::default();
+        for k in 0..100 {
+            pixel.add([f64::from(k % 2), 0.25, f64::NAN].map(quantised).each_ref().map(std::slice::from_ref));
+        }
+        assert!((pixel.mean() - DVec3::new(0.5, 0.25, 0.0)).abs().max_element() < 1e-5);
+        // A channel that is 0 or 1 has the deviation 1/2; a third of the variance is that of the mean over channels.
+        let expected = 255.0 * 255.0 * 0.25 * 100.0 / 99.0 / 3.0;
+        let variance = pixel.variance(Tone::Plain);
+        assert!((variance / expected - 1.0).abs() < 1e-3, "{variance}");
+        let mut equal = Pixel::default();
+        equal.add_equal([0.5, 2.0, -1.0].map(quantised), 7);
+        assert_eq!(equal.variance(Tone::Srgb), 0.0);
+        assert!((equal.mean() - DVec3::new(0.5, 1.0, 0.0)).abs().max_element() < 1e-5);
+    }
+
+    #[test]
+    fn levels_are_the_nearest() {
+        for channel in 0..=u16::MAX {
+            let exact = f64::from(channel) / ONE * 255.0;
+            for color in [Color::Sample([channel; 3]), Color::Mean(DVec3::splat(f64::from(channel) / ONE))] {
+                assert_eq!(color.levels().map(f64::from), [exact.round(); 3]);
+            }
+        }
+    }
+}
