@@ -125,7 +125,8 @@ impl Search<'_> {
                     }
                 }
                 (Part::Children(first, second), _) if a == b => {
-                    pending.extend([(first, first), (second, second), (first, second)]);
+                    // What is nearest to each other is taken first: in a crowd it is found at once.
+                    pending.extend([(first, second), (second, second), (first, first)]);
                 }
                 (Part::Solids(of), Part::Solids(others)) => {
                     left -= (of.len() * others.len() / 4) as isize;
