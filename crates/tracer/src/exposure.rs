@@ -2,8 +2,11 @@
 
 use rayfold_scene::Scene;
 
-/// The moments at which a scene that moves is drawn, for each sample that a pixel may have.
+/// The moments at which a scene that moves is drawn, for each sample that all pixels have.
 const MOMENTS_FOR_A_SAMPLE: u32 = 2;
+
+/// The same where few pixels have as many as they may.
+const MOMENTS_IF_ADAPTIVE: u32 = 1;
 
 /// How many there are at least and at most.
 const MOMENTS: (u32, u32) = (16, 256);
@@ -56,7 +59,9 @@ impl<'a> Exposure<'a> {
             return vec![self.scene.clone()];
         }
         let (least, most) = MOMENTS;
-        let wanted = self.scene.samples.most().saturating_mul(MOMENTS_FOR_A_SAMPLE).next_power_of_two();
+        let samples = self.scene.samples;
+        let for_a_sample = if samples.error() > 0.0 { MOMENTS_IF_ADAPTIVE } else { MOMENTS_FOR_A_SAMPLE };
+        let wanted = samples.most().saturating_mul(for_a_sample).min(most).next_power_of_two();
         let few = (OBJECTS / self.scene.objects.len().max(1)).clamp(least as usize, most as usize) as u32;
         let count = wanted.clamp(least, most).min(1 << few.ilog2());
         let moments: Vec<Scene> =

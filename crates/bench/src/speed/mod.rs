@@ -1,7 +1,7 @@
 //! `rayfold-bench speed`: processor time against the work asked for, and side by side with peers.
 
 mod embree;
-mod povray;
+pub(crate) mod povray;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -20,7 +20,17 @@ pub(crate) fn is_here() -> bool {
 
 /// Draws the scene on one thread, without anti-aliasing. Returns the processor time of the whole program in seconds,
 /// and the image.
-pub(crate) fn render(scene: &Scene, folder: &Path, (width, height): (u32, u32)) -> Result<(f64, RgbImage)> {
+pub(crate) fn render(scene: &Scene, folder: &Path, size: (u32, u32)) -> Result<(f64, RgbImage)> {
+    render_as(scene, folder, size, &["-A"])
+}
+
+/// The same with options of its own for anti-aliasing.
+pub(crate) fn render_as(
+    scene: &Scene,
+    folder: &Path,
+    (width, height): (u32, u32),
+    options: &[&str],
+) -> Result<(f64, RgbImage)> {
     let (input, output) = (folder.join("scene.pov"), folder.join("scene.ppm"));
     std::fs::write(&input, translated(scene)?)?;
     let (seconds, run) = cpu_time::of_children(|| {
@@ -28,7 +38,8 @@ pub(crate) fn render(scene: &Scene, folder: &Path, (width, height): (u32, u32)) 
             .arg(format!("+I{}", input.display()))
             .arg(format!("+O{}", output.display()))
             .args([format!("+W{width}"), format!("+H{height}")])
-            .args(["+FP8", "File_Gamma=1.0", "-A", "-D", "-GA", "+WT1"])
+            .args(["+FP8", "File_Gamma=1.0", "-D", "-GA", "+WT1"])
+            .args(options)
             .env("HOME", folder)
             .output()
     })?;

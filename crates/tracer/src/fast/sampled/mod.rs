@@ -38,6 +38,9 @@ const PASS: u32 = 256;
 /// Columns and rows of a tile.
 pub(super) const SIDE: (u32, u32) = (16, 16);
 
+/// The same of moving scenes: of larger tiles more rays are of one moment.
+const MOVING_SIDE: (u32, u32) = (32, 32);
+
 /// The half of a pixel, and a little for rounding: how far rays go from its middle.
 pub(super) const MARGIN: f64 = 0.5 + super::rounding::MARGIN;
 
@@ -70,7 +73,7 @@ impl<'a, E: Real> Sampled<'a, E> {
         geometries: &[Geometry],
         options: &'a RenderOptions<'a>,
     ) -> Result<Self, RenderError> {
-        let side = options.tile.unwrap_or(SIDE);
+        let side = options.tile.unwrap_or(if moments.len() > 1 { MOVING_SIDE } else { SIDE });
         let dimensions = Dimensions::new(moments);
         let moments = moments
             .par_iter()

@@ -67,6 +67,8 @@ struct Item {
 pub(super) struct Workspace<'a, E> {
     scratch: Scratch<'a, E>,
     items: Vec<Item>,
+    /// Memory for sorting them.
+    sorted: Vec<Item>,
     lights: LightPoints<E>,
     seeds: [u32; ROOM],
     samples: [u32; ROOM],
@@ -83,6 +85,7 @@ impl<'a, E: Real> Workspace<'a, E> {
         Self {
             scratch: Scratch::new(cancel),
             items: vec![],
+            sorted: vec![],
             lights: LightPoints::default(),
             seeds: [0; ROOM],
             samples: [0; ROOM],
@@ -135,7 +138,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
         });
     }
     if let Some(time) = pass.dimensions.time {
-        set_moments(pass, tile, time, &mut items);
+        set_moments(pass, tile, time, &mut items, &mut workspace.sorted);
     }
     for of_moment in items.chunk_by(|a, b| a.moment == b.moment) {
         let moment = &pass.moments[of_moment[0].moment as usize];
@@ -222,10 +225,17 @@ impl<E: Real> Moment<E> {
     }
 }
 
-/// Gives each ray its moment, and sorts by that.
+/// Gives each ray its moment, and sorts by that; those of one moment stay in order, so that neighbours lie side by side.
 #[inline(never)]
-fn set_moments<E: Real>(pass: &Pass<E>, tile: &SampledTile, time: usize, items: &mut [Item]) {
-    let count = pass.moments.len() as f64;
+fn set_moments<E: Real>(
+    pass: &Pass<E>,
+    tile: &SampledTile,
+    time: usize,
+    items: &mut Vec<Item>,
+    sorted: &mut Vec<Item>,
+) {
+    let count = pass.moments.len() as u32;
+    let mut ends = vec![0; pass.moments.len()];
     let mut coordinates = [0.0; ROOM];
     for batch in items.chunks_mut(ROOM) {
         let (mut seeds, mut samples) = ([0; ROOM], [0; ROOM]);
@@ -237,10 +247,23 @@ fn set_moments<E: Real>(pass: &Pass<E>, tile: &SampledTile, time: usize, items: 
         let rays = batch.len();
         pass.points.coordinates(time, &seeds[..rays], &samples[..rays], &mut coordinates[..rays]);
         for (item, time) in batch.iter_mut().zip(coordinates) {
-            item.moment = (time * count) as u32;
+            let moments = pass.wanted.moments(item.sample, count);
+            let apart = count / moments;
+            item.moment = (time * f64::from(moments)) as u32 * apart + apart / 2;
+            ends[item.moment as usize] += 1;
         }
     }
-    items.sort_unstable_by_key(|item| (item.moment, item.pixel.1, item.pixel.0, item.sample));
+    let mut before = 0;
+    for end in &mut ends {
+        before += core::mem::replace(end, before);
+    }
+    sorted.resize(items.len(), Item::default());
+    for item in items.iter() {
+        let place = &mut ends[item.moment as usize];
+        sorted[*place] = *item;
+        *place += 1;
+    }
+    core::mem::swap(items, sorted);
 }
 
 /// Draws at most [`ROOM`] rays of one moment; their colours are those of the hits then.

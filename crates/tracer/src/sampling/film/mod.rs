@@ -146,6 +146,13 @@ impl Wanted<'_> {
     pub(crate) fn goal(&self, count: u32) -> u32 {
         self.plan.goal(count)
     }
+
+    /// How many of so many moments, a power of two, a sample is one of: the first samples are of few, so that those of a tile
+    /// that are of one moment are many.
+    #[inline(always)]
+    pub(crate) fn moments(&self, sample: u32, all: u32) -> u32 {
+        self.plan.moments(sample, all)
+    }
 }
 
 impl Film {

@@ -15,6 +15,9 @@ use super::{Bits, CONTRAST, First, ONE, SLOPE, SPARED, Sums, Wanted};
 const FIRST: u32 = 1;
 const SECOND: u32 = 4;
 
+/// Moments of the first samples.
+const FEW_MOMENTS: u32 = 16;
+
 /// Rows that are looked at together.
 const BAND: usize = 16;
 
@@ -82,6 +85,16 @@ impl Plan {
             count.checked_add(1).and_then(u32::checked_next_power_of_two).unwrap_or(most)
         };
         next.min(most).min(count.saturating_add(self.step))
+    }
+
+    /// How many of so many moments a sample is one of.
+    #[inline(always)]
+    pub(super) fn moments(&self, sample: u32, all: u32) -> u32 {
+        if self.samples.error() == 0.0 {
+            all
+        } else {
+            sample.saturating_add(1).checked_next_power_of_two().unwrap_or(all).max(FEW_MOMENTS).min(all)
+        }
     }
 
     /// Whether a pixel has the second number of the chain.
