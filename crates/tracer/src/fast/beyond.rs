@@ -5,17 +5,18 @@ use rayfold_scene::Scene;
 
 use super::bodies::Bodies;
 use super::features::BUILT;
-use super::finish::Finishes;
+use super::finish::{Finishes, Gloss};
 use super::geometry::Geometry;
 use super::glass::Glass;
 use super::lights::lamp::Lamp;
+use super::parts;
 use super::real::Real;
 
 /// What few scenes have.
 #[derive(Debug)]
 pub(super) struct Beyond<E> {
     pub(super) bodies: Bodies<E>,
-    pub(super) lamps: Vec<Lamp<E>>,
+    lamps: Vec<Lamp<E>>,
     pub(super) finishes: Option<Finishes>,
     glass: Option<Glass<E>>,
 }
@@ -35,6 +36,23 @@ impl<E: Real> Beyond<E> {
     #[inline(always)]
     pub(super) fn glass(&self) -> Option<&Glass<E>> {
         if BUILT.glass { self.glass.as_ref() } else { None }
+    }
+
+    #[inline(always)]
+    pub(super) fn lamps(&self) -> &[Lamp<E>] {
+        if parts::BUILT.lamps { &self.lamps } else { &[] }
+    }
+
+    /// Where a packet's highlights are summed up, if there may be any.
+    #[inline(always)]
+    pub(super) fn gloss(&self) -> Option<Gloss<'_>> {
+        if parts::BUILT.highlights { self.finishes.as_ref().map(Finishes::gloss) } else { None }
+    }
+
+    /// Its surfaces, if any has a pattern.
+    #[inline(always)]
+    pub(super) fn patterned(&self) -> Option<&Finishes> {
+        self.finishes.as_ref().filter(|finishes| parts::BUILT.patterns && finishes.has_patterns)
     }
 
     pub(super) fn has_glass(&self) -> bool {

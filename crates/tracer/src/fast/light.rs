@@ -8,7 +8,7 @@ use super::bounce::{Columns, Hits, Queue};
 use super::candidates::{Candidates, Found, Masks, Picked};
 use super::dimming::{Arriving, Shadow};
 use super::features::{BUILT, Features};
-use super::finish::{Finishes, Gloss, Lit};
+use super::finish::{Gloss, Lit};
 use super::kind::ByKind;
 use super::lights::buffer::{LightBuffer, Seen};
 use super::lights::lamp::Rays;
@@ -137,7 +137,7 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                 let start = Vec3::load(simd, &hits.start, at);
                 let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
                 let seen = Ray { origin: start, direction: Vec3::load(simd, &queue.direction, at) };
-                let mut gloss = beyond.finishes.as_ref().map(Finishes::gloss);
+                let mut gloss = beyond.gloss();
                 // Most of glass scatters nothing, and needs no shadow rays.
                 let mut shows = zero.simd_eq(zero);
                 if let (Some(_), Some(finishes)) = (beyond.glass(), &beyond.finishes) {
@@ -171,7 +171,7 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                         gloss.add(Lit { lanes: lit, towards, color }, (seen, normal), orders);
                     }
                 }
-                for lamp in &beyond.lamps {
+                for lamp in beyond.lamps() {
                     let Rays { ray, far, part } = lamp.rays(simd, start);
                     let cosine = normal.dot(ray.direction);
                     let facing = cosine.simd_gt(zero) & shows;

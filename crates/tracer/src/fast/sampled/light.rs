@@ -6,11 +6,12 @@ use glam::DVec3;
 use rayfold_scene::{Light, Scene};
 
 use super::hulls::{Cone, Hulls, Region};
+use crate::fast::beyond::Beyond;
 use crate::fast::bounce::{Column, Columns, Hits, Queue, columns};
 use crate::fast::candidates::Candidates;
 use crate::fast::dimming::{Arriving, Shadow};
 use crate::fast::features::Features;
-use crate::fast::finish::{Finishes, Lit};
+use crate::fast::finish::Lit;
 use crate::fast::geometry::Geometry;
 use crate::fast::light::{InTheWay, add_light, region};
 use crate::fast::lights::lamp::Rays;
@@ -178,7 +179,7 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
             let (low, high) = region(simd, hits);
             let from = Region::new(low, high);
             let beyond = scene.beyond.as_ref();
-            let lamps = beyond.map_or(&[][..], |beyond| &beyond.lamps[..]);
+            let lamps = beyond.map_or(&[][..], Beyond::lamps);
             let all = |mask: u64| match &extents.hulls {
                 Some(_) => Candidates::masked(scene.masks(mask)),
                 None => scene.all(),
@@ -204,7 +205,7 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                 let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
                 let seen = Ray { origin: start, direction: Vec3::load(simd, &queue.direction, at) };
                 let finishes = beyond.and_then(|beyond| beyond.finishes.as_ref());
-                let mut gloss = finishes.map(Finishes::gloss);
+                let mut gloss = beyond.and_then(Beyond::gloss);
                 let glass = beyond.and_then(|beyond| Some((scene, beyond, beyond.glass()?)));
                 // Most of glass scatters nothing, and needs no shadow rays.
                 let mut shows = zero.simd_eq(zero);
