@@ -149,8 +149,11 @@ fn measured((name, asked, make): &Subject, args: &Args) -> Result<Row> {
     } else {
         rays::count(&scene, &packets("auto", RenderOptions::default()), MAX_BOUNCES)?.last().copied()
     };
-    let is_simple = matches!(asked, Asked::Shape) && scene.lights.len() == 1;
-    let mitsuba = if is_simple && mitsuba::is_here() { mitsuba::run(&scene, rounds)? } else { None };
+    let mitsuba = if matches!(asked, Asked::Shape) && mitsuba::is_here() {
+        mitsuba::run(&scene, rounds)?
+    } else {
+        None
+    };
     Ok(Row {
         name,
         asked: *asked,
@@ -187,7 +190,7 @@ fn report(args: &Args, rows: &[Row]) -> Result<String> {
          busy; what is compared is drawn in turn, and medians are shown. Ours is all of `render`, preparing included; POV-Ray's \
          (one thread, no anti-aliasing) is without what an image of 8 x 6 pixels takes it. A ray is one of the camera or one to a light \
          that a surface faces; those that glass sends on are not counted. *Off*: pixels of POV-Ray's picture that are off by \
-         more than 2 levels from ours: its noise is another function, its glass weighs mirrored light in another way. \
+         more than 2 levels from ours: its noise is another function. \
          Mitsuba 3 (LLVM variant, single precision, \
          one thread) is given the rays and asked for hits and shadows, without shading; its cylinders have no caps.\n\n"
     );

@@ -5,7 +5,7 @@ use rayfold_scene::Scene;
 
 use super::bodies::Bodies;
 use super::features::BUILT;
-use super::finish::{Finishes, Gloss};
+use super::finish::Finishes;
 use super::geometry::Geometry;
 use super::glass::Glass;
 use super::lights::lamp::Lamp;
@@ -17,7 +17,7 @@ use super::real::Real;
 pub(super) struct Beyond<E> {
     pub(super) bodies: Bodies<E>,
     lamps: Vec<Lamp<E>>,
-    pub(super) finishes: Option<Finishes>,
+    finishes: Option<Finishes>,
     glass: Option<Glass<E>>,
 }
 
@@ -43,10 +43,10 @@ impl<E: Real> Beyond<E> {
         if parts::BUILT.lamps { &self.lamps } else { &[] }
     }
 
-    /// Where a packet's highlights are summed up, if there may be any.
+    /// Its surfaces, if any has highlights.
     #[inline(always)]
-    pub(super) fn gloss(&self) -> Option<Gloss<'_>> {
-        if parts::BUILT.highlights { self.finishes.as_ref().map(Finishes::gloss) } else { None }
+    pub(super) fn glossy(&self) -> Option<&Finishes> {
+        self.finishes.as_ref().filter(|finishes| parts::BUILT.highlights && finishes.has_highlights)
     }
 
     /// Its surfaces, if any has a pattern.

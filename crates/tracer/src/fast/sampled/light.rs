@@ -11,7 +11,7 @@ use crate::fast::bounce::{Column, Columns, Hits, Queue, columns};
 use crate::fast::candidates::Candidates;
 use crate::fast::dimming::{Arriving, Shadow};
 use crate::fast::features::Features;
-use crate::fast::finish::Lit;
+use crate::fast::finish::{Finishes, Lit};
 use crate::fast::geometry::Geometry;
 use crate::fast::light::{InTheWay, add_light, region};
 use crate::fast::lights::lamp::Rays;
@@ -204,15 +204,17 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                 let start = Vec3::load(simd, &hits.start, at);
                 let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
                 let seen = Ray { origin: start, direction: Vec3::load(simd, &queue.direction, at) };
-                let finishes = beyond.and_then(|beyond| beyond.finishes.as_ref());
-                let mut gloss = beyond.and_then(Beyond::gloss);
+                let finishes = beyond.and_then(Beyond::glossy);
+                let mut gloss = finishes.map(Finishes::gloss);
                 let glass = beyond.and_then(|beyond| Some((scene, beyond, beyond.glass()?)));
                 // Most of glass scatters nothing, and needs no shadow rays.
                 let mut shows = zero.simd_eq(zero);
-                if let (Some(_), Some(finishes)) = (glass, finishes) {
+                if glass.is_some() {
                     let diffuse = Vec3::<S, E>::load(simd, &hits.diffuse, at);
                     shows = diffuse.x.simd_ne(zero) | diffuse.y.simd_ne(zero) | diffuse.z.simd_ne(zero);
-                    shows |= finishes.shines(simd, orders);
+                    if let Some(finishes) = finishes {
+                        shows |= finishes.shines(simd, orders);
+                    }
                 }
                 let mut sum = Vec3::zero(simd);
                 for (index, light) in scene.suns.iter().enumerate() {
