@@ -17,6 +17,7 @@ pub mod fingerprints;
 pub mod gif;
 pub mod hard_cases;
 pub mod measure;
+pub mod metamorphic;
 pub mod needs;
 pub mod oracle;
 pub mod parsing;

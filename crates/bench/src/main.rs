@@ -1,7 +1,7 @@
 //! The program that measures: a subcommand a report.
 
 use clap::{Parser, Subcommand};
-use rayfold_bench::{accuracy, fingerprints, gif, measure, needs, parsing, sampling, speed};
+use rayfold_bench::{accuracy, fingerprints, gif, measure, metamorphic, needs, parsing, sampling, speed};
 #[cfg(feature = "bucket")]
 use rayfold_bench::{cold_start, explore, pipeline, simulate};
 
@@ -37,10 +37,14 @@ enum Measurement {
     /// Run a program and print what it took
     #[command(hide = true)]
     Measure(measure::Args),
+    /// Random scenes against what must show the same: scaled, turned, in another order, taken apart, as groups
+    Metamorphic(metamorphic::Args),
     /// Instructions that scenes execute for parts of the tracer that they do not use (needs valgrind)
     Needs(needs::Args),
     /// Error against time of pictures of several samples a pixel
     Sampling(sampling::Args),
+    /// What a ray costs, shape by shape, beside POV-Ray and Mitsuba where they are
+    Shapes(speed::shapes::Args),
     /// Processor time against the work asked for, and beside POV-Ray and Embree where they are
     Speed(speed::Args),
 }
@@ -60,8 +64,10 @@ fn main() -> anyhow::Result<()> {
         Measurement::Gif(args) => gif::run(&args),
         Measurement::Fingerprints(args) => fingerprints::run(&args),
         Measurement::Measure(args) => measure::run(&args),
+        Measurement::Metamorphic(args) => metamorphic::run(&args),
         Measurement::Needs(args) => needs::run(&args),
         Measurement::Sampling(args) => sampling::run(&args),
+        Measurement::Shapes(args) => speed::shapes::run(&args),
         Measurement::Speed(args) => speed::run(&args),
     }
 }

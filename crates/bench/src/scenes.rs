@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use glam::{DVec2, DVec3};
 use rayfold_scene::{
     Camera, Cuboid, DirectionalLight, InvalidValue, Light, Limits, Material, Object, Pinhole, Scene, Screen,
-    Sphere, Triangle, natural_cmp, parse,
+    Script, Sphere, Triangle, natural_cmp, parse,
 };
 
 use crate::backends::Ray;
@@ -69,6 +69,20 @@ fn folder(animation: &str) -> PathBuf {
 
 /// The animations in `scenes/` that are in version 1 of the language.
 pub const EXAMPLES: [&str; 5] = ["sphere_light", "moving_up", "artistic", "artisticsss", "hello"];
+
+/// Those that are one script with curves, in version 2.
+pub const MOVING_EXAMPLES: [&str; 5] = ["clockwork", "glass", "lamp", "marbles", "planets"];
+
+/// The script of an animation in `scenes/` that stands in its middle.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn script(animation: &str) -> Result<Script> {
+    let names = scripts(animation)?;
+    let name = names.get(names.len() / 2).context("a folder without scripts")?;
+    let parsed = parse(name, &std::fs::read(folder(animation).join(name))?, &Limits::default());
+    parsed.script.with_context(|| format!("{name}: {:?}", parsed.diagnostics))
+}
 
 /// A surface that scatters and mirrors.
 ///

@@ -8,8 +8,8 @@
 use std::hash::{DefaultHasher, Hasher};
 use std::process::ExitCode;
 
-use rayfold_scene::{Limits, Scene, parse};
-use rayfold_tracer::{Level, Precision, RenderError, RenderOptions, render};
+use rayfold_scene::{Limits, parse};
+use rayfold_tracer::{Level, Precision, RenderError, RenderOptions, render_frame};
 
 /// The exit code for a scene that needs what this build leaves out.
 const LEFT_OUT: u8 = 3;
@@ -27,7 +27,7 @@ fn main() -> ExitCode {
 
 fn run() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [script, times, precision] = &arguments[..] else {
+    let [path, times, precision] = &arguments[..] else {
         return Err("usage: frames SCRIPT TIMES auto|f32|f64".into());
     };
     let precision = match &precision[..] {
@@ -35,13 +35,13 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
         "f64" => Precision::F64,
         _ => Precision::Auto,
     };
-    let parsed = parse(script, &std::fs::read(script)?, &Limits::default());
-    let scene: Scene = parsed.script.and_then(|script| script.frame(0)).ok_or("not a script")?;
+    let parsed = parse(path, &std::fs::read(path)?, &Limits::default());
+    let script = parsed.script.ok_or("not a script")?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build()?;
     let mut digest = DefaultHasher::new();
     for _ in 0..times.parse()? {
         let options = RenderOptions { precision, ..Default::default() };
-        let image = pool.install(|| render(&scene, &options))?;
+        let image = pool.install(|| render_frame(&script, 0, &options)).ok_or("nothing is shown")??;
         digest.write(image.as_raw());
     }
     println!("{:?} {:016x}", Level::new(), digest.finish());

@@ -40,7 +40,12 @@ impl<'a> Exposure<'a> {
 
     /// What it is at other moments, if they count.
     pub(crate) fn motion(&self) -> Option<&'a (dyn Fn(f64) -> Scene + Sync)> {
-        self.at.filter(|_| self.scene.samples.most() > 1 && self.scene.shutter.open() > 0.0)
+        self.at.filter(|_| cfg!(feature = "shutters") && self.is_moving())
+    }
+
+    /// Whether it may be something else at other moments that count.
+    pub(crate) fn is_moving(&self) -> bool {
+        self.at.is_some() && self.scene.samples.most() > 1 && self.scene.shutter.open() > 0.0
     }
 
     /// What the scene is at a share of its exposure, from 0 (the shutter opens) to 1 (it closes).

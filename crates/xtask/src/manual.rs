@@ -161,9 +161,7 @@ mod tests {
         let language = rayfold_scene::language();
         let clauses = language.clauses.iter().map(|clause| clause.name);
         for name in Command::ALL.iter().map(|command| command.name()).chain(clauses) {
-            // What these do to a pixel is not drawn by every version.
-            let is_of_sampling = ["Samples", "Shutter", "Lens"].contains(&name);
-            assert!(is_of_sampling || words.contains(&name.to_lowercase()), "no script uses `{name}`");
+            assert!(words.contains(&name.to_lowercase()), "no script uses `{name}`");
         }
         for mode in &language.curve_modes {
             assert!(words.iter().any(|word| word.trim_start_matches('(') == mode.name), "{}", mode.name);

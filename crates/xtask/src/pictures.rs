@@ -125,3 +125,50 @@ fn remove_others(folder: &Path, examples: &[Example]) -> anyhow::Result<()> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use rayfold_tracer::{RenderOptions, render_frame};
+
+    use super::*;
+
+    /// Levels that rounding may make of a pixel on another machine.
+    const TOLERANCE: u8 = 1;
+
+    #[test]
+    fn no_picture_is_stale() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let examples = examples(&fs::read_to_string(root.join(PAGE)).unwrap()).unwrap();
+        let mut stale = Vec::new();
+        for example in &examples {
+            let path = root.join(PICTURES).join(example.file());
+            let script = script(example).unwrap();
+            let is_drawn = if example.is_curve() {
+                fs::read_to_string(&path).unwrap() == plot::svg(&script).unwrap()
+            } else {
+                let drawn = |k| render_frame(&script, k, &RenderOptions::default()).unwrap().unwrap();
+                let frames: Vec<RgbImage> = (0..script.frame_count()).map(drawn).collect();
+                are_alike(&image::open(&path).unwrap().into_rgb8(), &side_by_side(&frames).unwrap())
+            };
+            if !is_drawn {
+                stale.push(example.file());
+            }
+        }
+        assert!(stale.is_empty(), "cargo xtask pictures: {}", stale.join(", "));
+    }
+
+    fn are_alike(a: &RgbImage, b: &RgbImage) -> bool {
+        let near = |(a, b): (&u8, &u8)| a.abs_diff(*b) <= TOLERANCE;
+        a.dimensions() == b.dimensions() && a.as_raw().iter().zip(b.as_raw()).all(near)
+    }
+
+    #[test]
+    fn another_picture_is_not_alike() {
+        let grey = RgbImage::from_pixel(3, 2, image::Rgb([100; 3]));
+        let mut other = grey.clone();
+        assert!(are_alike(&grey, &other));
+        other.put_pixel(2, 1, image::Rgb([100, 102, 100]));
+        assert!(!are_alike(&grey, &other));
+        assert!(!are_alike(&grey, &RgbImage::from_pixel(2, 3, image::Rgb([100; 3]))));
+    }
+}

@@ -1,9 +1,10 @@
 //! `rayfold-bench accuracy`: how far each backend is from the truth, and what it costs.
 
+mod examples;
 mod flip;
 mod images;
 mod naive;
-mod rays;
+pub(crate) mod rays;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -33,6 +34,9 @@ pub struct Args {
     /// The hard cases at full size instead of the images
     #[arg(long)]
     hard_cases: bool,
+    /// The frames of all example scenes, as users get them, instead: accuracy-examples.md
+    #[arg(long, conflicts_with = "hard_cases")]
+    examples: bool,
     /// Of the hard cases only this one
     #[arg(long, requires = "hard_cases")]
     case: Option<String>,
@@ -49,6 +53,9 @@ pub fn run(args: &Args) -> Result<()> {
     std::fs::create_dir_all(&args.output)?;
     if args.hard_cases {
         return hard_cases(args);
+    }
+    if args.examples {
+        return examples::run(&args.output, args.quick);
     }
     let report = {
         let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
@@ -74,7 +81,8 @@ fn introduction(quick: bool) -> String {
         "# Accuracy\n\n\
          Written by `cargo run --release -p rayfold-bench -- accuracy{command}`; all figures are of one run, with a load \
          of {load} (`/proc/loadavg`) when it ended. `... accuracy --hard-cases` measures the hard cases at full size and \
-         writes `hard-cases.md`.\n\n\
+         writes `hard-cases.md`; `... accuracy --examples` compares frames of all example scenes as users get them: \
+         [accuracy-examples.md](accuracy-examples.md).\n\n\
          Every backend draws the same scenes on one thread, in turn, and its processor time is taken (the machine \
          may be busy with other work; the median of the rounds is shown). `f32 naive` is the same packet machinery, tiles \
          and trees with textbook formulas: quadratic roots, edges and slabs without error bounds, rays that start 1e-4 off \
@@ -86,7 +94,8 @@ fn introduction(quick: bool) -> String {
          RMSE and the largest error are in levels (0 to 255) over the three channels; FLIP is the mean of LDR-FLIP \
          (Andersson et al. 2020) at 67 pixels a degree; NaN counts channels that were not a number before they became \
          a level. Rays are those that the language asks for: from the camera, to each light that a surface faces, from \
-         mirrors. One sample a pixel: that is what scenes have as yet.\n\n"
+         mirrors. One sample a pixel; of several \
+         samples, [sampling.md](sampling.md).\n\n"
     )
 }
 

@@ -17,7 +17,7 @@ use super::images::off_by_more_than;
 use super::nasty::{Kind, color, first_seed, judge_kinds, point, power, within};
 use super::setup::direction;
 use crate::backends::Backend;
-use crate::scenes::light;
+use crate::scenes::{light, moved};
 
 /// The share of pixels that may be wrong: rays that meet rims, tips and walls between cells exactly.
 const FEW: f64 = 5e-4;
@@ -69,10 +69,15 @@ pub(super) fn scaled_by_two(backends: &[Backend], size: Size, figures: &mut Figu
     Ok(())
 }
 
-fn scaled(scene: &Scene, scale: f64) -> Result<Scene> {
+/// The scene in another unit.
+pub(crate) fn scaled(scene: &Scene, scale: f64) -> Result<Scene> {
     let place = |p: DVec3| scale * p;
     let mut scaled = scene.clone();
-    let Camera::Look(look) = &scene.camera else { anyhow::bail!("only a camera with an eye is scaled") };
+    let look = match &scene.camera {
+        Camera::Look(look) => look,
+        Camera::Pinhole(_) => return moved(scene, scale, DVec3::ZERO),
+        Camera::Orthographic => anyhow::bail!("only a camera with an eye is scaled"),
+    };
     let up = Some(look.up());
     let look = Look::new(place(look.eye()), place(look.target()), look.field_of_view(), up)?;
     scaled.camera = Camera::Look(look);

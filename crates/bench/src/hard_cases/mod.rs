@@ -24,11 +24,14 @@ mod ties;
 mod triangles;
 
 use anyhow::{Context, Result};
+use fastrand::Rng;
+use rayfold_scene::Scene;
 
 use crate::backends::Backend;
 
+pub(crate) use everything::scaled;
 pub use figures::{Figure, Size};
-pub(crate) use nasty::one_of_each;
+pub(crate) use nasty::{is_wrong_at, one_of_each};
 pub use report::{Report, Run};
 
 use figures::Figures;
@@ -66,6 +69,13 @@ impl Case {
         (self.run)(backends, size, &mut figures).with_context(|| format!("case {}", self.number))?;
         Ok(figures.0)
     }
+}
+
+/// The random scene of a seed, of all kinds that there are in turn, and what it is.
+pub(crate) fn random_scene(seed: u64) -> Result<(&'static str, Scene)> {
+    let kinds = [everything::KINDS, nasty::KINDS, everyday::KINDS].concat();
+    let (name, make) = kinds[(seed % kinds.len() as u64) as usize];
+    Ok((name, make(&mut Rng::with_seed(seed))?))
 }
 
 /// All hard cases.

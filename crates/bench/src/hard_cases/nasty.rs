@@ -138,24 +138,40 @@ fn judge(scene: &Scene, images: &[RgbImage], samples: usize, seed: u64) -> Resul
         .map(|(x, y)| {
             let (i, j) = (f64::from(x), f64::from(height - 1 - y));
             let exact = shown(scene, i, j);
-            let off = |image: &RgbImage, from: DVec3, to: DVec3| {
-                let color = DVec3::from_array(image.get_pixel(x, y).0.map(f64::from));
-                (from - color).max(color - to).max_element() > LEVELS
-            };
-            if images.iter().all(|image| !off(image, exact, exact)) {
+            let is_off = |image: &RgbImage, range| is_off(image.get_pixel(x, y).0, range);
+            if images.iter().all(|image| !is_off(image, (exact, exact))) {
                 return vec![false; images.len()];
             }
-            let (mut from, mut to) = (exact, exact);
-            for turn in 0..8 {
-                let aside = DVec2::from_angle(f64::from(turn) * std::f64::consts::TAU / 8.0) * BESIDE;
-                let beside = shown(scene, i + aside.x, j + aside.y);
-                (from, to) = (from.min(beside), to.max(beside));
-            }
-            images.iter().map(|image| off(image, from, to)).collect()
+            let range = around(scene, (i, j), exact);
+            images.iter().map(|image| is_off(image, range)).collect()
         })
         .collect();
     let count = |image: usize| verdicts.iter().filter(|verdict| verdict[image]).count();
     Ok((0..images.len()).map(count).collect())
+}
+
+/// Whether a pixel's colour is wrong; its row counts from the top.
+pub(crate) fn is_wrong_at(scene: &Scene, (x, y): (u32, u32), color: [u8; 3]) -> bool {
+    let (i, j) = (f64::from(x), f64::from(scene.screen.height() - 1 - y));
+    let exact = shown(scene, i, j);
+    is_off(color, (exact, exact)) && is_off(color, around(scene, (i, j), exact))
+}
+
+/// Whether a colour is none between these two.
+fn is_off(color: [u8; 3], (from, to): (DVec3, DVec3)) -> bool {
+    let color = DVec3::from_array(color.map(f64::from));
+    (from - color).max(color - to).max_element() > LEVELS
+}
+
+/// Of all colours that the oracle sees at a pixel (`exact`) and beside it the least and the greatest, channel by channel.
+fn around(scene: &Scene, (i, j): (f64, f64), exact: DVec3) -> (DVec3, DVec3) {
+    let (mut from, mut to) = (exact, exact);
+    for turn in 0..8 {
+        let aside = DVec2::from_angle(f64::from(turn) * std::f64::consts::TAU / 8.0) * BESIDE;
+        let beside = shown(scene, i + aside.x, j + aside.y);
+        (from, to) = (from.min(beside), to.max(beside));
+    }
+    (from, to)
 }
 
 /// The oracle's colour as levels before rounding.

@@ -1,7 +1,9 @@
 //! `rayfold-bench speed`: processor time against the work asked for, and side by side with peers.
 
 mod embree;
+mod mitsuba;
 pub(crate) mod povray;
+pub mod shapes;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -5,8 +5,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use image::RgbImage;
+use rayfold_scene::model::Weight;
 use rayfold_scene::{Camera, Light, Material, Object, Scene};
 use rayfold_tracer::MAX_BOUNCES;
 
@@ -93,35 +94,78 @@ fn translated(scene: &Scene) -> Result<String> {
         vector(up)
     );
     for light in scene.lights.iter() {
-        let Light::Directional(light) = light else { anyhow::bail!("{light:?} is not translated") };
-        let from = vector(-1e4 * light.direction());
-        writeln!(text, "light_source {{ {from} rgb {} parallel point_at 0 }}", vector(light.color()))?;
+        let color = vector(light.color());
+        match light {
+            Light::Directional(sun) => {
+                let from = vector(-1e4 * sun.direction());
+                writeln!(text, "light_source {{ {from} rgb {color} parallel point_at 0 }}")?;
+            }
+            Light::Lamp(lamp) => {
+                ensure!(lamp.reach() == 0.0, "a lamp's reach is not translated");
+                writeln!(text, "light_source {{ {} rgb {color} }}", vector(lamp.position()))?;
+            }
+        }
     }
     for object in scene.objects.iter() {
-        let surface = surface(object.material());
+        let surface = surface(object.material())?;
         match object {
-            Object::Sphere(s) => {
-                writeln!(text, "sphere {{ {}, {:e} {surface} }}", vector(s.center()), s.radius())?;
+            Object::Instance(instance) => {
+                let placement = instance.placement();
+                let axes = placement.rotation() * placement.scale();
+                let inner = shape(instance.object())?;
+                // The pattern lies in the group's coordinates.
+                writeln!(text, "{inner} {surface} {} }}", matrix(axes, placement.translation()))?;
             }
-            Object::Cuboid(c) => {
-                writeln!(text, "box {{ {}, {} {surface} }}", vector(c.min()), vector(c.max()))?
-            }
-            Object::Triangle(t) => {
-                let [u, v, w] = t.vertices().map(vector);
-                writeln!(text, "triangle {{ {u}, {v}, {w} {surface} }}")?;
-            }
-            Object::Plane(_)
-            | Object::Disc(_)
-            | Object::Cylinder(_)
-            | Object::Cone(_)
-            | Object::Torus(_)
-            | Object::Instance(_) => anyhow::bail!("{object:?} is not translated"),
+            object => writeln!(text, "{} {surface} }}", shape(object)?)?,
         }
     }
     Ok(text)
 }
 
-fn surface(material: &Material) -> String {
+/// The shape, without its closing brace.
+fn shape(object: &Object) -> Result<String> {
+    Ok(match object {
+        Object::Sphere(s) => format!("sphere {{ {}, {:e}", vector(s.center()), s.radius()),
+        Object::Cuboid(c) => format!("box {{ {}, {}", vector(c.min()), vector(c.max())),
+        Object::Triangle(t) => {
+            let [u, v, w] = t.vertices().map(vector);
+            format!("triangle {{ {u}, {v}, {w}")
+        }
+        Object::Plane(p) => {
+            let normal = p.normal().normalize();
+            format!("plane {{ {}, {:e}", vector(normal), normal.dot(p.point()))
+        }
+        Object::Disc(d) => {
+            format!("disc {{ {}, {}, {:e}", vector(d.center()), vector(d.normal()), d.radius())
+        }
+        Object::Cylinder(c) => {
+            let [a, b] = c.ends().map(vector);
+            format!("cylinder {{ {a}, {b}, {:e}", c.radius())
+        }
+        Object::Cone(c) => {
+            let ([a, b], [from, to]) = (c.ends().map(vector), c.radii());
+            format!("cone {{ {a}, {from:e}, {b}, {to:e}")
+        }
+        Object::Torus(t) => {
+            // Around the second axis there.
+            let y = t.normal().normalize();
+            let (x, z) = y.any_orthonormal_pair();
+            let axes = matrix(DMat3::from_cols(x, y, z), t.center());
+            format!("torus {{ {:e}, {:e} {axes}", t.radius(), t.thickness())
+        }
+        Object::Instance(_) => anyhow::bail!("an object of a group in a group"),
+    })
+}
+
+fn matrix(axes: DMat3, origin: DVec3) -> String {
+    let columns = [axes.x_axis, axes.y_axis, axes.z_axis, origin].map(|v| v.to_array()).concat();
+    let numbers: Vec<String> = columns.iter().map(|x| format!("{x:e}")).collect();
+    format!("matrix <{}>", numbers.join(","))
+}
+
+/// The same for ambient colours that are the same share of the diffuse ones in both materials of a pattern. Noise is another
+/// one there: the picture differs, the work is alike.
+fn surface(material: &Material) -> Result<String> {
     let diffuse = material.diffuse();
     // Emission is multiplied by the pigment.
     let part = |a: f64, r: f64| if r == 0.0 { 0.0 } else { a / r };
@@ -133,9 +177,46 @@ fn surface(material: &Material) -> String {
     } else {
         format!(" reflection {{ rgb {} }}", vector(material.mirror()))
     };
-    format!(
-        "pigment {{ rgb {} }} finish {{ ambient 0 diffuse 1 emission rgb {}{mirror} }}",
-        vector(diffuse),
+    let finish = material.finish();
+    if let Some(glass) = finish.and_then(|finish| finish.glass) {
+        let color = glass.color().to_array().map(|x| format!("{x:e}")).join(",");
+        return Ok(format!(
+            "pigment {{ rgbf <{color},1> }} interior {{ ior {:e} }} \
+             finish {{ ambient 0 diffuse 0 reflection {{ 0, 1 fresnel on }} conserve_energy }}",
+            glass.ior()
+        ));
+    }
+    let shine = match finish.and_then(|finish| finish.shine) {
+        None => String::new(),
+        Some(shine) => {
+            let color = shine.color();
+            ensure!(color.min_element() == color.max_element(), "only a grey highlight is translated");
+            format!(" specular {:e} roughness {:e}", color.x, 1.0 / shine.exponent())
+        }
+    };
+    let own = vector(diffuse);
+    let pigment = match finish.and_then(|finish| finish.pattern) {
+        None => format!("rgb {own}"),
+        Some(pattern) => {
+            let other = vector(pattern.other.diffuse());
+            match pattern.weight {
+                Weight::Checker(size) => format!("checker rgb {own}, rgb {other} scale {size:e}"),
+                Weight::Stripes(size) => {
+                    let both = format!("[0 rgb {own}][0.5 rgb {own}][0.5 rgb {other}][1 rgb {other}]");
+                    format!("gradient x color_map {{ {both} }} scale {:e}", 2.0 * size)
+                }
+                Weight::Gradient(from, to) => format!(
+                    "gradient y color_map {{ [0 rgb {own}][1 rgb {other}] }} scale {:e} translate <0,{from:e},0>",
+                    to - from
+                ),
+                Weight::Noise(size) => {
+                    format!("bozo color_map {{ [0 rgb {own}][1 rgb {other}] }} scale {size:e}")
+                }
+            }
+        }
+    };
+    Ok(format!(
+        "pigment {{ {pigment} }} finish {{ ambient 0 diffuse 1 emission rgb {}{mirror}{shine} }}",
         vector(emission)
-    )
+    ))
 }

@@ -9,14 +9,15 @@ use super::finish::Finishes;
 use super::geometry::Geometry;
 use super::glass::Glass;
 use super::lights::lamp::Lamp;
+use super::parts;
 use super::real::Real;
 
 /// What few scenes have.
 #[derive(Debug)]
 pub(super) struct Beyond<E> {
     pub(super) bodies: Bodies<E>,
-    pub(super) lamps: Vec<Lamp<E>>,
-    pub(super) finishes: Option<Finishes>,
+    lamps: Vec<Lamp<E>>,
+    finishes: Option<Finishes>,
     glass: Option<Glass<E>>,
 }
 
@@ -35,6 +36,23 @@ impl<E: Real> Beyond<E> {
     #[inline(always)]
     pub(super) fn glass(&self) -> Option<&Glass<E>> {
         if BUILT.glass { self.glass.as_ref() } else { None }
+    }
+
+    #[inline(always)]
+    pub(super) fn lamps(&self) -> &[Lamp<E>] {
+        if parts::BUILT.lamps { &self.lamps } else { &[] }
+    }
+
+    /// Its surfaces, if any has highlights.
+    #[inline(always)]
+    pub(super) fn glossy(&self) -> Option<&Finishes> {
+        self.finishes.as_ref().filter(|finishes| parts::BUILT.highlights && finishes.has_highlights)
+    }
+
+    /// Its surfaces, if any has a pattern.
+    #[inline(always)]
+    pub(super) fn patterned(&self) -> Option<&Finishes> {
+        self.finishes.as_ref().filter(|finishes| parts::BUILT.patterns && finishes.has_patterns)
     }
 
     pub(super) fn has_glass(&self) -> bool {

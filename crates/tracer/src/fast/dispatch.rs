@@ -3,33 +3,39 @@
 /// Compiles an expression for every instruction set that has kernels, and evaluates the one for `level`.
 #[cfg(target_arch = "x86_64")]
 macro_rules! on {
-    (narrow $level:expr, $simd:ident => $work:expr) => {
-        if let Some($simd) = $level.as_sse4_2() {
-            fearless_simd::Simd::vectorize(
-                $simd,
-                #[inline(always)]
-                || $work,
-            )
-        } else {
-            unreachable!("asked for kernels that this machine has not")
+    (narrow $level:expr, $simd:ident => $work:expr) => {{
+        #[cfg(feature = "narrow")]
+        {
+            if let Some($simd) = $level.as_sse4_2() {
+                on!(@ $simd => $work)
+            } else {
+                unreachable!("asked for kernels that this machine has not")
+            }
         }
-    };
-    ($level:expr, $simd:ident => $work:expr) => {
-        if let Some($simd) = $level.as_avx512() {
-            fearless_simd::Simd::vectorize(
-                $simd,
-                #[inline(always)]
-                || $work,
-            )
+        #[cfg(not(feature = "narrow"))]
+        {
+            unreachable!("asked for kernels that this build has not")
+        }
+    }};
+    ($level:expr, $simd:ident => $work:expr) => {{
+        #[cfg(feature = "avx512")]
+        let wide = $level.as_avx512();
+        #[cfg(not(feature = "avx512"))]
+        let wide = $level.as_avx2();
+        if let Some($simd) = wide {
+            on!(@ $simd => $work)
         } else if let Some($simd) = $level.as_avx2() {
-            fearless_simd::Simd::vectorize(
-                $simd,
-                #[inline(always)]
-                || $work,
-            )
+            on!(@ $simd => $work)
         } else {
             on!(narrow $level, $simd => $work)
         }
+    }};
+    (@ $simd:ident => $work:expr) => {
+        fearless_simd::Simd::vectorize(
+            $simd,
+            #[inline(always)]
+            || $work,
+        )
     };
 }
 

@@ -138,8 +138,10 @@ impl<E: Real, By: Formulas<E>> Kernel<E> for Fitted<By> {
 }
 
 /// The kernel of those that only old machines are without: smaller, and somewhat slower.
+#[cfg(all(target_arch = "x86_64", feature = "narrow"))]
 pub(super) struct Unfitted<By>(PhantomData<By>);
 
+#[cfg(all(target_arch = "x86_64", feature = "narrow"))]
 impl<E: Real, By: Formulas<E>> Kernel<E> for Unfitted<By> {
     type By = By;
     const FITTED: bool = false;

@@ -23,6 +23,7 @@ pub(super) struct Finishes {
     center: DVec3,
     scale: f64,
     pub(super) has_patterns: bool,
+    pub(super) has_highlights: bool,
 }
 
 /// The highlights of a packet of hits.
@@ -42,7 +43,9 @@ impl Finishes {
         let finishes = || scene.objects.iter().filter_map(|object| object.material().finish());
         finishes().next()?;
         let has_patterns = finishes().any(|finish| finish.pattern.is_some());
-        Some(Self { scene: scene.clone(), center: geometry.center, scale: geometry.scale, has_patterns })
+        let has_highlights = finishes().any(|finish| finish.shine.is_some());
+        let (center, scale) = (geometry.center, geometry.scale);
+        Some(Self { scene: scene.clone(), center, scale, has_patterns, has_highlights })
     }
 
     /// Mixes the coefficients of patterns into the colours and diffuse coefficients of the hits, and notes the mirror

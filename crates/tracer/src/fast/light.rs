@@ -137,13 +137,15 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                 let start = Vec3::load(simd, &hits.start, at);
                 let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
                 let seen = Ray { origin: start, direction: Vec3::load(simd, &queue.direction, at) };
-                let mut gloss = beyond.finishes.as_ref().map(Finishes::gloss);
+                let mut gloss = beyond.glossy().map(Finishes::gloss);
                 // Most of glass scatters nothing, and needs no shadow rays.
                 let mut shows = zero.simd_eq(zero);
-                if let (Some(_), Some(finishes)) = (beyond.glass(), &beyond.finishes) {
+                if beyond.glass().is_some() {
                     let diffuse = Vec3::<S, E>::load(simd, &hits.diffuse, at);
                     shows = diffuse.x.simd_ne(zero) | diffuse.y.simd_ne(zero) | diffuse.z.simd_ne(zero);
-                    shows |= finishes.shines(simd, orders);
+                    if let Some(finishes) = beyond.glossy() {
+                        shows |= finishes.shines(simd, orders);
+                    }
                 }
                 let mut sum = Vec3::zero(simd);
                 for (light, obstacles) in scene.suns.iter().zip(&obstacles.of) {
@@ -171,7 +173,7 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                         gloss.add(Lit { lanes: lit, towards, color }, (seen, normal), orders);
                     }
                 }
-                for lamp in &beyond.lamps {
+                for lamp in beyond.lamps() {
                     let Rays { ray, far, part } = lamp.rays(simd, start);
                     let cosine = normal.dot(ray.direction);
                     let facing = cosine.simd_gt(zero) & shows;

@@ -30,6 +30,7 @@ mod look;
 mod naive;
 mod onwards;
 mod packet;
+mod parts;
 mod placed;
 mod planes;
 mod precision;
@@ -61,7 +62,7 @@ use rayfold_scene::Scene;
 
 use self::band::{Band, Tile};
 use self::dispatch::on;
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", feature = "narrow"))]
 use self::features::Unfitted;
 use self::features::{Fitted, Kernel};
 use self::geometry::Geometry;
@@ -113,8 +114,9 @@ impl<'a> Drawing<'a> {
     /// # Errors
     /// When this build leaves out what the scene needs.
     pub fn exposed(exposure: Exposure<'a>, options: &'a RenderOptions) -> Result<Self, RenderError> {
+        parts::check(&exposure)?;
         let scene = exposure.scene();
-        if scene.samples.most() > 1 {
+        if parts::BUILT.samples && scene.samples.most() > 1 {
             return Ok(Self(
                 sampled_backend(exposure, options)?.unwrap_or(Backend::Reference(exposure, options)),
             ));
@@ -215,7 +217,8 @@ fn sampled_backend<'a>(
 /// Whether there are kernels for the instructions; the first 64-bit processors of the x86 line have none of use.
 #[cfg(target_arch = "x86_64")]
 fn has_kernels(options: &RenderOptions) -> bool {
-    options.level.unwrap_or_else(Level::new).as_sse4_2().is_some()
+    let level = options.level.unwrap_or_else(Level::new);
+    if cfg!(feature = "narrow") { level.as_sse4_2().is_some() } else { level.as_avx2().is_some() }
 }
 
 #[cfg(not(target_arch = "x86_64"))]
@@ -337,9 +340,11 @@ impl<E: Real> Job<'_, E> {
 /// Draws with the best kernel for the instructions.
 #[cfg(target_arch = "x86_64")]
 fn draw<E: Real, By: Formulas<E>>(job: &Job<E>, level: Level, band: Band, scratch: &mut Scratch<E>) {
+    #[cfg(feature = "avx512")]
     if let Some(simd) = level.as_avx512() {
-        job.draw::<_, Fitted<By>>(simd, band, scratch);
-    } else if let Some(simd) = level.as_avx2() {
+        return job.draw::<_, Fitted<By>>(simd, band, scratch);
+    }
+    if let Some(simd) = level.as_avx2() {
         job.draw::<_, Fitted<By>>(simd, band, scratch);
     } else {
         // Such machines are old, and few: one variant of each step will do for them.

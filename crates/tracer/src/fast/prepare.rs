@@ -16,6 +16,7 @@ use super::kind::{ByKind, Kind, Row};
 use super::lights::buffer::LightBuffer;
 use super::lights::sun::{Direction, Outline, Outlines, Sun};
 use super::lists::LISTED;
+use super::parts;
 use super::rays::Rays;
 use super::real::Real;
 use super::shapes::{Obstacles, Shape, Shapes, Solid, Sorted};
@@ -76,7 +77,7 @@ pub(super) struct Prepared<E> {
     /// Unclamped, for mirrored rays; of a sky its first colour.
     pub(super) background: [E; 3],
     /// A background that depends on where a ray goes.
-    pub(super) sky: Option<Sky<E>>,
+    sky: Option<Sky<E>>,
     /// What it has.
     pub(super) needs: Needs,
     /// What few scenes have.
@@ -168,6 +169,12 @@ impl<E: Real> Prepared<E> {
     #[inline(always)]
     pub(super) fn is_plain(&self) -> bool {
         !self.needs.beyond || !BUILT.beyond
+    }
+
+    /// Its background, if that depends on where a ray goes.
+    #[inline(always)]
+    pub(super) fn sky(&self) -> Option<&Sky<E>> {
+        if parts::BUILT.skies { self.sky.as_ref() } else { None }
     }
 
     /// Whether it has glass.

@@ -21,6 +21,7 @@ use super::kind::ByKind;
 use super::light::{InTheWay, light_up, light_up_beyond};
 use super::look::{aim_along_axis, look, look_at_bodies, look_from_eye};
 use super::onwards::send_on;
+use super::parts;
 use super::prepare::Prepared;
 use super::rays::Rays;
 use super::real::{Lanes, Real};
@@ -115,7 +116,8 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     let hits = &scratch.hits;
     match band.tone {
         Tone::Plain => write_pixels::<S, E>(simd, tile, &hits.color, band),
-        Tone::Srgb => write_encoded::<S, E>(tile, &hits.color, band),
+        Tone::Srgb if parts::BUILT.srgb => write_encoded::<S, E>(tile, &hits.color, band),
+        Tone::Srgb => unreachable!("such scenes are refused"),
     }
 }
 
@@ -233,7 +235,7 @@ fn shade_more<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     in_the_way: &mut InTheWay,
 ) {
     let (queue, count) = (met.queue, met.count);
-    match (&scene.beyond, met.soft) {
+    match (&scene.beyond, met.soft.filter(|_| parts::BUILT.extents)) {
         (beyond, Some(soft)) => {
             let way = (beyond.as_ref(), soft);
             shade_softly::<S, E, N, EYE>(simd, scene, way, met, hits, in_the_way);
@@ -241,7 +243,7 @@ fn shade_more<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
         (Some(beyond), None) => shade_beyond::<S, E, N, EYE>(simd, scene, beyond, met, hits, in_the_way),
         (None, None) => shade_plain::<S, E, N, EYE>(simd, scene, met, hits, in_the_way),
     }
-    if let Some(sky) = &scene.sky {
+    if let Some(sky) = scene.sky() {
         show_sky::<S, E, EYE>(simd, sky, count, queue, hits);
     }
 }
@@ -299,7 +301,7 @@ fn paint<S: Simd, E: Real, const EYE: bool>(
     queue: &Queue<E>,
     hits: &mut Hits<E>,
 ) -> bool {
-    let painted = beyond.finishes.as_ref().filter(|finishes| finishes.has_patterns);
+    let painted = beyond.patterned();
     if let Some(finishes) = painted {
         finishes.paint::<E, EYE>(queue, hits, Lanes::<S, E>::LEN);
     }

@@ -28,6 +28,7 @@ use self::torus::Torus;
 use super::bounds::Crossing;
 use super::descent::{backwards, descend};
 use super::packet::{Nearest, Ray, Surface};
+use super::parts::BUILT;
 use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
 use super::tree::{Copies, Tree, group};
 
@@ -55,6 +56,20 @@ enum Shape<E> {
     Cone(Cone<E>, [E; 3]),
     Torus(Torus<E>),
     Cuboid(Cuboid<E>),
+}
+
+impl<E> Shape<E> {
+    /// Whether this build looks for it.
+    #[inline(always)]
+    fn is_built(&self) -> bool {
+        match self {
+            Self::Plane => BUILT.planes,
+            Self::Disc(_) => BUILT.discs,
+            Self::Cone(..) => BUILT.cones,
+            Self::Torus(_) => BUILT.tori,
+            Self::Cuboid(_) => BUILT.turned_boxes,
+        }
+    }
 }
 
 /// A body as the kernels read it.
@@ -127,6 +142,9 @@ impl<E: Real> Body<E> {
         simd.vectorize(
             #[inline(always)]
             || {
+                if !self.shape.is_built() {
+                    return;
+                }
                 let local = self.local(simd, ray);
                 let (hit, distance) = match &self.shape {
                     Shape::Plane => plane::along(simd, local),

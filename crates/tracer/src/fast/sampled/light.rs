@@ -6,6 +6,7 @@ use glam::DVec3;
 use rayfold_scene::{Light, Scene};
 
 use super::hulls::{Cone, Hulls, Region};
+use crate::fast::beyond::Beyond;
 use crate::fast::bounce::{Column, Columns, Hits, Queue, columns};
 use crate::fast::candidates::Candidates;
 use crate::fast::dimming::{Arriving, Shadow};
@@ -178,7 +179,7 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
             let (low, high) = region(simd, hits);
             let from = Region::new(low, high);
             let beyond = scene.beyond.as_ref();
-            let lamps = beyond.map_or(&[][..], |beyond| &beyond.lamps[..]);
+            let lamps = beyond.map_or(&[][..], Beyond::lamps);
             let all = |mask: u64| match &extents.hulls {
                 Some(_) => Candidates::masked(scene.masks(mask)),
                 None => scene.all(),
@@ -203,15 +204,17 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                 let start = Vec3::load(simd, &hits.start, at);
                 let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
                 let seen = Ray { origin: start, direction: Vec3::load(simd, &queue.direction, at) };
-                let finishes = beyond.and_then(|beyond| beyond.finishes.as_ref());
+                let finishes = beyond.and_then(Beyond::glossy);
                 let mut gloss = finishes.map(Finishes::gloss);
                 let glass = beyond.and_then(|beyond| Some((scene, beyond, beyond.glass()?)));
                 // Most of glass scatters nothing, and needs no shadow rays.
                 let mut shows = zero.simd_eq(zero);
-                if let (Some(_), Some(finishes)) = (glass, finishes) {
+                if glass.is_some() {
                     let diffuse = Vec3::<S, E>::load(simd, &hits.diffuse, at);
                     shows = diffuse.x.simd_ne(zero) | diffuse.y.simd_ne(zero) | diffuse.z.simd_ne(zero);
-                    shows |= finishes.shines(simd, orders);
+                    if let Some(finishes) = finishes {
+                        shows |= finishes.shines(simd, orders);
+                    }
                 }
                 let mut sum = Vec3::zero(simd);
                 for (index, light) in scene.suns.iter().enumerate() {

@@ -17,7 +17,7 @@ use std::sync::atomic::Ordering;
 use self::light::Extents;
 use self::tile::{Pass, SampledTile, Workspace};
 use super::dispatch::on;
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", feature = "narrow"))]
 use super::features::Unfitted;
 use super::features::{Fitted, Kernel};
 use super::geometry::{Geometry, View};
@@ -233,9 +233,11 @@ impl<E: Real> Job<'_, E> {
 /// Draws with the best kernel for the instructions.
 #[cfg(target_arch = "x86_64")]
 fn draw<E: Real>(job: &Job<E>, level: Level, band: &mut Band<'_>, workspace: &mut Workspace<E>) {
+    #[cfg(feature = "avx512")]
     if let Some(simd) = level.as_avx512() {
-        job.draw::<_, Fitted<Robust>>(simd, band, workspace);
-    } else if let Some(simd) = level.as_avx2() {
+        return job.draw::<_, Fitted<Robust>>(simd, band, workspace);
+    }
+    if let Some(simd) = level.as_avx2() {
         job.draw::<_, Fitted<Robust>>(simd, band, workspace);
     } else {
         on!(narrow level, simd => job.draw::<_, Unfitted<Robust>>(simd, band, workspace));

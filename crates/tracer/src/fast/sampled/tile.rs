@@ -11,7 +11,9 @@ use super::light::{LightPoints, SoftLight};
 use crate::fast::bounce::{Column, Hits, Queue};
 use crate::fast::candidates::Candidates;
 use crate::fast::features::{BUILT, Kernel, Variant, fitted};
+use crate::fast::lens::Aperture;
 use crate::fast::look::look;
+use crate::fast::parts;
 use crate::fast::rays::Rays;
 use crate::fast::real::{Lanes, Real, Vec3, constant};
 use crate::fast::tile::{Met, Scratch, shade};
@@ -218,6 +220,11 @@ impl SampledTile {
 }
 
 impl<E: Real> Moment<E> {
+    #[inline(always)]
+    fn lens(&self) -> Option<&Aperture<E>> {
+        if parts::BUILT.lenses { self.lens.as_ref() } else { None }
+    }
+
     /// Whether a tile surely shows nothing but a background of one colour.
     #[inline(always)]
     fn shows_nothing(&self, tile: &SampledTile) -> bool {
@@ -278,7 +285,11 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     place::<S, E>(simd, pass, (tile, moment), batch, workspace);
     let Workspace { scratch, lights, objects, .. } = workspace;
     let (scene, count) = (&moment.prepared, batch.len());
-    let soft = moment.extents.as_ref().map(|extents| SoftLight { extents, points: lights });
+    let soft = moment
+        .extents
+        .as_ref()
+        .filter(|_| parts::BUILT.extents)
+        .map(|extents| SoftLight { extents, points: lights });
     aim::<S, E>(simd, moment, &mut scratch.queue);
     let Scratch { queue, hits, next, waiting, in_the_way, sights, .. } = &mut *scratch;
     let tree = BUILT.tree && scene.tree.is_some();
@@ -295,7 +306,7 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
         waiting.begin(pass.bounces);
     }
     let (kinds, background) = (candidates.kinds, scene.background);
-    if matches!(scene.rays, Rays::Pinhole(_)) && moment.lens.is_none() {
+    if matches!(scene.rays, Rays::Pinhole(_)) && moment.lens().is_none() {
         fitted!(N, kinds, tree, C T D => {
             look::<S, E, Variant<N::By, C, T, D>, true>(simd, scene, candidates, background, queue, hits)
         });
@@ -412,7 +423,7 @@ fn place<S: Simd, E: Real>(
             for (slot, pixel) in queue.pixel.0.iter_mut().enumerate().take(count) {
                 *pixel = E::narrow(slot as f64);
             }
-            if let Some((first, lens)) = pass.dimensions.lens.zip(moment.lens.as_ref()) {
+            if let Some((first, lens)) = pass.dimensions.lens.zip(moment.lens()) {
                 pass.points.coordinates(first, seeds, samples, &mut u[..count]);
                 pass.points.coordinates(first + 1, seeds, samples, &mut v[..count]);
                 let [x, y, _] = &mut queue.origin;
@@ -421,7 +432,9 @@ fn place<S: Simd, E: Real>(
                     (x.0[k], y.0[k]) = (E::narrow(at.x), E::narrow(at.y));
                 }
             }
-            if let Some(extents) = &moment.extents {
+            if parts::BUILT.extents
+                && let Some(extents) = &moment.extents
+            {
                 extents.place(pass.points, seeds, samples, coordinates, lights);
             }
         },
@@ -440,7 +453,7 @@ fn aim<S: Simd, E: Real>(simd: S, moment: &Moment<E>, queue: &mut Queue<E>) {
                 let end = at + Lanes::<S, E>::LEN;
                 let load = |column: &Column<E>| Lanes::<S, E>::from_slice(simd, &column.0[at..end]);
                 let (i, j) = (load(&queue.weight[0]), load(&queue.weight[1]));
-                let (origin, direction) = match (&moment.prepared.rays, &moment.lens) {
+                let (origin, direction) = match (&moment.prepared.rays, moment.lens()) {
                     (Rays::Pinhole(rays), None) => (Vec3::zero(simd), rays.along(simd, i, j)),
                     (Rays::Pinhole(rays), Some(lens)) => {
                         let (x, y) = (load(&queue.origin[0]), load(&queue.origin[1]));

@@ -9,6 +9,7 @@ use rayfold_scene::{
     Cone, Cuboid, Cylinder, Disc, Instance, Object, Placement, Plane, Sphere, Torus, Triangle,
 };
 
+use crate::fast::parts::BUILT;
 use crate::reference::triangle_normal;
 
 /// Whether the axes stay along axes.
@@ -18,6 +19,9 @@ fn turns_axes_to_axes(placement: &Placement) -> bool {
 
 /// The group's box, if it stands askew in the world.
 pub(in crate::fast) fn turned_box(instance: &Instance) -> Option<&Cuboid> {
+    if !BUILT.groups {
+        return None;
+    }
     match instance.object() {
         Object::Cuboid(cuboid) if !turns_axes_to_axes(instance.placement()) => Some(cuboid),
         Object::Cuboid(_)
@@ -34,6 +38,9 @@ pub(in crate::fast) fn turned_box(instance: &Instance) -> Option<&Cuboid> {
 
 /// The object as one of the world; none for a [`turned_box`], and if it can never be hit.
 pub(in crate::fast) fn in_world(instance: &Instance) -> Option<Object> {
+    if !BUILT.groups {
+        return None;
+    }
     let placement = instance.placement();
     let material = instance.material().clone();
     let (scale, rotation) = (placement.scale(), placement.rotation());

@@ -1,0 +1,116 @@
+//! Frames of all example scenes as users get them, samples, shutter and all, against the plain tracer.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use image::RgbImage;
+use rayfold_scene::Script;
+use rayfold_tracer::{Exposure, RenderOptions, precision, reference, render_frame};
+
+use crate::scenes::{EXAMPLES, MOVING_EXAMPLES, script};
+
+/// Frames of an animation that are compared, spread evenly.
+const FRAMES: usize = 8;
+
+/// What is asked for: the share of pixels off by more than 2 levels, in percent.
+const MOST: f64 = 0.01;
+
+/// What was found in an animation.
+struct Row {
+    name: &'static str,
+    frames: usize,
+    precision: String,
+    samples: u32,
+    pixels: usize,
+    different: usize,
+    off: usize,
+    largest: u8,
+}
+
+impl Row {
+    fn share(&self) -> f64 {
+        100.0 * self.off as f64 / self.pixels as f64
+    }
+}
+
+/// Compares and writes accuracy-examples.md.
+///
+/// # Errors
+/// When a scene cannot be drawn or the report cannot be written.
+pub(super) fn run(folder: &Path, quick: bool) -> Result<()> {
+    let names = EXAMPLES.into_iter().chain(MOVING_EXAMPLES);
+    let rows: Vec<Row> = names
+        .map(|name| {
+            eprintln!("scene {name}");
+            compared(name, &script(name)?, if quick { 1 } else { FRAMES })
+        })
+        .collect::<Result<_>>()?;
+    let path = folder.join("accuracy-examples.md");
+    std::fs::write(&path, report(&rows, quick)?).with_context(|| path.display().to_string())
+}
+
+fn compared(name: &'static str, script: &Script, most: usize) -> Result<Row> {
+    let count = script.frame_count();
+    let frames = count.min(most);
+    let first = script.frame(0).context("a frame")?;
+    let mut row = Row {
+        name,
+        frames,
+        precision: format!("{:?}", precision(&first)).to_lowercase(),
+        samples: first.samples.most(),
+        pixels: 0,
+        different: 0,
+        off: 0,
+        largest: 0,
+    };
+    for k in 0..frames {
+        // The middles of equal stretches.
+        let (ours, plain) = both(script, (2 * k + 1) * count / (2 * frames))?;
+        for (a, b) in ours.pixels().zip(plain.pixels()) {
+            let apart = (0..3).map(|c| a.0[c].abs_diff(b.0[c])).max().unwrap_or(0);
+            row.pixels += 1;
+            row.different += usize::from(apart > 0);
+            row.off += usize::from(apart > 2);
+            row.largest = row.largest.max(apart);
+        }
+    }
+    Ok(row)
+}
+
+/// A frame as users get it, and by the plain tracer.
+fn both(script: &Script, k: usize) -> Result<(RgbImage, RgbImage)> {
+    let options = RenderOptions::default();
+    let scene = script.frame(k).context("a frame")?;
+    let after = |frames| script.frame_after(k, frames).unwrap_or_else(|| scene.clone());
+    let plain = reference::render_exposed(Exposure::moving(&scene, &after), &options)?;
+    Ok((render_frame(script, k, &options).context("a frame")??, plain))
+}
+
+fn report(rows: &[Row], quick: bool) -> Result<String> {
+    let command = if quick { " --quick" } else { "" };
+    let mut text = format!(
+        "# Accuracy of the example scenes\n\n\
+         Written by `cargo run --release -p rayfold-bench -- accuracy --examples{command}`. Frames of each animation in `scenes/`, \
+         at its size and with its samples, shutter and lights, as `auto` draws them and as the plain `f64` tracer does. Of the first \
+         five the script in the middle, of the others up to {FRAMES} frames. *Off*: pixels off by more than 2 levels; at most \
+         {MOST} % are asked for.\n\n"
+    );
+    let beyond: Vec<_> = rows.iter().filter(|row| row.share() > MOST).map(|row| row.name).collect();
+    if beyond.is_empty() {
+        writeln!(text, "All {} scenes keep that.\n", rows.len())?;
+    } else {
+        writeln!(text, "**Beyond that**: {}.\n", beyond.join(", "))?;
+    }
+    text += "| scene | frames | precision | rays a pixel, at most | pixels | different | off | off, % | largest, levels |\n\
+             | --- | --: | --- | --: | --: | --: | --: | --: | --: |\n";
+    for row in rows {
+        let Row { name, frames, precision, samples, pixels, different, off, largest } = row;
+        let share = row.share();
+        writeln!(
+            text,
+            "| {name} | {frames} | {precision} | {samples} | {pixels} | {different} | {off} | {share:.4} | {largest} |"
+        )?;
+    }
+    Ok(text)
+}

@@ -1,0 +1,274 @@
+//! `rayfold-bench needs`: what a scene pays for parts of the tracer that it does not use.
+//!
+//! The tracer is built whole and without parts (its cargo features), and instructions are counted by valgrind: the same on
+//! every run, on a busy machine too. valgrind's processor has AVX2 and not AVX-512, so that this is the path that is counted,
+//! and the only one that is built.
+
+mod parts;
+mod subjects;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use anyhow::{Context, Result, ensure};
+use rayon::prelude::*;
+
+use self::parts::{Build, PARTS, builds, uses};
+use self::subjects::{Subject, subjects};
+
+/// What to do with the counts.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The folder that receives needs.md
+    #[arg(long, default_value = "docs/reports")]
+    output: PathBuf,
+    /// Print the table and write nothing
+    #[arg(long)]
+    check: bool,
+    /// Only builds without a part whose name holds this; writes nothing
+    #[arg(long, default_value = "")]
+    only: String,
+}
+
+/// The most that a scene may execute beyond a build without what it does not use, in percent.
+const MOST: f64 = 0.5;
+
+/// The driver's exit code for a scene that needs what it was built without.
+const LEFT_OUT: i32 = 3;
+
+/// Builds that are made at once: the tracer is compiled in one piece, on one core.
+const AT_ONCE: usize = 2;
+
+/// A line of the table.
+struct Row {
+    subject: &'static str,
+    /// What the build is without.
+    without: String,
+    whole: u64,
+    less: u64,
+}
+
+impl Row {
+    /// What the whole build executes beyond the other, in percent.
+    fn beyond(&self) -> f64 {
+        100.0 * (self.whole as f64 / self.less as f64 - 1.0)
+    }
+
+    fn is_beyond(&self) -> bool {
+        self.beyond() > MOST
+    }
+
+    fn told(&self) -> String {
+        format!("{} without {} ({:+.2} %)", self.subject, self.without, self.beyond())
+    }
+}
+
+/// Counts, prints the table and writes the report.
+///
+/// # Errors
+/// When a part costs a scene too much that does not use it, when a build draws what it cannot or another picture, or
+/// when valgrind or cargo fails.
+pub fn run(args: &Args) -> Result<()> {
+    ensure!(
+        Command::new("valgrind").arg("--version").output().is_ok_and(|run| run.status.success()),
+        "valgrind cannot be run; on Debian: apt-get install valgrind"
+    );
+    let folder = tempfile::tempdir()?;
+    let builds: Vec<Build> = builds().into_iter().filter(|build| build.name.contains(&args.only)).collect();
+    let programs = build(&builds, folder.path())?;
+    let subjects = subjects()?;
+    let scripts: Vec<PathBuf> = subjects
+        .iter()
+        .enumerate()
+        .map(|(k, subject)| {
+            let script = folder.path().join(format!("{k}.txt"));
+            std::fs::write(&script, &subject.script)?;
+            Ok(script)
+        })
+        .collect::<Result<_>>()?;
+    eprintln!("counting {} scenes", subjects.len());
+    let counted: Vec<Vec<Row>> = subjects
+        .par_iter()
+        .zip(&scripts)
+        .map(|(subject, script)| compare(subject, script, (&builds, &programs)))
+        .collect::<Result<_>>()?;
+    let mut rows: Vec<Row> = counted.into_iter().flatten().collect();
+    rows.sort_by_key(|row| builds.iter().position(|build| build.name == row.without));
+    let report = report(&rows)?;
+    eprintln!("{report}");
+    if !args.check && args.only.is_empty() {
+        std::fs::create_dir_all(&args.output)?;
+        let path = args.output.join("needs.md");
+        std::fs::write(&path, &report).with_context(|| path.display().to_string())?;
+    }
+    let beyond: Vec<_> = rows.iter().filter(|row| row.is_beyond()).map(Row::told).collect();
+    ensure!(beyond.is_empty(), "scenes execute over {MOST} % more than they need: {}", beyond.join("; "));
+    Ok(())
+}
+
+/// The driver whole, and as each of the builds.
+fn build(builds: &[Build], folder: &Path) -> Result<Vec<PathBuf>> {
+    let next = AtomicUsize::new(0);
+    let builder = |place: usize| -> Result<Vec<(usize, PathBuf)>> {
+        let target = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../target/needs-{place}"));
+        let mut built = Vec::new();
+        loop {
+            let k = next.fetch_add(1, Ordering::Relaxed);
+            let without = match k {
+                0 => &[][..],
+                k => match builds.get(k - 1) {
+                    Some(build) => &build.without,
+                    None => return Ok(built),
+                },
+            };
+            built.push((k, build_without(without, &target, &folder.join(k.to_string()))?));
+        }
+    };
+    let built: Result<Vec<Vec<_>>> = std::thread::scope(|scope| {
+        let builder = &builder;
+        let builders: Vec<_> = (0..AT_ONCE).map(|place| scope.spawn(move || builder(place))).collect();
+        let finished = builders
+            .into_iter()
+            .map(|builder| builder.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        finished.collect()
+    });
+    let mut programs = built?.concat();
+    programs.sort_by_key(|(k, _)| *k);
+    Ok(programs.into_iter().map(|(_, program)| program).collect())
+}
+
+fn build_without(without: &[&str], target: &Path, program: &Path) -> Result<PathBuf> {
+    let name = if without.is_empty() { "whole".into() } else { format!("without {}", without.join(", ")) };
+    eprintln!("building the tracer, {name}");
+    let with: Vec<_> = PARTS.iter().map(|part| part.feature).filter(|part| !without.contains(part)).collect();
+    let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
+    let status = Command::new(cargo)
+        .args(["build", "--quiet", "--locked", "--release", "--package", "rayfold-tracer"])
+        .args(["--example", "frames", "--no-default-features", "--features", &with.join(",")])
+        // The tracer is one piece as it is; to link it again and again with all else optimised takes too long.
+        .env("CARGO_PROFILE_RELEASE_LTO", "off")
+        .arg("--target-dir")
+        .arg(target)
+        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
+        .status()
+        .context("cargo")?;
+    ensure!(status.success(), "cargo build, {name}: {status}");
+    std::fs::copy(target.join("release/examples/frames"), program)?;
+    Ok(program.to_owned())
+}
+
+/// A row for each build that leaves out what the scene does not use; the others must refuse it.
+fn compare(subject: &Subject, script: &Path, (builds, programs): (&[Build], &[PathBuf])) -> Result<Vec<Row>> {
+    let (whole, picture) = frame(&programs[0], script, subject.precision)?;
+    let mut rows = Vec::new();
+    for (Build { name, without, is_of_version_2 }, program) in builds.iter().zip(&programs[1..]) {
+        if without.iter().any(|part| uses(part, &subject.scene)) {
+            let run = Command::new(program).arg(script).args(["1", subject.precision]).output()?;
+            ensure!(
+                run.status.code() == Some(LEFT_OUT),
+                "{}, without {name}: {}, where it must be refused",
+                subject.name,
+                run.status
+            );
+        } else if *is_of_version_2 == subject.is_of_version_2 {
+            let (less, same) = frame(program, script, subject.precision)?;
+            ensure!(picture == same, "{}: another picture without {name}", subject.name);
+            rows.push(Row { subject: subject.name, without: name.clone(), whole, less });
+        }
+    }
+    Ok(rows)
+}
+
+/// Instructions of one frame, and the digest of some.
+fn frame(program: &Path, script: &Path, precision: &str) -> Result<(u64, String)> {
+    let (one, _) = count(program, script, "1", precision)?;
+    let (three, digest) = count(program, script, "3", precision)?;
+    Ok(((three - one) / 2, digest))
+}
+
+fn count(program: &Path, script: &Path, times: &str, precision: &str) -> Result<(u64, String)> {
+    let run = Command::new("valgrind")
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+        .arg(program)
+        .arg(script)
+        .args([times, precision])
+        .output()?;
+    let told = String::from_utf8_lossy(&run.stderr);
+    ensure!(run.status.success(), "valgrind: {}: {told}", run.status);
+    let answer = String::from_utf8(run.stdout)?;
+    ensure!(answer.starts_with("Avx2"), "not the AVX2 path but {answer}");
+    let collected = told.lines().find_map(|line| line.split_once("Collected :"));
+    let (_, collected) = collected.with_context(|| format!("valgrind says {told}"))?;
+    Ok((collected.trim().parse()?, answer))
+}
+
+/// The most that any of the rows is beyond what its scene needs.
+fn worst<'a>(rows: impl Iterator<Item = &'a Row>) -> Option<&'a Row> {
+    rows.max_by(|a, b| a.beyond().total_cmp(&b.beyond()))
+}
+
+fn report(rows: &[Row]) -> Result<String> {
+    let beyond: Vec<_> = rows.iter().filter(|row| row.is_beyond()).map(Row::told).collect();
+    let verdict = if beyond.is_empty() {
+        let most = worst(rows.iter()).context("nothing counted")?;
+        format!("All {} pairs hold; the most is {}.", rows.len(), most.told())
+    } else {
+        format!("**This run failed** for {} of {} pairs: {}.", beyond.len(), rows.len(), beyond.join("; "))
+    };
+    let mut text = format!(
+        "# Only what a scene needs\n\n\
+         Written by `cargo run -p rayfold-bench -- needs`; `.ci/run` runs it with `--check`. Instructions of a frame, \
+         preparations included, on one thread and the AVX2 path, counted by `valgrind --tool=callgrind`: by the whole \
+         tracer, and by one that was built without a part that the scene does not use. *Beyond* is what the whole one \
+         executes more; the run fails where it is over {MOST} %. Every pair draws the same picture bit for bit, and a \
+         scene that uses what a build leaves out is refused by it. Those without a part of version 1 of the language \
+         are without all of version 2 besides. Parts of version 2 are left out several at a time, such that for each scene of \
+         version 2 and each part that it does not use there is a build without that part.\n\n\
+         {verdict}\n\n\
+         | built without | scenes | most beyond | of |\n| --- | --- | --- | --- |\n"
+    );
+    for of_build in rows.chunk_by(|a, b| a.without == b.without) {
+        let most = worst(of_build.iter()).context("a build without scenes")?;
+        let (count, beyond, subject) = (of_build.len(), most.beyond(), most.subject);
+        writeln!(text, "| {} | {count} | {beyond:+.2} % | {subject} |", most.without)?;
+    }
+    text += "\n| built without | scene | instructions, whole | without | beyond |\n\
+             | --- | --- | --- | --- | --- |\n";
+    for row in rows {
+        let Row { subject, without, whole, less } = row;
+        writeln!(text, "| {without} | {subject} | {whole} | {less} | {:+.2} % |", row.beyond())?;
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(whole: u64) -> Vec<Row> {
+        let row = |build: Build| Row { subject: "balls", without: build.name, whole: 100_000, less: 100_000 };
+        let mut rows: Vec<_> = builds().into_iter().map(row).collect();
+        rows[2].whole = whole;
+        rows
+    }
+
+    #[test]
+    fn a_report_tells_that_all_hold() {
+        let report = report(&rows(100_500)).expect("rows of each part");
+        assert!(
+            report.contains("All 12 pairs hold; the most is balls without mirrors (+0.50 %)."),
+            "{report}"
+        );
+        assert!(!report.contains("failed"), "{report}");
+    }
+
+    #[test]
+    fn a_report_tells_which_pairs_failed() {
+        let report = report(&rows(100_600)).expect("rows of each part");
+        let told = "**This run failed** for 1 of 12 pairs: balls without mirrors (+0.60 %).";
+        assert!(report.contains(told), "{report}");
+        assert!(!report.contains("hold"), "{report}");
+    }
+}
