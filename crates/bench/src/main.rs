@@ -1,7 +1,7 @@
 //! The program that measures: a subcommand a report.
 
 use clap::{Parser, Subcommand};
-use rayfold_bench::{accuracy, fingerprints, gif, measure, needs, parsing, sampling, speed};
+use rayfold_bench::{accuracy, fingerprints, gif, measure, needs, parsing, sampling, speed, studio};
 #[cfg(feature = "bucket")]
 use rayfold_bench::{cold_start, explore, pipeline, simulate};
 
@@ -43,6 +43,8 @@ enum Measurement {
     Sampling(sampling::Args),
     /// Processor time against the work asked for, and beside POV-Ray and Embree where they are
     Speed(speed::Args),
+    /// The studio's page in Chromium: pictures a second, and from the pointer to the canvas
+    Studio(studio::Args),
 }
 
 fn main() -> anyhow::Result<()> {
@@ -63,5 +65,6 @@ fn main() -> anyhow::Result<()> {
         Measurement::Needs(args) => needs::run(&args),
         Measurement::Sampling(args) => sampling::run(&args),
         Measurement::Speed(args) => speed::run(&args),
+        Measurement::Studio(args) => studio::run(&args),
     }
 }

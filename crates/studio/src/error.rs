@@ -37,6 +37,14 @@ pub enum Error {
         /// How much is held.
         limit: u64,
     },
+    /// A name that a new script cannot have.
+    #[error("{name}: {problem}")]
+    Name {
+        /// The name, or its beginning.
+        name: String,
+        /// What is wrong with it, and what would be right.
+        problem: &'static str,
+    },
     /// No socket, no randomness.
     #[error("cannot start the server of the page")]
     Server(#[source] io::Error),
