@@ -192,7 +192,7 @@ test("what the bucket has and the page has not is deleted only when that is said
   const { page, path } = await studio(t, bucket.exports, { from: join(folder, "film"), name: "film" });
   await page.getByRole("link", { name: "Submit", exact: true }).click();
   await page.getByRole("button", { name: "What will it cost?" }).click();
-  const agree = page.getByLabel(/^Delete a script of the bucket that the page does not have: scripts\/film\/other.txt/);
+  const agree = page.getByLabel(/Delete a script of the bucket that the page does not have: scripts\/film\/other.txt/);
   await agree.waitFor();
   const go = page.getByRole("button", { name: "Submit", exact: true });
   assert.ok(await go.isDisabled(), "not before it is said");
