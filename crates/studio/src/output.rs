@@ -139,14 +139,15 @@ fn no_picture(error: &dyn std::error::Error) -> Error {
 }
 
 /// All frames at their scripts' own sizes, a PNG each, as a zip file that is sent while they are drawn: whoever stops
-/// reading stops the drawing.
+/// reading stops the drawing, and lets go of the `permit` to draw.
 ///
 /// # Errors
 /// When a script has errors, or the system has no thread.
-pub(crate) fn frames_zip(project: &Project) -> Result<Body, Error> {
+pub(crate) fn frames_zip(project: &Project, permit: impl Send + 'static) -> Result<Body, Error> {
     let job = Job::of(project)?;
     let of: usize = job.scripts.iter().map(Script::frame_count).sum();
     let made = zip_of(move |zip| {
+        let _permit = permit;
         let frames =
             job.scripts.iter().flat_map(|script| (0..script.frame_count()).map(move |k| (script, k)));
         for ((script, k), number) in frames.zip(1..) {

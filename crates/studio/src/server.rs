@@ -19,7 +19,7 @@ use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{any, get};
 use tokio::net::TcpListener;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
 use tokio::task::JoinHandle;
 use tokio::time::MissedTickBehavior;
 
@@ -37,6 +37,9 @@ const MESSAGE: usize = 2 << 20;
 
 /// What waits to be sent to the page, at most; pictures are bounded further by the painter.
 const WAITING: usize = 64;
+
+/// Downloads for which frames are drawn at once, beside the viewport.
+const DRAWN: usize = 2;
 
 /// How often files are looked at and written.
 const TICK: Duration = Duration::from_millis(250);
@@ -64,6 +67,8 @@ struct Shared {
     page: Page,
     token: String,
     host: String,
+    /// Frames are drawn to be downloaded.
+    drawing: Arc<Semaphore>,
     /// Ends the page that works now.
     working: Mutex<Option<oneshot::Sender<()>>>,
 }
@@ -88,6 +93,7 @@ impl Server {
             page,
             token,
             host,
+            drawing: Arc::new(Semaphore::new(DRAWN)),
             working: Mutex::default(),
         });
         let router = Router::new()
@@ -134,6 +140,15 @@ impl Server {
 impl Shared {
     fn project(&self) -> MutexGuard<'_, Project> {
         self.project.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The right to draw frames for a download.
+    fn may_draw(&self) -> Result<OwnedSemaphorePermit, Response> {
+        let permit = Arc::clone(&self.drawing).try_acquire_owned();
+        permit.map_err(|_| {
+            let busy = "frames are drawn for other downloads: wait for these\n";
+            (StatusCode::SERVICE_UNAVAILABLE, busy).into_response()
+        })
     }
 
     fn is_allowed(&self, request: &Request) -> bool {
@@ -207,7 +222,11 @@ async fn one_script(State(shared): State<Arc<Shared>>, request: Request) -> Resp
 }
 
 async fn frames(State(shared): State<Arc<Shared>>) -> Response {
-    let zip = tokio::task::block_in_place(|| frames_zip(&shared.project()));
+    let permit = match shared.may_draw() {
+        Ok(permit) => permit,
+        Err(busy) => return busy,
+    };
+    let zip = tokio::task::block_in_place(|| frames_zip(&shared.project(), permit));
     zip.map_or_else(
         |error| failed(&error),
         |zip| ([(header::CONTENT_TYPE, "application/zip")], zip).into_response(),
@@ -216,6 +235,10 @@ async fn frames(State(shared): State<Arc<Shared>>) -> Response {
 
 /// The frame whose number, from 0, is the query.
 async fn frame(State(shared): State<Arc<Shared>>, request: Request) -> Response {
+    let _permit = match shared.may_draw() {
+        Ok(permit) => permit,
+        Err(busy) => return busy,
+    };
     let number = request.uri().query().unwrap_or_default().parse().unwrap_or(0);
     let (script, frame) = {
         let project = shared.project();

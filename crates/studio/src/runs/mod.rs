@@ -8,6 +8,8 @@
 mod offer;
 mod routes;
 mod sending;
+#[cfg(test)]
+mod tests;
 mod told;
 
 use std::fmt;

@@ -38,7 +38,7 @@ const BODY: usize = 1 << 20;
 const LISTED: usize = 500;
 
 /// Runs that are watched at once.
-const WATCHED: usize = 8;
+pub(super) const WATCHED: usize = 8;
 
 /// Pictures and GIFs that are fetched at once.
 const FETCHED: usize = 12;

@@ -9,7 +9,7 @@ import { basename, join } from "node:path";
 import { test } from "node:test";
 
 import { start } from "./processes.mjs";
-import { open, program, scenes, shot, until } from "./stage.mjs";
+import { audit, open, program, scenes, shot, until } from "./stage.mjs";
 
 /** Longer than a bucket takes on a loaded machine, in milliseconds. */
 const PATIENCE = 300_000;
@@ -102,6 +102,7 @@ test("a run goes on without its page, and gives the GIF of the command line", as
   await page.getByText("Making it, once").click();
   await page.getByText("Lambda: rendering").waitFor();
   await shot(page, "submit");
+  assert.deepEqual(await audit(page), []);
   await page.getByRole("button", { name: "Submit", exact: true }).click();
   await until(async () => (await cells(page, "done")) > 0, PATIENCE);
   assert.notEqual(await status(page), "done", "it is under way");
@@ -117,6 +118,7 @@ test("a run goes on without its page, and gives the GIF of the command line", as
   await until(() => again.locator(".gif img").evaluate((image) => image.complete && image.naturalWidth > 0));
   await until(() => again.locator(".cell img").first().evaluate((image) => image.complete && image.naturalWidth > 0));
   await shot(again, "run-done");
+  assert.deepEqual(await audit(again), []);
   assert.ok((await downloaded(again, /Download GIF/)).equals(rendered(path, folder)), "the same bytes");
   assert.equal(filesOfZip(await downloaded(again, "Download frames")), 50);
   await again.getByRole("link", { name: "All runs" }).click();
@@ -148,6 +150,7 @@ test("a frame that cannot be drawn opens its line, and is drawn again once that 
   const opens = page.getByRole("button", { name: "Open 2.txt, line 4, column 4" });
   await opens.waitFor();
   await shot(page, "run-failed");
+  assert.deepEqual(await audit(page), []);
   await opens.click();
   const line = page.getByLabel("Line 4", { exact: true });
   await until(() => line.evaluate((input) => input === document.activeElement && input.selectionStart === 3));
