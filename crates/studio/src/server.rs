@@ -143,12 +143,8 @@ impl Shared {
     }
 
     /// The right to draw frames for a download.
-    fn may_draw(&self) -> Result<OwnedSemaphorePermit, Response> {
-        let permit = Arc::clone(&self.drawing).try_acquire_owned();
-        permit.map_err(|_| {
-            let busy = "frames are drawn for other downloads: wait for these\n";
-            (StatusCode::SERVICE_UNAVAILABLE, busy).into_response()
-        })
+    fn may_draw(&self) -> Option<OwnedSemaphorePermit> {
+        Arc::clone(&self.drawing).try_acquire_owned().ok()
     }
 
     fn is_allowed(&self, request: &Request) -> bool {
@@ -222,10 +218,7 @@ async fn one_script(State(shared): State<Arc<Shared>>, request: Request) -> Resp
 }
 
 async fn frames(State(shared): State<Arc<Shared>>) -> Response {
-    let permit = match shared.may_draw() {
-        Ok(permit) => permit,
-        Err(busy) => return busy,
-    };
+    let Some(permit) = shared.may_draw() else { return busy() };
     let zip = tokio::task::block_in_place(|| frames_zip(&shared.project(), permit));
     zip.map_or_else(
         |error| failed(&error),
@@ -235,10 +228,7 @@ async fn frames(State(shared): State<Arc<Shared>>) -> Response {
 
 /// The frame whose number, from 0, is the query.
 async fn frame(State(shared): State<Arc<Shared>>, request: Request) -> Response {
-    let _permit = match shared.may_draw() {
-        Ok(permit) => permit,
-        Err(busy) => return busy,
-    };
+    let Some(_permit) = shared.may_draw() else { return busy() };
     let number = request.uri().query().unwrap_or_default().parse().unwrap_or(0);
     let (script, frame) = {
         let project = shared.project();
@@ -255,6 +245,11 @@ async fn frame(State(shared): State<Arc<Shared>>, request: Request) -> Response 
 
 fn file(kind: &'static str, bytes: Vec<u8>) -> Response {
     ([(header::CONTENT_TYPE, kind)], Body::from(bytes)).into_response()
+}
+
+fn busy() -> Response {
+    let why = "frames are drawn for other downloads: wait for these\n";
+    (StatusCode::SERVICE_UNAVAILABLE, why).into_response()
 }
 
 fn failed(error: &Error) -> Response {

@@ -10,7 +10,7 @@ use rayfold_scene::{AnimationSettings, Screen, Script};
 use rayfold_tracer::{RenderOptions, render_frame};
 use serde::Serialize;
 
-use super::told::words;
+use crate::error::words;
 use crate::output::png;
 use crate::project::Project;
 

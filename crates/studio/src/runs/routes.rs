@@ -27,7 +27,8 @@ use tokio::sync::{Semaphore, mpsc};
 
 use super::offer::{Ready, Refusal};
 use super::sending::{SendingTell, Uploads};
-use super::told::{FrameTell, RunState, RunTell, Summary, faults, summary, words};
+use super::told::{FrameTell, RunState, RunTell, Summary, faults, summary};
+use crate::error::words;
 use crate::pipe::{Zip, frame_file, pipe};
 use crate::project::Project;
 

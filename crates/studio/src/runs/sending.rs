@@ -7,7 +7,7 @@ use rayfold_client::{Error, Sending};
 use rayfold_pipeline::keys::Animation;
 use serde::Serialize;
 
-use super::told::words;
+use crate::error::words;
 
 /// Uploads that are known, at most; the ended ones are forgotten first.
 const KNOWN: usize = 64;

@@ -168,7 +168,7 @@ async fn no_request_reaches_an_object_that_is_none_of_an_animation() {
         ("frames.zip?run=film".into(), 404),
         ("events?run=%2E%2E".into(), 400),
         ("offer?run=%2F".into(), 400),
-        ("../../secret.txt".into(), 403),
+        ("../../secret.txt".into(), 404),
         ("secret.txt".into(), 404),
     ] {
         let (status, body) = desk.get(&what).await;

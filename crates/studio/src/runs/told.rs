@@ -262,22 +262,6 @@ fn word(status: Status) -> &'static str {
     }
 }
 
-/// An error with all that it rests on, for people. What stores say of credentials is that they are missing or wrong,
-/// never which they are.
-pub(super) fn words(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(error) = source {
-        let words = error.to_string();
-        if !text.contains(&words) {
-            text.push_str(": ");
-            text.push_str(&words);
-        }
-        source = error.source();
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -319,15 +303,5 @@ mod tests {
         assert_eq!(second.changed.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [1]);
         let third = tell(1, &[true; 4]).unwrap();
         assert_eq!(third.frames.unwrap().len(), 4, "another number of frames: all of them");
-    }
-
-    #[test]
-    fn the_whole_chain_of_an_error_is_told_once() {
-        let refused = rayfold_pipeline::Error::Refused {
-            key: "scripts/".into(),
-            source: std::io::Error::other("no such bucket").into(),
-        };
-        let text = words(&rayfold_client::Error::Store(refused));
-        assert_eq!(text, "the store refuses scripts/: no such bucket");
     }
 }

@@ -35,7 +35,7 @@ import { files } from "./store";
 const CELL = [168, 132] as const;
 
 /** What the dialog leaves free of the window's width, with its own edges. */
-const EDGES = 120;
+const EDGES = 60;
 
 const name = signal("");
 const mayDelete = signal(false);
@@ -170,7 +170,8 @@ function Cost({ offer: { estimate, folder, upload, unchanged } }: { readonly off
                   <ul>
                     {section.lines.map((line) => (
                       <li key={line.item}>
-                        {line.item}: {Number(line.amount.toPrecision(4))} {line.unit}, {dollars(line.usd)}
+                        {line.item}: {Number(line.amount.toPrecision(4))}
+                        {line.unit && ` ${line.unit}`}, {dollars(line.usd)}
                       </li>
                     ))}
                   </ul>
