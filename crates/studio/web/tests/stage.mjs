@@ -71,7 +71,8 @@ export async function open(t, { from, text, name = "scene.txt", scheme = "light"
   return { page, context, path, folder, address, settled, saved, check, ended, server };
 }
 
-export async function until(condition, patience = 20_000) {
+/** Waits for a condition; its patience, in milliseconds, is longer than anything takes on a loaded machine. */
+export async function until(condition, patience = 60_000) {
   const end = Date.now() + patience;
   while (!(await condition())) {
     assert.ok(Date.now() < end, `waited in vain for ${condition}`);
