@@ -298,11 +298,12 @@ async fn events<S: Store + 'static>(
 
 async fn watch<S: Store>(runs: &Runs<S>, animation: Animation, sender: &mpsc::Sender<Event>) {
     let mut watch = Watch::new(runs.client(), animation);
-    let mut last = None;
+    let (mut last, mut ended) = (None, 0);
     loop {
+        let ended_before = std::mem::replace(&mut ended, runs.uploads.ended());
         let looked = async {
             let changed = watch.look().await?;
-            if changed || watch.is_behind() || last.is_none() {
+            if changed || watch.is_behind() || last.is_none() || ended != ended_before {
                 watch.compare().await?;
             }
             Ok::<_, Error>(())

@@ -1,6 +1,7 @@
 //! Uploads that go on: they outlive the page that began them, and end with the program.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rayfold_client::{Error, Sending};
@@ -32,7 +33,10 @@ pub(super) enum SendingTell {
 
 /// The uploads of this program by animation.
 #[derive(Debug, Default)]
-pub(super) struct Uploads(Mutex<BTreeMap<Animation, SendingTell>>);
+pub(super) struct Uploads {
+    known: Mutex<BTreeMap<Animation, SendingTell>>,
+    ended: AtomicU64,
+}
 
 impl Uploads {
     /// Takes note of a new one; not if one of this animation goes on, or too many do.
@@ -61,12 +65,18 @@ impl Uploads {
     /// Takes note of its end.
     pub(super) fn end<T>(&self, animation: &Animation, ended: Result<T, Error>) {
         let mut known = self.known();
+        self.ended.fetch_add(1, Ordering::Relaxed);
         match ended {
             Ok(_) => drop(known.remove(animation)),
             Err(error) => {
                 drop(known.insert(animation.clone(), SendingTell::Failed { why: words(&error) }));
             }
         }
+    }
+
+    /// How many have ended: when that grows the bucket may hold other scripts than were seen last.
+    pub(super) fn ended(&self) -> u64 {
+        self.ended.load(Ordering::Relaxed)
     }
 
     /// How far it is, if it goes on or failed.
@@ -80,7 +90,7 @@ impl Uploads {
     }
 
     fn known(&self) -> MutexGuard<'_, BTreeMap<Animation, SendingTell>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -99,7 +109,7 @@ mod tests {
         assert_eq!(uploads.of(&film), Some(SendingTell::Failed { why: "there is no animation film".into() }));
         assert!(uploads.begin(&film));
         uploads.end(&film, Ok(()));
-        assert_eq!(uploads.of(&film), None);
+        assert_eq!((uploads.of(&film), uploads.ended()), (None, 2));
     }
 
     #[test]
