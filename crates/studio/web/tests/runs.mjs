@@ -12,7 +12,7 @@ import { start } from "./processes.mjs";
 import { audit, open, program, scenes, shot, until } from "./stage.mjs";
 
 /** Longer than a bucket takes on a loaded machine, in milliseconds. */
-const PATIENCE = 300_000;
+const PATIENCE = 600_000;
 
 /** A bucket with its functions; what a user would export. */
 async function dev(t, { data, port = 0, env = {} } = {}) {
