@@ -21,7 +21,10 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-client", &["rayfold-scene", "rayfold-pipeline"]),
     ("rayfold-lambda", &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline"]),
     ("rayfold-local", &["rayfold-bucket", "rayfold-pipeline"]),
-    ("rayfold-studio", &["rayfold-scene", "rayfold-tracer", "rayfold-gif"]),
+    (
+        "rayfold-studio",
+        &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline", "rayfold-client"],
+    ),
     (
         "rayfold",
         &[

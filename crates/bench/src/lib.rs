@@ -29,3 +29,4 @@ pub mod scenes;
 #[cfg(feature = "bucket")]
 pub mod simulate;
 pub mod speed;
+pub mod studio;

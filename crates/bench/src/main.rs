@@ -1,7 +1,9 @@
 //! The program that measures: a subcommand a report.
 
 use clap::{Parser, Subcommand};
-use rayfold_bench::{accuracy, fingerprints, gif, measure, metamorphic, needs, parsing, sampling, speed};
+use rayfold_bench::{
+    accuracy, fingerprints, gif, measure, metamorphic, needs, parsing, sampling, speed, studio,
+};
 #[cfg(feature = "bucket")]
 use rayfold_bench::{cold_start, explore, pipeline, simulate};
 
@@ -47,6 +49,8 @@ enum Measurement {
     Shapes(speed::shapes::Args),
     /// Processor time against the work asked for, and beside POV-Ray and Embree where they are
     Speed(speed::Args),
+    /// The studio's page in Chromium: pictures a second, and from the pointer to the canvas
+    Studio(studio::Args),
 }
 
 fn main() -> anyhow::Result<()> {
@@ -69,5 +73,6 @@ fn main() -> anyhow::Result<()> {
         Measurement::Sampling(args) => sampling::run(&args),
         Measurement::Shapes(args) => speed::shapes::run(&args),
         Measurement::Speed(args) => speed::run(&args),
+        Measurement::Studio(args) => studio::run(&args),
     }
 }

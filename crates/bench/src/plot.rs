@@ -53,6 +53,64 @@ pub(crate) fn columns(
     draw_columns(path, labels, names, lines, series).map_err(|error| anyhow!("{}: {error}", path.display()))
 }
 
+/// Draws courses of shares in percent over a linear axis from 0 to `end`, and points that they should be left of.
+pub(crate) fn shares(
+    path: &Path,
+    labels: &Labels,
+    end: f64,
+    goals: &[(f64, f64)],
+    series: &[Series],
+) -> Result<()> {
+    draw_shares(path, labels, end, goals, series).map_err(|error| anyhow!("{}: {error}", path.display()))
+}
+
+fn draw_shares(
+    path: &Path,
+    labels: &Labels,
+    end: f64,
+    goals: &[(f64, f64)],
+    series: &[Series],
+) -> Result<(), Box<dyn std::error::Error>> {
+    let area = SVGBackend::new(path, SIZE).into_drawing_area();
+    area.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&area)
+        .caption(labels.title, ("sans-serif", 20))
+        .margin(12)
+        .x_label_area_size(44)
+        .y_label_area_size(72)
+        .build_cartesian_2d(0.0..end, 0.0..100.0)?;
+    chart
+        .configure_mesh()
+        .x_desc(labels.x)
+        .y_desc(labels.y)
+        .label_style(("sans-serif", 14))
+        .max_light_lines(0)
+        .draw()?;
+    for (k, series) in series.iter().enumerate() {
+        let style = COLORS[k % COLORS.len()].stroke_width(2);
+        let points = series.points.iter().copied().filter(|point| point.0 <= end);
+        chart
+            .draw_series(LineSeries::new(points, style))?
+            .label(&series.name)
+            .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], style));
+    }
+    for &goal in goals {
+        chart
+            .draw_series([Cross::new(goal, 7, BLACK.stroke_width(2))])?
+            .label("goal")
+            .legend(|(x, y)| Cross::new((x + 9, y), 6, BLACK.stroke_width(2)));
+    }
+    chart
+        .configure_series_labels()
+        .background_style(WHITE.mix(0.85))
+        .border_style(BLACK.mix(0.3))
+        .label_font(("sans-serif", 14))
+        .position(SeriesLabelPosition::LowerRight)
+        .draw()?;
+    area.present()?;
+    Ok(())
+}
+
 fn draw_columns(
     path: &Path,
     labels: &Labels,

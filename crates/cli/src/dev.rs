@@ -27,6 +27,16 @@ const LOOK: Duration = Duration::from_millis(50);
 /// How long the first lines wait for what was missed since the last run.
 const CATCH_UP: Duration = Duration::from_secs(3);
 
+/// What the functions take from their environment about the largest script and animation; the stack sets the same.
+const LIMITS: [&str; 6] = [
+    "RAYFOLD_MAX_SCRIPT_BYTES",
+    "RAYFOLD_MAX_OBJECTS",
+    "RAYFOLD_MAX_LIGHTS",
+    "RAYFOLD_MAX_PIXELS",
+    "RAYFOLD_MAX_FRAMES",
+    "RAYFOLD_MAX_ANIMATION_FRAMES",
+];
+
 /// Run the whole pipeline on this machine: an S3 server, the bucket and the functions
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -36,6 +46,7 @@ needs Go 1.25 or later. Each keeps objects of its own, `bucket/` and `objects/` 
 
 The functions, rayfold-render and rayfold-assemble, are those in the folder that RAYFOLD_FUNCTIONS
 names; without it those beside rayfold, or on the PATH, or they are built where rayfold was built.
+They refuse what RAYFOLD_MAX_PIXELS, RAYFOLD_MAX_OBJECTS and the like do not allow, as on AWS.
 
 Stop with Ctrl-C; the data is kept, and the next start goes on where this one was.
 
@@ -94,6 +105,8 @@ async fn serve(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         settings.concurrency = args.concurrency.map_or_else(usual_concurrency, usize::from);
         let stuck_after_ms = stuck_after(settings.timeout).as_millis().to_string();
         settings.environment.push(("RAYFOLD_STUCK_AFTER_MS".into(), stuck_after_ms));
+        let own = |name: &str| Some((name.to_owned(), std::env::var(name).ok()?));
+        settings.environment.extend(LIMITS.into_iter().filter_map(own));
     };
     let start = Platform::start(&plan, settings, &mut say);
     let mut platform = tokio::select! {

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Context;
-use rayfold_studio::{Page, Project, Server};
+use rayfold_pipeline::store::S3Store;
+use rayfold_studio::{Cloud, Page, Project, Server};
 
 use crate::console::Console;
 use crate::interrupt;
@@ -24,7 +25,9 @@ writes the scripts that PATH names and nothing else. Stop with Ctrl-C.
 
 Examples:
   rayfold studio scenes/hello    a folder of scripts
-  rayfold studio mine.txt        one script; if it is not there yet, with a scene to begin with")]
+  rayfold studio mine.txt        one script; if it is not there yet, with a scene to begin with
+  rayfold studio scenes/hello --bucket my-bucket
+                                 with a bucket to render it in")]
 pub(crate) struct Args {
     /// A folder of scripts, or one script
     path: PathBuf,
@@ -34,6 +37,10 @@ pub(crate) struct Args {
     /// Where to listen on this machine; 0 is any free port
     #[arg(long, value_name = "PORT", default_value_t = 0)]
     port: u16,
+    /// A bucket to submit to, as `rayfold submit` does. Region, credentials and endpoint come from the standard AWS
+    /// environment
+    #[arg(long, env = "RAYFOLD_BUCKET", value_name = "NAME")]
+    bucket: Option<String>,
     #[command(flatten)]
     threads: Threads,
 }
@@ -48,7 +55,11 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         .build()
         .context("cannot start")?;
     runtime.block_on(async {
-        let server = Server::start(project, page, args.port).await?;
+        let cloud = match &args.bucket {
+            Some(bucket) => Cloud::new(bucket, S3Store::from_environment(bucket).await?),
+            None => Cloud::none(),
+        };
+        let server = Server::start(project, page, cloud, args.port).await?;
         console.print(format!("{}\n", server.address()))?;
         console.note("Ctrl-C ends it");
         if !args.no_open

@@ -4,7 +4,7 @@
 //! do, and it remembers nothing: whatever is interrupted is picked up from what the bucket shows. It knows no terminal,
 //! no flags and no S3: the bucket is a [`Store`](rayfold_pipeline::store::Store), time
 //! a [`Clock`](rayfold_pipeline::Clock), and progress comes as values ([`Sending`],
-//! [`Waiting`], [`Removing`]) to a closure that the caller brings.
+//! [`Waiting`], [`Removing`]) to a closure that the caller brings. What an animation costs on AWS [`cost`] says.
 //!
 //! ```
 //! use rayfold_client::{Client, File, Submission, Submitted};
@@ -20,6 +20,7 @@
 //! ```
 
 mod client;
+pub mod cost;
 mod error;
 mod fetch;
 mod file;

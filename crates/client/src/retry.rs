@@ -16,7 +16,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
     pub async fn retry(
         &self,
         animation: &Animation,
-        scope: Scope,
+        scope: Scope<'_>,
         pixels: u32,
         random: &Randomness,
     ) -> Result<Retried> {
@@ -32,6 +32,7 @@ mod tests {
     use super::*;
     use crate::Error;
     use crate::world::{PIXELS, World};
+    use rayfold_pipeline::keys::ScriptName;
 
     #[tokio::test]
     async fn what_failed_is_drawn_again_and_what_is_drawn_only_on_demand() {
@@ -47,6 +48,10 @@ mod tests {
         world.functions().await;
         let retried = client.retry(&film, Scope::All, PIXELS, &random).await.unwrap();
         assert_eq!((retried.deleted, retried.woken), (2, 2));
+        world.functions().await;
+        let one = ScriptName::new("1").unwrap();
+        let retried = client.retry(&film, Scope::Frame(&one, None), PIXELS, &random).await.unwrap();
+        assert_eq!((retried.deleted, retried.woken), (1, 1), "of two");
         let none = Animation::new("none").unwrap();
         let error = client.retry(&none, Scope::All, PIXELS, &random).await.unwrap_err();
         assert!(matches!(error, Error::NoAnimation(name) if name == none));

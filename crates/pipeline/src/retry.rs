@@ -8,18 +8,38 @@ use std::collections::BTreeSet;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 
 use crate::invocation::Invocation;
-use crate::keys::{Animation, Key, Receipt, Tag};
-use crate::manifest::FrameState;
+use crate::keys::{Animation, Key, Part, Receipt, ScriptName, Tag};
+use crate::manifest::{Frame, FrameState};
 use crate::store::Store;
 use crate::{Clock, Result};
 
 /// Which frames to draw again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scope {
+pub enum Scope<'a> {
     /// Those that failed or are missing.
     Failed,
     /// All of them, also those that are drawn.
     All,
+    /// This one, also if it is drawn.
+    Frame(&'a ScriptName, Part),
+}
+
+impl Scope<'_> {
+    fn has(self, frame: &Frame) -> bool {
+        match self {
+            Scope::Failed => !matches!(frame.state, FrameState::Done { .. }),
+            Scope::All => true,
+            Scope::Frame(name, part) => frame.script == *name && frame.part == part,
+        }
+    }
+
+    /// Whether it draws what is drawn.
+    fn draws_anew(self) -> bool {
+        match self {
+            Scope::Failed => false,
+            Scope::All | Scope::Frame(..) => true,
+        }
+    }
 }
 
 /// What a retry did.
@@ -41,21 +61,17 @@ pub struct Retried {
 pub async fn retry<S: Store, C: Clock>(
     invocation: &Invocation<'_, S, C>,
     animation: &Animation,
-    scope: Scope,
+    scope: Scope<'_>,
 ) -> Result<Retried> {
     invocation.retry(animation, scope).await
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    async fn retry(&self, animation: &Animation, scope: Scope) -> Result<Retried> {
+    async fn retry(&self, animation: &Animation, scope: Scope<'_>) -> Result<Retried> {
         let known = self.manifest(animation).await?;
         let observation = self.observe(animation, known.as_ref()).await?;
         let manifest = &observation.manifest;
-        let wanted: Vec<_> = manifest
-            .frames
-            .iter()
-            .filter(|frame| scope == Scope::All || !matches!(frame.state, FrameState::Done { .. }))
-            .collect();
+        let wanted: Vec<_> = manifest.frames.iter().filter(|frame| scope.has(frame)).collect();
         let named: BTreeSet<_> =
             wanted.iter().map(|frame| (&frame.script, &frame.version, frame.part)).collect();
         let (mut doomed, mut counted) = (Vec::new(), Vec::new());
@@ -76,7 +92,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 }
                 Receipt::Split { .. } => continue,
             };
-            if named.contains(&(name, &tag.version, part)) && (scope == Scope::All || !drawn) {
+            if named.contains(&(name, &tag.version, part)) && (scope.draws_anew() || !drawn) {
                 doomed.push(animation.receipt(&found.receipt));
             }
         }

@@ -62,7 +62,9 @@ impl Document {
 
     /// Its text.
     pub fn bytes(&self) -> Vec<u8> {
-        self.lines.iter().flat_map(Line::bytes).copied().collect()
+        let mut bytes = Vec::with_capacity(self.lines.iter().map(|line| line.bytes().len()).sum());
+        self.lines.iter().for_each(|line| bytes.extend_from_slice(line.bytes()));
+        bytes
     }
 
     /// Makes a change, as a step of its own or as part of the step before, if that is of the same gesture (a drag, a

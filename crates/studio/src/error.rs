@@ -37,6 +37,14 @@ pub enum Error {
         /// How much is held.
         limit: u64,
     },
+    /// A name that a new script cannot have.
+    #[error("{name}: {problem}")]
+    Name {
+        /// The name, or its beginning.
+        name: String,
+        /// What is wrong with it, and what would be right.
+        problem: &'static str,
+    },
     /// No socket, no randomness.
     #[error("cannot start the server of the page")]
     Server(#[source] io::Error),
@@ -46,4 +54,35 @@ pub enum Error {
     /// The animation cannot be rendered.
     #[error("{0}")]
     Output(String),
+}
+
+/// An error with all that it rests on, for people. What stores say of credentials is that they are missing or wrong,
+/// never which they are.
+pub(crate) fn words(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(error) = source {
+        let words = error.to_string();
+        if !text.contains(&words) {
+            text.push_str(": ");
+            text.push_str(&words);
+        }
+        source = error.source();
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_whole_chain_of_an_error_is_told_once() {
+        let refused = rayfold_pipeline::Error::Refused {
+            key: "scripts/".into(),
+            source: std::io::Error::other("no such bucket").into(),
+        };
+        let text = words(&rayfold_client::Error::Store(refused));
+        assert_eq!(text, "the store refuses scripts/: no such bucket");
+    }
 }

@@ -6,7 +6,7 @@
 //! for parameters the parser's own tables say.
 //!
 //! Start at [`Server`] (a page's connection) and `session` (what a page wants, and what follows). `document` and `line`
-//! are pure, `project` is all that touches files.
+//! are pure, `project` is all that touches files. `runs` are animations in a bucket, over any store.
 //!
 //! Invariants: it reads and writes what it was opened with and nothing else; it listens on loopback only; undoing
 //! everything gives the bytes that were there.
@@ -14,13 +14,16 @@
 mod document;
 mod edits;
 mod error;
+mod examples;
 mod handles;
 mod line;
 mod output;
 mod page;
 mod pictures;
+mod pipe;
 mod project;
 mod protocol;
+mod runs;
 mod server;
 mod session;
 mod silhouette;
@@ -33,4 +36,5 @@ pub use error::Error;
 pub use line::Line;
 pub use page::Page;
 pub use project::{Opened, Project, Saved};
+pub use runs::Cloud;
 pub use server::Server;

@@ -69,8 +69,12 @@ impl Line {
 
     /// The command, if its first word is one.
     pub fn command(&self) -> Option<Command> {
-        let words = self.words()?;
-        Command::from_name(std::str::from_utf8(&self.0[words.command]).ok()?)
+        // Alone: a script has many lines, and each is asked again and again.
+        let code = self.body().split(|&byte| byte == b'#').next()?;
+        let code = code.strip_prefix(b"\xef\xbb\xbf").unwrap_or(code);
+        let word = code.split(|&byte| is_separator(byte)).find(|word| !word.is_empty())?;
+        let end = word.iter().position(|&byte| byte == b'(').unwrap_or(word.len());
+        Command::from_name(std::str::from_utf8(&word[..end]).ok()?)
     }
 
     /// `None` for a line without a command.
@@ -197,6 +201,29 @@ mod tests {
             assert_eq!(lines.iter().flat_map(|l| l.bytes()).copied().collect::<Vec<_>>(), text.as_bytes());
         }
         assert_eq!(Line::split(b"\xff\xfe\n")[0].bytes(), b"\xff\xfe\n");
+    }
+
+    #[test]
+    fn the_command_is_the_first_word() {
+        let lines = [
+            "Trace",
+            "\u{feff} trace,1",
+            "\t, Sphere(1:1 9:2)",
+            "# Trace",
+            "",
+            "Spere 1",
+            "(Trace)",
+            "Tr#ace",
+            "1 Trace",
+        ];
+        for text in lines {
+            let line = line(&format!("{text}\n"));
+            let first = line.words().and_then(|words| {
+                Command::from_name(std::str::from_utf8(&line.bytes()[words.command]).unwrap())
+            });
+            assert_eq!(line.command(), first, "{text}");
+        }
+        assert_eq!(line("\t, Sphere(1:1 9:2)").command(), Some(Command::Sphere));
     }
 
     #[test]

@@ -5,6 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
+use axum::body::Body;
+use image::{ImageFormat, RgbImage};
 use rayfold_gif::{Encoder, Settings};
 use rayfold_scene::{AnimationSettings, Script};
 use rayfold_tracer::{RenderOptions, render_frame};
@@ -12,6 +14,7 @@ use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
 use crate::error::Error;
+use crate::pipe::{frame_file, zip_of};
 use crate::project::Project;
 use crate::protocol::OutputState;
 
@@ -118,11 +121,43 @@ impl Outputs {
 /// When it cannot be drawn.
 pub(crate) fn frame_png(script: &Script, frame: usize) -> Result<Option<Vec<u8>>, Error> {
     let Some(image) = render_frame(script, frame, &RenderOptions::default()) else { return Ok(None) };
-    let failed = |error: &dyn std::error::Error| Error::Output(format!("cannot make the picture: {error}"));
-    let image = image.map_err(|error| failed(&error))?;
+    png(&image.map_err(|error| no_picture(&error))?).map(Some)
+}
+
+/// A picture as PNG.
+///
+/// # Errors
+/// When it is beyond what the format can hold.
+pub(crate) fn png(image: &RgbImage) -> Result<Vec<u8>, Error> {
     let mut file = io::Cursor::new(Vec::new());
-    image.write_to(&mut file, image::ImageFormat::Png).map_err(|error| failed(&error))?;
-    Ok(Some(file.into_inner()))
+    image.write_to(&mut file, ImageFormat::Png).map_err(|error| no_picture(&error))?;
+    Ok(file.into_inner())
+}
+
+fn no_picture(error: &dyn std::error::Error) -> Error {
+    Error::Output(format!("cannot make the picture: {error}"))
+}
+
+/// All frames at their scripts' own sizes, a PNG each, as a zip file that is sent while they are drawn: whoever stops
+/// reading stops the drawing, and lets go of the `permit` to draw.
+///
+/// # Errors
+/// When a script has errors, or the system has no thread.
+pub(crate) fn frames_zip(project: &Project, permit: impl Send + 'static) -> Result<Body, Error> {
+    let job = Job::of(project)?;
+    let of: usize = job.scripts.iter().map(Script::frame_count).sum();
+    let made = zip_of(move |zip| {
+        let _permit = permit;
+        let frames =
+            job.scripts.iter().flat_map(|script| (0..script.frame_count()).map(move |k| (script, k)));
+        for ((script, k), number) in frames.zip(1..) {
+            if let Some(png) = frame_png(script, k).map_err(io::Error::other)? {
+                zip.add(&frame_file(number, of as u64), &png)?;
+            }
+        }
+        Ok(())
+    });
+    made.map_err(|error| Error::Output(format!("cannot make the zip file: {error}")))
 }
 
 /// All scripts, as they stand on the page, as a zip file.

@@ -21,6 +21,9 @@ use crate::line::Line;
 /// Bytes of all scripts together.
 const TEXT: u64 = 256 << 20;
 
+/// Bytes of a new script's name; file systems take 255, and hidden names beside it are longer.
+const NAME: usize = 200;
+
 /// Faults of a script that are told one by one.
 const DESCRIBED: usize = 200;
 
@@ -71,6 +74,8 @@ pub struct Project {
     pub files: Vec<Opened>,
     /// What the folder says about the animation.
     pub settings: AnimationSettings,
+    /// The folder, where one was opened.
+    folder: Option<PathBuf>,
 }
 
 /// A frame of the animation.
@@ -125,7 +130,46 @@ impl Project {
                 Ok(file)
             })
             .collect::<Result<_, Error>>()?;
-        Ok(Self { name, files, settings })
+        let folder = path.is_dir().then(|| path.to_path_buf());
+        Ok(Self { name, files, settings, folder })
+    }
+
+    /// Whether scripts can be added: a folder was opened, and what was opened may be written.
+    pub fn can_create(&self) -> bool {
+        self.folder.is_some()
+    }
+
+    /// Adds a script to the folder, under a name that nothing has there; its index.
+    ///
+    /// # Errors
+    /// Where no folder was opened, for a name that is none of a script, or taken, and when the file cannot be written.
+    pub fn create(&mut self, name: &str, text: &[u8]) -> Result<usize, Error> {
+        let refused = |problem| Error::Name { name: name.chars().take(80).collect(), problem };
+        let Some(folder) = &self.folder else {
+            return Err(refused("one script was opened, and nothing beside it may be written"));
+        };
+        let stem = script_name(name).filter(|stem| !stem.is_empty() && !stem.starts_with('.'));
+        let is_plain = stem.is_some()
+            && name.len() <= NAME
+            && !name.chars().any(|c| c.is_control() || "/\\:".contains(c));
+        if !is_plain {
+            return Err(refused("expected a plain file name that ends with .txt"));
+        }
+        let held: usize = self.files.iter().filter_map(|file| file.on_disk.as_ref()).map(Vec::len).sum();
+        let path = folder.join(name);
+        if (held + text.len()) as u64 > TEXT {
+            return Err(Error::TooLarge { path, limit: TEXT });
+        }
+        write_new(&path, text).map_err(|error| match error.kind() {
+            io::ErrorKind::AlreadyExists => refused("there is such a file already"),
+            _ => Error::Write { path: path.clone(), source: error },
+        })?;
+        let order = |name: &str, other: &str| {
+            natural_cmp(script_name(name).unwrap_or(name), script_name(other).unwrap_or(other))
+        };
+        let at = self.files.partition_point(|file| order(&file.name, name).is_lt());
+        self.files.insert(at, Opened::open(name.to_owned(), path)?);
+        Ok(at)
     }
 
     /// How many frames can be shown: those of all files, and one for a file that has none.
@@ -223,6 +267,13 @@ impl Opened {
         done
     }
 
+    /// Its text becomes another, as a step that can be undone; what was done to the lines.
+    pub fn replace(&mut self, text: &[u8]) -> Vec<Splice> {
+        let done = self.become_text(text);
+        self.changed = Some(Instant::now());
+        done
+    }
+
     fn touched(&mut self) {
         self.parse();
         self.changed = Some(Instant::now());
@@ -266,8 +317,15 @@ impl Opened {
         self.take_over(&text)
     }
 
-    /// The lines become those of a text, by one splice of what differs.
+    /// The lines become those that the file holds.
     fn take_over(&mut self, text: &[u8]) -> Vec<Splice> {
+        let done = self.become_text(text);
+        self.changed = None;
+        done
+    }
+
+    /// The lines become those of a text, by one splice of what differs.
+    fn become_text(&mut self, text: &[u8]) -> Vec<Splice> {
         let new = Line::split(text);
         let old = self.document.lines();
         let most = old.len().min(new.len());
@@ -278,7 +336,6 @@ impl Opened {
         let splice = Splice { at: same, removed: old.len() - rest - same, inserted };
         let done = self.document.replace(splice);
         self.parse();
-        self.changed = None;
         done
     }
 
@@ -328,10 +385,29 @@ fn read(path: &Path) -> Result<Option<Vec<u8>>, Error> {
     Ok(Some(text))
 }
 
+/// A hidden name beside a file's place.
+fn temporary(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!(".{name}.{}.part", std::process::id()))
+}
+
+/// Writes a file that is not there yet: whole or not at all, and never over another.
+fn write_new(path: &Path, text: &[u8]) -> io::Result<()> {
+    let temporary = temporary(path);
+    let mut file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
+    let written = (|| {
+        file.write_all(text)?;
+        file.sync_all()?;
+        // Unlike a rename it refuses a name that is taken.
+        fs::hard_link(&temporary, path)
+    })();
+    let _ = fs::remove_file(&temporary);
+    written
+}
+
 /// Writes a file under a hidden name beside its place, and then in its place.
 fn write_whole(path: &Path, text: &[u8]) -> Result<(), Error> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let temporary = path.with_file_name(format!(".{name}.{}.part", std::process::id()));
+    let temporary = temporary(path);
     let written = (|| {
         let mut file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
         file.write_all(text)?;
@@ -417,6 +493,40 @@ mod tests {
         assert_eq!(project.files[0].document.bytes(), b"theirs");
         assert!(!project.save(true));
         assert_eq!(fs::read_to_string(&path).unwrap(), "theirs");
+    }
+
+    #[test]
+    fn a_new_script_goes_into_the_folder_that_was_opened_and_over_no_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let inner = folder.path().join("film");
+        fs::create_dir(&inner).unwrap();
+        for name in ["f1.txt", "f10.txt"] {
+            fs::write(inner.join(name), "Screen 1 1\nTrace").unwrap();
+        }
+        fs::write(inner.join("f3.txt.bak"), "").unwrap();
+        let mut project = Project::open(&inner).unwrap();
+        assert_eq!(project.create("f2.txt", b"# two\n").unwrap(), 1);
+        assert_eq!(fs::read(inner.join("f2.txt")).unwrap(), b"# two\n");
+        fs::write(inner.join("theirs.txt"), "theirs").unwrap();
+        for name in ["f2.txt", "theirs.txt"] {
+            let error = project.create(name, b"mine").unwrap_err();
+            assert!(error.to_string().contains("there is such a file already"), "{error}");
+        }
+        assert_eq!(fs::read(inner.join("theirs.txt")).unwrap(), b"theirs");
+        let long = format!("{}.txt", "x".repeat(NAME));
+        let bad = [
+            "", ".txt", "..txt", "a", "a.md", "../a.txt", "/a.txt", "b/a.txt", "b\\a.txt", "a\n.txt",
+            "a\0.txt", ".a.txt", "c:a.txt", &long,
+        ];
+        for name in bad {
+            assert!(matches!(project.create(name, b""), Err(Error::Name { .. })), "{name:?}");
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing beside the folder");
+        assert_eq!(fs::read_dir(&inner).unwrap().count(), 5, "no litter");
+        let names: Vec<_> = project.files.iter().map(|file| file.name.as_str()).collect();
+        assert_eq!(names, ["f1.txt", "f2.txt", "f10.txt"]);
+        let mut single = Project::open(&inner.join("f1.txt")).unwrap();
+        assert!(single.create("f4.txt", b"").is_err() && !single.can_create());
     }
 
     #[test]

@@ -67,10 +67,26 @@ pub(crate) enum Ask {
     Redo,
     /// End a conflict with what others wrote.
     Resolve { keep_mine: bool },
+    /// A whole text, in place of the one that is shown, or as a new script of this name.
+    Load { from: Source, new: Option<String> },
     /// Make the GIF.
     Render,
     /// Stop making it.
     Cancel,
+}
+
+/// Where a whole text comes from.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case", tag = "what")]
+pub(crate) enum Source {
+    /// Nothing is in it.
+    Empty,
+    /// An example.
+    Example { name: String },
+    /// The page sends it.
+    Text { text: String },
+    /// What is shown.
+    Shown,
 }
 
 /// A way to move the free camera.
@@ -110,6 +126,12 @@ pub(crate) struct Tell {
     /// Once, at the start.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) tables: Option<Vec<CommandTable>>,
+    /// The names of the examples, once, at the start.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) examples: Option<Vec<&'static str>>,
+    /// Whether scripts can be added, once, at the start.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) can_create: Option<bool>,
     /// All files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) files: Option<Vec<FileState>>,

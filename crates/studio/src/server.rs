@@ -14,21 +14,22 @@ use axum::Router;
 use axum::body::{Body, Bytes};
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::extract::{Request, State};
-use axum::http::{HeaderValue, StatusCode, header};
+use axum::http::{HeaderValue, Method, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{any, get};
 use tokio::net::TcpListener;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
 use tokio::task::JoinHandle;
 use tokio::time::MissedTickBehavior;
 
 use crate::error::Error;
-use crate::output::{Outputs, frame_png, scripts_zip};
+use crate::output::{Outputs, frame_png, frames_zip, scripts_zip};
 use crate::page::Page;
 use crate::pictures::Painter;
 use crate::project::Project;
 use crate::protocol::{Ask, Tell};
+use crate::runs::Cloud;
 use crate::session::{Answer, Output, Session};
 
 /// Bytes of what the page says at once: more than a line that is pasted.
@@ -36,6 +37,9 @@ const MESSAGE: usize = 2 << 20;
 
 /// What waits to be sent to the page, at most; pictures are bounded further by the painter.
 const WAITING: usize = 64;
+
+/// Downloads for which frames are drawn at once, beside the viewport.
+const DRAWN: usize = 2;
 
 /// How often files are looked at and written.
 const TICK: Duration = Duration::from_millis(250);
@@ -58,21 +62,23 @@ pub struct Server {
 
 #[derive(Debug)]
 struct Shared {
-    project: Mutex<Project>,
+    project: Arc<Mutex<Project>>,
     outputs: Arc<Outputs>,
     page: Page,
     token: String,
     host: String,
+    /// Frames are drawn to be downloaded.
+    drawing: Arc<Semaphore>,
     /// Ends the page that works now.
     working: Mutex<Option<oneshot::Sender<()>>>,
 }
 
 impl Server {
-    /// Serves a project, on this port or on any that is free if it is 0.
+    /// Serves a project, and a bucket to submit it to, on this port or on any that is free if it is 0.
     ///
     /// # Errors
     /// When the port is taken or the system has no randomness.
-    pub async fn start(project: Project, page: Page, port: u16) -> Result<Self, Error> {
+    pub async fn start(project: Project, page: Page, cloud: Cloud, port: u16) -> Result<Self, Error> {
         let mut random = [0; TOKEN];
         getrandom::fill(&mut random).map_err(|error| Error::Server(io::Error::other(error)))?;
         let token: String = random.iter().map(|byte| format!("{byte:02x}")).collect();
@@ -80,12 +86,14 @@ impl Server {
             TcpListener::bind(SocketAddr::from((Ipv4Addr::LOCALHOST, port))).await.map_err(Error::Server)?;
         let host = listener.local_addr().map_err(Error::Server)?.to_string();
         let address = format!("http://{host}/{token}/");
+        let project = Arc::new(Mutex::new(project));
         let shared = Arc::new(Shared {
-            project: Mutex::new(project),
+            project: Arc::clone(&project),
             outputs: Arc::default(),
             page,
             token,
             host,
+            drawing: Arc::new(Semaphore::new(DRAWN)),
             working: Mutex::default(),
         });
         let router = Router::new()
@@ -96,8 +104,11 @@ impl Server {
             .route("/{token}/animation.gif", get(gif))
             .route("/{token}/scripts.zip", get(scripts))
             .route("/{token}/frame.png", get(frame))
-            .layer(from_fn_with_state(Arc::clone(&shared), guard))
-            .with_state(Arc::clone(&shared));
+            .route("/{token}/frames.zip", get(frames))
+            .route("/{token}/script.txt", get(one_script))
+            .with_state(Arc::clone(&shared))
+            .nest("/{token}/runs", cloud.router(project))
+            .layer(from_fn_with_state(Arc::clone(&shared), guard));
         let (stop, stopped) = oneshot::channel();
         let task = tokio::spawn(async move {
             let serving = axum::serve(listener, router).into_future();
@@ -131,15 +142,20 @@ impl Shared {
         self.project.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The right to draw frames for a download.
+    fn may_draw(&self) -> Option<OwnedSemaphorePermit> {
+        Arc::clone(&self.drawing).try_acquire_owned().ok()
+    }
+
     fn is_allowed(&self, request: &Request) -> bool {
         let header = |name| request.headers().get(name).map(HeaderValue::as_bytes);
         let token = request.uri().path().split('/').nth(1).unwrap_or_default();
         let origin = format!("http://{}", self.host);
-        let is_socket = header(header::UPGRADE).is_some();
+        let must_say = header(header::UPGRADE).is_some() || request.method() != Method::GET;
         let known_origin = match header(header::ORIGIN) {
             Some(from) => from == origin.as_bytes(),
-            // Browsers always say from where a socket is opened.
-            None => !is_socket,
+            // Browsers always say from where a socket is opened, or something is sent.
+            None => !must_say,
         };
         header(header::HOST) == Some(self.host.as_bytes()) && known_origin && same(token, &self.token)
     }
@@ -191,8 +207,28 @@ async fn scripts(State(shared): State<Arc<Shared>>) -> Response {
     zip.map_or_else(|error| failed(&error), |zip| file("application/zip", zip))
 }
 
+/// The script whose index among the files is the query, as it stands on the page.
+async fn one_script(State(shared): State<Arc<Shared>>, request: Request) -> Response {
+    let index: usize = request.uri().query().unwrap_or_default().parse().unwrap_or(0);
+    let text = shared.project().files.get(index).map(|opened| opened.document.bytes());
+    match text {
+        Some(text) => file("text/plain; charset=utf-8", text),
+        None => (StatusCode::NOT_FOUND, "there is no such script\n").into_response(),
+    }
+}
+
+async fn frames(State(shared): State<Arc<Shared>>) -> Response {
+    let Some(permit) = shared.may_draw() else { return busy() };
+    let zip = tokio::task::block_in_place(|| frames_zip(&shared.project(), permit));
+    zip.map_or_else(
+        |error| failed(&error),
+        |zip| ([(header::CONTENT_TYPE, "application/zip")], zip).into_response(),
+    )
+}
+
 /// The frame whose number, from 0, is the query.
 async fn frame(State(shared): State<Arc<Shared>>, request: Request) -> Response {
+    let Some(_permit) = shared.may_draw() else { return busy() };
     let number = request.uri().query().unwrap_or_default().parse().unwrap_or(0);
     let (script, frame) = {
         let project = shared.project();
@@ -209,6 +245,11 @@ async fn frame(State(shared): State<Arc<Shared>>, request: Request) -> Response 
 
 fn file(kind: &'static str, bytes: Vec<u8>) -> Response {
     ([(header::CONTENT_TYPE, kind)], Body::from(bytes)).into_response()
+}
+
+fn busy() -> Response {
+    let why = "frames are drawn for other downloads: wait for these\n";
+    (StatusCode::SERVICE_UNAVAILABLE, why).into_response()
 }
 
 fn failed(error: &Error) -> Response {
@@ -341,7 +382,7 @@ mod tests {
         std::fs::write(folder.path().join("a.txt"), "Screen 4 3\nTrace").unwrap();
         let project = Project::open(folder.path()).unwrap();
         let page = Page { html: b"page".to_vec(), script: Vec::new(), style: Vec::new() };
-        let server = Server::start(project, page, 0).await.unwrap();
+        let server = Server::start(project, page, Cloud::none(), 0).await.unwrap();
         let rest = server.address().strip_prefix("http://").unwrap();
         let (host, path) = rest.split_at(rest.find('/').unwrap());
         assert!(host.starts_with("127.0.0.1:") && path.len() == 2 * TOKEN + 2);

@@ -3,11 +3,14 @@
 //!
 //! Knows no socket and no thread: wishes come in, values go out, so that tests need neither.
 
+mod loading;
+
 use glam::{DVec2, DVec3};
 use rayfold_scene::{Camera, Command, Pinhole, Scene, Screen};
 
 use crate::document::Splice;
 use crate::edits;
+use crate::examples;
 use crate::handles::{Drag, Grip, Manner, Values, handles};
 use crate::line::Line;
 use crate::pictures::Wanted;
@@ -111,6 +114,8 @@ impl Session {
         };
         let tell = Tell {
             tables: Some(commands()),
+            examples: Some(examples::names()),
+            can_create: Some(project.can_create()),
             lines: Some(session.lines(project)),
             notice: None,
             ..Tell::default()
@@ -307,6 +312,7 @@ impl Session {
                 self.told(splices, tell);
                 Change::Still
             }
+            Ask::Load { from, new } => self.load(project, from, new.as_deref(), tell),
             Ask::Render => {
                 self.output = Some(Output::Render);
                 Change::Nothing

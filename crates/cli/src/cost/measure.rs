@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Context;
+use rayfold_client::cost::{render_ms, waiting_ms};
 use rayfold_scene::{Limits, Screen};
 
 use crate::console::Console;
@@ -18,13 +19,6 @@ const SAMPLES: u64 = 8;
 
 /// How often each of them is drawn.
 const TRIES: usize = 2;
-
-/// Memory with which a function has one processor, in MB.
-const PROCESSOR_MB: f64 = 1769.0;
-
-/// What an invocation waits for requests and pauses, in milliseconds, which Lambda bills: measured at these numbers of
-/// frames (`docs/reports/simulation.md`), and in between taken to grow evenly.
-const WAITING_MS: [(f64, f64); 2] = [(50.0, 258.0), (1_000.0, 427.0)];
 
 /// What is known of an animation once some of its frames have been drawn.
 #[derive(Debug)]
@@ -70,28 +64,13 @@ pub(super) fn measure(input: &[PathBuf], memory_mb: f64, console: &Console) -> a
     })?;
     let drawing_ms = 1e3 * seconds / jobs.len() as f64;
     let bytes = bytes as f64 / jobs.len() as f64;
-    let waiting_ms = waiting_ms(frames as f64);
+    let waiting_ms = waiting_ms(frames);
     console.note(format_args!(
         "drawn here on one thread: {} of {frames}, {drawing_ms:.1} ms each, a PNG of {} each; requests and pauses add \
          {waiting_ms:.0} ms",
         number(jobs.len() as u64, "frame"),
         Size(bytes as u64)
     ));
-    let ms = drawing_ms * PROCESSOR_MB / memory_mb + waiting_ms;
+    let ms = render_ms(frames, drawing_ms, memory_mb);
     Ok(Measured { frames, size, ms, frame_kb: bytes / 1e3 })
-}
-
-fn waiting_ms(frames: f64) -> f64 {
-    let [(few, short), (many, long)] = WAITING_MS;
-    short + (long - short) * ((frames - few) / (many - few)).clamp(0.0, 1.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn waiting_is_what_was_measured_and_between() {
-        assert_eq!([1.0, 50.0, 525.0, 1_000.0, 1e6].map(waiting_ms), [258.0, 258.0, 342.5, 427.0, 427.0]);
-    }
 }

@@ -2,34 +2,21 @@
 //!
 //! Asks nobody: the prices are a data file, the rest is arithmetic, and what drawing takes is measured here.
 
-mod estimate;
 mod measure;
-mod prices;
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::ValueEnum;
+use rayfold_client::cost::{Prices, Section, Workload, estimate};
 use rayfold_scene::Screen;
 use serde::Serialize;
 
 use crate::console::{Console, Format};
 use crate::outcome::Outcome;
 use crate::values;
-use estimate::{Section, Workload, estimate};
 use measure::measure;
-use prices::{BUILT_IN, Prices};
-
-/// Bytes of a frame's PNG, a pixel: about twice what `scenes/hello` gives.
-const FRAME_BYTES_A_PIXEL: f64 = 0.15;
-
-/// Bytes of the GIF, a pixel of a frame: about twice what `scenes/hello` gives.
-const GIF_BYTES_A_PIXEL: f64 = 0.06;
-
-/// Time that the assemble function takes for a pixel: decoding, quantising, encoding. Measured: 14 to 23 ns of a
-/// processor, more for small frames (`docs/decisions/gif-in-one-piece.md`); Lambda's may be slower.
-const ASSEMBLE_NS_A_PIXEL: f64 = 30.0;
 
 /// The longest that the assemble function can run, in seconds: the stack's default, and the most that Lambda allows.
 const ASSEMBLE_TIMEOUT_S: f64 = 900.0;
@@ -148,7 +135,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
 }
 
 fn read(file: Option<&PathBuf>) -> anyhow::Result<Prices> {
-    let Some(path) = file else { return Ok(serde_json::from_str(BUILT_IN)?) };
+    let Some(path) = file else { return Ok(Prices::built_in()?) };
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     serde_json::from_str(&text).with_context(|| format!("{} holds no prices", path.display()))
 }
@@ -165,21 +152,17 @@ fn workload(args: &Args, console: &Console) -> anyhow::Result<Workload> {
         Some(size) => size,
         None => Screen::new(512, 512)?,
     };
-    let frame_kb = args.frame_kb.or(measured.map(|measured| measured.frame_kb));
-    let pixels = size.pixels() as f64;
+    let guessed = Workload::new(frames, size, ms);
     Ok(Workload {
-        frames,
-        ms,
-        width: size.width() as usize,
-        height: size.height() as usize,
         memory_mb: args.memory,
         assemble_memory_mb: args.assemble_memory,
         arm64: args.architecture == Architecture::Arm64,
-        assemble_ms: args.assemble_ms.unwrap_or(pixels * ASSEMBLE_NS_A_PIXEL / 1e6),
-        frame_kb: frame_kb.unwrap_or(pixels * FRAME_BYTES_A_PIXEL / 1e3),
-        gif_mb: args.gif_mb.unwrap_or(frames as f64 * pixels * GIF_BYTES_A_PIXEL / 1e6),
+        assemble_ms: args.assemble_ms.unwrap_or(guessed.assemble_ms),
+        frame_kb: args.frame_kb.or(measured.map(|measured| measured.frame_kb)).unwrap_or(guessed.frame_kb),
+        gif_mb: args.gif_mb.unwrap_or(guessed.gif_mb),
         sweep_minutes: args.sweep_minutes,
         customer_managed_key: args.customer_managed_key,
+        ..guessed
     })
 }
 
@@ -257,12 +240,5 @@ mod tests {
         }
         assert_eq!(amount(1_234_567.0), "1,234,567");
         assert_eq!(amount(123_456.0), "123,456");
-    }
-
-    #[test]
-    fn the_prices_that_come_with_the_program_are_whole() {
-        let prices = read(None).unwrap();
-        assert_eq!(prices.region, "us-east-1");
-        assert!(prices.sources.iter().all(|page| page.starts_with("https://aws.amazon.com/")));
     }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::*;
 use crate::handles::Handle;
+use crate::protocol::Source;
 
 struct Desk {
     _folder: tempfile::TempDir,
@@ -238,4 +239,43 @@ fn a_huge_script_is_edited_line_by_line() {
     assert_eq!(answer.tell.splices[0].lines.len(), 1);
     desk.ask(Ask::Undo);
     assert_eq!(desk.text(), text);
+}
+
+#[test]
+fn another_text_is_one_step_and_an_example_is_drawn() {
+    let mut desk = Desk::new(TEXT);
+    let from = Source::Example { name: "marbles".into() };
+    let answer = desk.ask(Ask::Load { from, new: None });
+    assert!(answer.picture.is_some() && desk.project.files[0].is_sound());
+    assert!(desk.text().lines().count() > 10 && desk.text() != TEXT);
+    desk.ask(Ask::Undo);
+    assert_eq!(desk.text(), TEXT);
+    desk.ask(Ask::Load { from: Source::Empty, new: None });
+    assert_eq!(desk.text(), "");
+    desk.ask(Ask::Undo);
+    let refused = desk.ask(Ask::Load { from: Source::Shown, new: Some("b.txt".into()) });
+    assert!(refused.tell.notice.unwrap().contains("one script was opened"));
+    assert_eq!(fs::read_dir(desk.path.parent().unwrap()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_copy_under_a_new_name_is_shown_and_the_old_one_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.txt", "c.txt"] {
+        fs::write(folder.path().join(name), TEXT).unwrap();
+    }
+    let mut project = Project::open(folder.path()).unwrap();
+    let (mut session, first) = Session::open(&project);
+    assert_eq!(first.tell.can_create, Some(true));
+    session.ask(&mut project, Ask::Frame { frame: 1, moving: false });
+    let answer = session.ask(&mut project, Ask::Load { from: Source::Shown, new: Some("b.txt".into()) });
+    let state = answer.tell.state.unwrap();
+    assert_eq!((state.file, state.frame, state.frames), (1, 1, 3));
+    assert_eq!(answer.tell.lines.unwrap().len(), TEXT.split('\n').count(), "its lines are told");
+    assert_eq!(answer.tell.files.unwrap().len(), 3);
+    assert_eq!(fs::read_to_string(folder.path().join("b.txt")).unwrap(), TEXT);
+    session.ask(&mut project, Ask::Text { line: 0, text: "# b".into() });
+    project.save(true);
+    assert_eq!(fs::read_to_string(folder.path().join("c.txt")).unwrap(), TEXT);
+    assert!(fs::read_to_string(folder.path().join("b.txt")).unwrap().starts_with("# b\r\n"));
 }

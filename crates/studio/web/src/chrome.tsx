@@ -5,6 +5,7 @@ import { useEffect } from "preact/hooks";
 
 import { actions, step, type Action } from "./actions";
 import { Button, keyName } from "./button";
+import { filing } from "./file";
 import { ask, connected, files, help, notice, output, playing, state, tables } from "./store";
 
 const SAVED = { yes: "saved", soon: "saving", conflict: "not saved", failed: "cannot be saved" } as const;
@@ -18,6 +19,9 @@ export function Bar(): JSX.Element {
       <span class="file">
         {file?.name} <span class={`saved ${now?.saved ?? ""}`} role="status">{now ? SAVED[now.saved] : ""}</span>
       </span>
+      <button type="button" onClick={() => (filing.value = true)}>
+        File
+      </button>
       <nav aria-label="Edit">
         <Button action={actions.undo} />
         <Button action={actions.redo} />
@@ -73,8 +77,17 @@ function Result(): JSX.Element {
       <a class="button" href={`frame.png?${frame}`} download={`frame${frame + 1}.png`}>
         Frame
       </a>
+      <a class="button" href="frames.zip" download="frames.zip" title="All frames, as PNG in a zip file">
+        Frames
+      </a>
       <a class="button" href="scripts.zip" download="scripts.zip">
         Scripts
+      </a>
+      <a class="button" href="#submit">
+        Submit
+      </a>
+      <a class="button" href="#runs">
+        Runs
       </a>
     </div>
   );

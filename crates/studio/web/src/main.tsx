@@ -4,8 +4,11 @@ import { render } from "preact";
 
 import { listen } from "./actions";
 import { Bar, Frames, Keys, Notices, Palette } from "./chrome";
+import { FileDialog } from "./file";
 import { Inspector } from "./inspector";
 import { Outliner } from "./outliner";
+import { follow } from "./runs";
+import { Runs } from "./runs-panel";
 import { Script } from "./script";
 import { connect } from "./store";
 import "./studio.css";
@@ -31,6 +34,8 @@ function Studio() {
         </div>
       </main>
       <Keys />
+      <FileDialog />
+      <Runs />
     </>
   );
 }
@@ -38,3 +43,4 @@ function Studio() {
 render(<Studio />, document.body);
 listen();
 connect();
+follow();

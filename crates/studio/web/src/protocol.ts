@@ -90,8 +90,15 @@ export type Output =
   | { readonly is: "cancelled" }
   | { readonly is: "failed"; readonly why: string };
 
+export type Source =
+  | { readonly what: "empty" | "shown" }
+  | { readonly what: "example"; readonly name: string }
+  | { readonly what: "text"; readonly text: string };
+
 /** What is left out has not changed. */
 export interface Tell {
+  readonly examples?: readonly string[];
+  readonly canCreate?: boolean;
   readonly tables?: readonly Command[];
   readonly files?: readonly FileState[];
   readonly lines?: readonly Line[];
@@ -135,6 +142,7 @@ export type Ask =
   | { readonly ask: "rename"; readonly line: number; readonly name: string }
   | { readonly ask: "nudge"; readonly lines: readonly number[]; readonly by: readonly [number, number, number] }
   | { readonly ask: "add"; readonly command: string; readonly at: Point | null }
+  | { readonly ask: "load"; readonly from: Source; readonly new: string | null }
   | { readonly ask: "resolve"; readonly "keep-mine": boolean };
 
 /** Bytes before the pixels of a picture: number, width, height, microseconds; little-endian. */

@@ -6,7 +6,7 @@ import { useEffect, useRef } from "preact/hooks";
 
 import { List } from "./list";
 import type { Fault, Line } from "./protocol";
-import { ask, lines, selected, selection, state } from "./store";
+import { ask, files, lines, selected, selection, state } from "./store";
 
 const ROW = 24;
 
@@ -18,6 +18,14 @@ const faultsByLine = computed(() => {
 
 /** The line that the caret goes to when it is there, and its column. */
 let caret: { readonly line: number; readonly column: number } | null = null;
+
+/** Opens a line of a file and puts the caret to a column, all from 0. */
+export function openPlace(file: number, line: number, column: number): void {
+  const before = files.value.slice(0, file).reduce((frames, { frames: own }) => frames + own, 0);
+  if (state.value?.file !== file) ask({ ask: "frame", frame: before, moving: false });
+  caret = { line, column };
+  ask({ ask: "select", lines: [line] });
+}
 
 export function Script(): JSX.Element {
   const faults = state.value?.faults ?? [];

@@ -7,6 +7,10 @@ import type { Ask, Command, FileState, Line, Output, State, Tell } from "./proto
 
 export const connected = signal(true);
 export const tables = signal<readonly Command[]>([]);
+/** Scenes to begin with, by name. */
+export const examples = signal<readonly string[]>([]);
+/** Whether scripts can be added. */
+export const canCreate = signal(false);
 export const files = signal<readonly FileState[]>([]);
 export const lines = signal<readonly Line[]>([]);
 export const state = signal<State | null>(null);
@@ -94,6 +98,8 @@ export function connect(): void {
 function hear(tell: Tell): void {
   batch(() => {
     if (tell.tables) tables.value = tell.tables;
+    if (tell.examples) examples.value = tell.examples;
+    if (tell.canCreate !== undefined) canCreate.value = tell.canCreate;
     if (tell.files) files.value = tell.files;
     if (tell.lines) lines.value = tell.lines;
     if (tell.splices) {

@@ -3,9 +3,33 @@
 //! Invariants: free allowances are left out, so that a bill is never higher for them; what is not known beforehand
 //! (requests a frame, sizes) is a named constant with its reason, or the caller's.
 
+use rayfold_scene::Screen;
 use serde::Serialize;
 
 use super::prices::Prices;
+
+/// Memory with which a function has one processor, in MB, and that of the render function.
+const PROCESSOR_MB: f64 = 1769.0;
+
+/// Memory of the assemble function, in MB.
+const ASSEMBLE_MEMORY_MB: f64 = 3008.0;
+
+/// Minutes between two sweeps.
+const SWEEP_MINUTES: f64 = 15.0;
+
+/// What an invocation waits for requests and pauses, in milliseconds, which Lambda bills: measured at these numbers of
+/// frames (`docs/reports/simulation.md`), and in between taken to grow evenly.
+const WAITING_MS: [(f64, f64); 2] = [(50.0, 258.0), (1_000.0, 427.0)];
+
+/// Bytes of a frame's PNG, a pixel: about twice what `scenes/hello` gives.
+const FRAME_BYTES_A_PIXEL: f64 = 0.15;
+
+/// Bytes of the GIF, a pixel of a frame: about twice what `scenes/hello` gives.
+const GIF_BYTES_A_PIXEL: f64 = 0.06;
+
+/// Time that the assemble function takes for a pixel: decoding, quantising, encoding. Measured: 14 to 23 ns of a
+/// processor, more for small frames (`docs/decisions/gif-in-one-piece.md`); Lambda's may be slower.
+const ASSEMBLE_NS_A_PIXEL: f64 = 30.0;
 
 /// Requests a frame while it is made, of the kind that is billed as PUT, COPY, POST or LIST: the upload, the look for
 /// a result, the result, and the listings, manifests and claims of a fold, of which many frames share one. Measured with
@@ -32,7 +56,7 @@ const LOG_BYTES: f64 = 1500.0;
 const TRACED: f64 = 0.05;
 
 /// Metrics that the stack's 21 alarms look at; each is billed. `infra/terraform` tests the number.
-pub(super) const ALARMS: f64 = 24.0;
+const ALARMS: f64 = 24.0;
 
 /// A sweep of a bucket in which nothing is amiss.
 const SWEEP_S: f64 = 0.5;
@@ -43,47 +67,83 @@ const QUEUE_POLLS_A_MONTH: f64 = 5.0 * MINUTES_A_MONTH * 3.0;
 const MINUTES_A_MONTH: f64 = 30.0 * 24.0 * 60.0;
 
 /// What is to be made, and on what.
-#[derive(Debug, Serialize)]
-pub(super) struct Workload {
-    pub(super) frames: u64,
-    /// Of the render function, a frame.
-    pub(super) ms: f64,
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) memory_mb: f64,
-    pub(super) assemble_memory_mb: f64,
-    pub(super) arm64: bool,
-    /// Of the assemble function, a frame.
-    pub(super) assemble_ms: f64,
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Workload {
+    /// How many frames.
+    pub frames: u64,
+    /// Milliseconds of the render function, a frame.
+    pub ms: f64,
+    /// Of a frame, in pixels.
+    pub width: usize,
+    /// Of a frame, in pixels.
+    pub height: usize,
+    /// Memory of the render function.
+    pub memory_mb: f64,
+    /// Memory of the assemble function.
+    pub assemble_memory_mb: f64,
+    /// Whether the functions run on arm64, or on x86_64.
+    pub arm64: bool,
+    /// Milliseconds of the assemble function, a frame.
+    pub assemble_ms: f64,
     /// A frame's PNG, in the mean.
-    pub(super) frame_kb: f64,
-    pub(super) gif_mb: f64,
-    pub(super) sweep_minutes: f64,
-    pub(super) customer_managed_key: bool,
+    pub frame_kb: f64,
+    /// The GIF.
+    pub gif_mb: f64,
+    /// Between two sweeps.
+    pub sweep_minutes: f64,
+    /// Whether the stack has a key of its own.
+    pub customer_managed_key: bool,
 }
 
 impl Workload {
+    /// Frames of one size, each of which takes the render function so many milliseconds, on a stack as it is set up when
+    /// nobody says otherwise. Sizes of files are guessed from the pixels.
+    pub fn new(frames: u64, size: Screen, ms: f64) -> Self {
+        let pixels = size.pixels() as f64;
+        Self {
+            frames,
+            ms,
+            width: size.width() as usize,
+            height: size.height() as usize,
+            memory_mb: PROCESSOR_MB,
+            assemble_memory_mb: ASSEMBLE_MEMORY_MB,
+            arm64: false,
+            assemble_ms: pixels * ASSEMBLE_NS_A_PIXEL / 1e6,
+            frame_kb: pixels * FRAME_BYTES_A_PIXEL / 1e3,
+            gif_mb: frames as f64 * pixels * GIF_BYTES_A_PIXEL / 1e6,
+            sweep_minutes: SWEEP_MINUTES,
+            customer_managed_key: false,
+        }
+    }
+
     /// How long the assemble function runs, in seconds.
-    pub(super) fn assembling_s(&self) -> f64 {
+    pub fn assembling_s(&self) -> f64 {
         (self.frames as f64 * self.assemble_ms + ASSEMBLE_OVERHEAD_MS) / 1e3
     }
 }
 
 /// Lines under one heading.
-#[derive(Debug, Serialize)]
-pub(super) struct Section {
-    pub(super) title: &'static str,
-    pub(super) lines: Vec<Line>,
-    pub(super) usd: f64,
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Section {
+    /// What it is about.
+    pub title: &'static str,
+    /// What is billed.
+    pub lines: Vec<Line>,
+    /// Together, in US dollars.
+    pub usd: f64,
 }
 
 /// So much of something, and what it costs.
-#[derive(Debug, Serialize)]
-pub(super) struct Line {
-    pub(super) item: &'static str,
-    pub(super) amount: f64,
-    pub(super) unit: &'static str,
-    pub(super) usd: f64,
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Line {
+    /// What is billed.
+    pub item: &'static str,
+    /// How much of it.
+    pub amount: f64,
+    /// What that counts; empty for pieces.
+    pub unit: &'static str,
+    /// In US dollars.
+    pub usd: f64,
 }
 
 impl Section {
@@ -93,8 +153,20 @@ impl Section {
     }
 }
 
+/// What an invocation waits for requests and pauses, in milliseconds, while so many frames are made.
+pub fn waiting_ms(frames: u64) -> f64 {
+    let [(few, short), (many, long)] = WAITING_MS;
+    short + (long - short) * ((frames as f64 - few) / (many - few)).clamp(0.0, 1.0)
+}
+
+/// Milliseconds that the render function takes for one of so many frames, if drawing it takes `drawing_ms` on one
+/// processor and the function has `memory_mb`.
+pub fn render_ms(frames: u64, drawing_ms: f64, memory_mb: f64) -> f64 {
+    drawing_ms * PROCESSOR_MB / memory_mb + waiting_ms(frames)
+}
+
 /// Everything, in the order in which it is asked about.
-pub(super) fn estimate(work: &Workload, prices: &Prices) -> Vec<Section> {
+pub fn estimate(work: &Workload, prices: &Prices) -> Vec<Section> {
     vec![making(work, prices), keeping(work, prices), stack(work, prices)]
 }
 
@@ -189,7 +261,7 @@ mod tests {
     use super::*;
 
     fn prices() -> Prices {
-        serde_json::from_str(super::super::prices::BUILT_IN).unwrap()
+        Prices::built_in().unwrap()
     }
 
     fn work(frames: u64, ms: f64) -> Workload {
@@ -268,5 +340,18 @@ mod tests {
             near(section.usd, section.lines.iter().map(|line| line.usd).sum());
             assert!(section.lines.iter().all(|line| line.usd > 0.0), "{section:?}");
         }
+    }
+
+    #[test]
+    fn waiting_is_what_was_measured_and_between() {
+        assert_eq!([1, 50, 525, 1_000, 1_000_000].map(waiting_ms), [258.0, 258.0, 342.5, 427.0, 427.0]);
+        assert_eq!(render_ms(50, 10.0, 2.0 * PROCESSOR_MB), 263.0);
+    }
+
+    #[test]
+    fn the_prices_that_come_with_the_program_are_whole() {
+        let prices = prices();
+        assert_eq!(prices.region, "us-east-1");
+        assert!(prices.sources.iter().all(|page| page.starts_with("https://aws.amazon.com/")));
     }
 }

@@ -1,0 +1,8 @@
+//! What an animation costs on AWS before it is made, and what the stack costs. Asks nobody: the prices are a data file,
+//! the rest is arithmetic.
+
+mod estimate;
+mod prices;
+
+pub use estimate::{Line, Section, Workload, estimate, render_ms, waiting_ms};
+pub use prices::{CloudWatch, Lambda, Prices, S3};

@@ -1,0 +1,45 @@
+//! Scenes to begin with: those of `scenes/`, each as one script.
+
+/// An example's name and its text.
+type Example = (&'static str, &'static str);
+
+/// All of them: one script with curves where the animation is one, else the first of its frames.
+const ALL: [Example; 10] = [
+    ("hello", include_str!("../../../scenes/hello/frame01.txt")),
+    ("marbles", include_str!("../../../scenes/marbles/marbles.txt")),
+    ("glass", include_str!("../../../scenes/glass/glass.txt")),
+    ("clockwork", include_str!("../../../scenes/clockwork/clockwork.txt")),
+    ("planets", include_str!("../../../scenes/planets/planets.txt")),
+    ("lamp", include_str!("../../../scenes/lamp/lamp.txt")),
+    ("sphere_light", include_str!("../../../scenes/sphere_light/frame01.txt")),
+    ("moving_up", include_str!("../../../scenes/moving_up/frame01.txt")),
+    ("artistic", include_str!("../../../scenes/artistic/frame01.txt")),
+    ("artisticsss", include_str!("../../../scenes/artisticsss/frame01.txt")),
+];
+
+/// Their names.
+pub(crate) fn names() -> Vec<&'static str> {
+    ALL.iter().map(|(name, _)| *name).collect()
+}
+
+/// The text of one.
+pub(crate) fn text(name: &str) -> Option<&'static str> {
+    ALL.iter().find(|(other, _)| *other == name).map(|(_, text)| *text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_example_is_in_order() {
+        for name in names() {
+            let parsed = rayfold_scene::parse(name, text(name).unwrap().as_bytes(), &Default::default());
+            assert!(parsed.script.is_some(), "{name}");
+        }
+        let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+        let folders =
+            std::fs::read_dir(scenes).unwrap().filter(|entry| entry.as_ref().unwrap().path().is_dir());
+        assert_eq!(folders.count(), ALL.len(), "is one of scenes/ missing?");
+    }
+}

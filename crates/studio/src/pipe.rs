@@ -1,0 +1,160 @@
+//! Files that are sent while they are made, so that their size does not matter: what is written comes out as the body of
+//! an answer. Whoever writes waits for whoever reads, and hears when nobody does any more.
+
+use std::io::{self, Write};
+use std::thread;
+
+use axum::body::Body;
+use bytes::Bytes;
+use futures_util::stream;
+use tokio::sync::mpsc::{Receiver, Sender, channel};
+use zip::ZipWriter;
+use zip::write::{SimpleFileOptions, StreamWriter};
+
+/// Bytes that are sent at once.
+const PIECE: usize = 64 << 10;
+
+/// Pieces that wait to be read, at most.
+const WAITING: usize = 16;
+
+/// Where a file is written to.
+#[derive(Debug)]
+pub(crate) struct Pipe {
+    sender: Sender<io::Result<Bytes>>,
+    gathered: Vec<u8>,
+}
+
+/// A zip file that is sent while it is made. Pictures are in it as they are: they are compressed.
+#[derive(Debug)]
+pub(crate) struct Zip(ZipWriter<StreamWriter<Pipe>>);
+
+/// A body, and what is written into it.
+pub(crate) fn pipe() -> (Pipe, Body) {
+    let (sender, receiver) = channel(WAITING);
+    let next = async |mut receiver: Receiver<_>| receiver.recv().await.map(|piece| (piece, receiver));
+    (Pipe { sender, gathered: Vec::new() }, Body::from_stream(stream::unfold(receiver, next)))
+}
+
+/// Has `work` write a zip file on a thread of its own; a failure breaks the answer off, so that it is not taken for a whole
+/// file.
+///
+/// # Errors
+/// When the system has no thread.
+pub(crate) fn zip_of(work: impl FnOnce(&mut Zip) -> io::Result<()> + Send + 'static) -> io::Result<Body> {
+    let (pipe, body) = pipe();
+    let failures = pipe.failures();
+    thread::Builder::new().name("zip".into()).spawn(move || {
+        let mut zip = Zip::new(pipe);
+        if let Err(error) = work(&mut zip).and_then(|()| zip.finish()) {
+            // Whoever has left hears nothing any more.
+            let _ = failures.blocking_send(Err(error));
+        }
+    })?;
+    Ok(body)
+}
+
+impl Zip {
+    pub(crate) fn new(pipe: Pipe) -> Self {
+        Self(ZipWriter::new_stream(pipe))
+    }
+
+    /// Adds a file.
+    ///
+    /// # Errors
+    /// When nobody reads any more.
+    pub(crate) fn add(&mut self, name: &str, bytes: &[u8]) -> io::Result<()> {
+        let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+        self.0.start_file(name, options)?;
+        self.0.write_all(bytes)
+    }
+
+    /// Ends it.
+    ///
+    /// # Errors
+    /// When nobody reads any more.
+    pub(crate) fn finish(self) -> io::Result<()> {
+        self.0.finish()?.into_inner().flush()
+    }
+}
+
+/// What a frame's file is called in a zip file of so many, so that every program shows them in their order.
+pub(crate) fn frame_file(number: u64, of: u64) -> String {
+    let digits = of.max(1).to_string().len();
+    format!("frame{number:0digits$}.png")
+}
+
+impl Pipe {
+    /// Where a failure goes, which breaks the answer off.
+    pub(crate) fn failures(&self) -> Sender<io::Result<Bytes>> {
+        self.sender.clone()
+    }
+
+    /// Sends what was gathered.
+    fn send(&mut self) -> io::Result<()> {
+        let piece = Bytes::from(std::mem::take(&mut self.gathered));
+        self.sender.blocking_send(Ok(piece)).map_err(|_| io::ErrorKind::BrokenPipe.into())
+    }
+}
+
+impl Write for Pipe {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.gathered.extend_from_slice(bytes);
+        if self.gathered.len() >= PIECE {
+            self.send()?;
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        if self.gathered.is_empty() { Ok(()) } else { self.send() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Cursor, Read};
+
+    use super::*;
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
+    async fn a_zip_file_comes_whole_however_large_it_is() {
+        let large: Vec<u8> = (0..3_000_000_u32).map(|n| (n % 251) as u8).collect();
+        let sent = large.clone();
+        let body = zip_of(move |zip| {
+            zip.add("small", b"x")?;
+            zip.add("large", &sent)
+        });
+        let bytes = axum::body::to_bytes(body.unwrap(), usize::MAX).await.unwrap();
+        let mut read = zip::ZipArchive::new(Cursor::new(bytes)).unwrap();
+        let mut found = Vec::new();
+        read.by_name("large").unwrap().read_to_end(&mut found).unwrap();
+        assert!(found == large);
+        assert_eq!(read.len(), 2);
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
+    async fn a_file_that_fails_on_the_way_is_no_whole_answer() {
+        let body = zip_of(|zip| {
+            zip.add("a", b"x")?;
+            Err(io::Error::other("no more"))
+        });
+        assert!(axum::body::to_bytes(body.unwrap(), usize::MAX).await.is_err());
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
+    async fn whoever_writes_hears_that_nobody_reads() {
+        let (told, heard) = std::sync::mpsc::channel();
+        let body = zip_of(move |zip| {
+            let ended = (0..10_000).try_for_each(|_| zip.add("a", &[0; 1 << 16]));
+            told.send(ended.is_err()).unwrap();
+            ended
+        });
+        drop(body);
+        assert!(heard.recv_timeout(std::time::Duration::from_secs(20)).unwrap());
+    }
+
+    #[test]
+    fn frames_are_named_so_that_they_sort() {
+        assert_eq!((frame_file(7, 50), frame_file(7, 9)), ("frame07.png".into(), "frame7.png".into()));
+    }
+}

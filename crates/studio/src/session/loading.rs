@@ -1,0 +1,52 @@
+//! Whole texts: an example, an empty scene, a file that somebody has chosen in the browser, a copy of what is shown. Each
+//! comes in place of the text that is shown, as one step that undo takes back, or as a new script of the folder.
+
+use super::{Change, Session};
+use crate::examples;
+use crate::project::Project;
+use crate::protocol::{Source, Tell};
+
+impl Session {
+    /// Puts a text in place of the one that is shown, or into a new file of this name.
+    pub(super) fn load(
+        &mut self,
+        project: &mut Project,
+        from: Source,
+        new: Option<&str>,
+        tell: &mut Tell,
+    ) -> Change {
+        let file = self.place(project).file;
+        let text = match from {
+            Source::Empty => Vec::new(),
+            Source::Example { name } => match examples::text(&name) {
+                Some(text) => text.into(),
+                None => return Change::Nothing,
+            },
+            Source::Text { text } => text.into_bytes(),
+            Source::Shown => project.files[file].document.bytes(),
+        };
+        self.held = None;
+        match new {
+            None => {
+                let splices = project.files[file].replace(&text);
+                self.told(splices, tell);
+                self.select(project, Vec::new());
+            }
+            Some(name) => match project.create(name, &text) {
+                Ok(file) => {
+                    self.selection.clear();
+                    // Other files have other numbers now: what is shown is told anew in any case.
+                    self.shown_file = usize::MAX;
+                    let first = project.first_frame(file);
+                    self.show(project, first, tell);
+                }
+                Err(error) => {
+                    tell.notice = Some(error.to_string());
+                    return Change::Nothing;
+                }
+            },
+        }
+        tell.outline = Some(String::new());
+        Change::Still
+    }
+}

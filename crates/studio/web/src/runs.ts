@@ -1,0 +1,214 @@
+// Runs in a bucket, as signals: what is looked at, which is the address behind the # of the page, and what the server told
+// of it. Nothing is remembered beside that address: a page that is opened again shows the same run.
+
+import { computed, signal } from "@preact/signals";
+
+import { notice, state } from "./store";
+
+export type View =
+  | { readonly what: "closed" | "list" | "submit" }
+  | { readonly what: "run"; readonly run: string };
+
+export interface Gif {
+  readonly bytes: number;
+  readonly version: string;
+  readonly current: boolean;
+}
+
+export interface Summary {
+  readonly run: string;
+  readonly status: string;
+  readonly done: number;
+  readonly failed: number;
+  readonly total: number;
+  readonly behind: boolean;
+  readonly settled: boolean;
+  readonly gif: Gif | null;
+}
+
+export interface Fault {
+  readonly what: string;
+  readonly script?: string;
+  readonly part?: number;
+  readonly place?: readonly [number, number];
+  readonly message: string;
+  readonly help: string;
+}
+
+export interface Frame {
+  readonly script: string;
+  readonly version: string;
+  readonly part?: number;
+  readonly state: "pending" | "done" | "failed";
+  readonly pixels?: number;
+}
+
+export type Sending =
+  | { readonly is: "uploading"; readonly done: number; readonly total: number }
+  | { readonly is: "failed"; readonly why: string };
+
+export interface Run extends Summary {
+  readonly faults: readonly Fault[];
+  readonly moreFaults: number;
+  readonly sending: Sending | null;
+  readonly problem: string | null;
+  readonly frames: readonly Frame[];
+}
+
+/** What the server sends of a run: all frames, or those that changed with their places. */
+interface Told extends Omit<Run, "frames"> {
+  readonly frames?: readonly Frame[];
+  readonly changed?: readonly (readonly [number, Frame])[];
+}
+
+export interface List {
+  /** None where the server was started without one. */
+  readonly bucket: string | null;
+  readonly runs: readonly Summary[];
+  readonly more: number;
+}
+
+export interface Refusal {
+  readonly why: string;
+  readonly script?: string;
+  readonly place?: readonly [number, number];
+  readonly delete?: readonly string[];
+}
+
+export interface CostLine {
+  readonly item: string;
+  readonly amount: number;
+  readonly unit: string;
+  readonly usd: number;
+}
+
+export interface Section {
+  readonly title: string;
+  readonly lines: readonly CostLine[];
+  readonly usd: number;
+}
+
+export interface Offer {
+  readonly estimate: {
+    readonly frames: number;
+    readonly size: readonly [number, number];
+    readonly drawingMs: number;
+    readonly prices: string;
+    readonly sections: readonly Section[];
+  };
+  readonly folder: string;
+  readonly upload: number;
+  readonly unchanged: number;
+  readonly delete: readonly string[];
+}
+
+export const view = signal<View>({ what: "closed" });
+export const list = signal<List | null>(null);
+export const run = signal<Run | null>(null);
+export const offer = signal<Offer | null>(null);
+export const refusal = signal<Refusal | null>(null);
+/** Whether an answer is awaited. */
+export const waiting = signal(false);
+
+/** The name under which the project is submitted unless another is given. */
+export const ownName = computed(() => (state.value?.title ?? "").replace(/\.txt$/, ""));
+
+let source: EventSource | null = null;
+
+export function address(of: View): string {
+  return of.what === "run" ? `#run=${encodeURIComponent(of.run)}` : of.what === "closed" ? "#" : `#${of.what === "list" ? "runs" : "submit"}`;
+}
+
+export function go(to: View): void {
+  if (to.what === "closed") {
+    history.pushState(null, "", location.pathname);
+    look();
+  } else location.hash = address(to);
+}
+
+function viewOf(hash: string): View {
+  if (hash === "#runs") return { what: "list" };
+  if (hash === "#submit") return { what: "submit" };
+  if (!hash.startsWith("#run=")) return { what: "closed" };
+  try {
+    return { what: "run", run: decodeURIComponent(hash.slice(5)) };
+  } catch {
+    return { what: "list" };
+  }
+}
+
+/** What an address below `runs/` is, with a query. */
+export function resource(name: string, query: Readonly<Record<string, string | number | undefined>>): string {
+  const pairs = Object.entries(query).flatMap(([key, value]) => (value === undefined ? [] : [[key, String(value)]]));
+  return `runs/${name}?${new URLSearchParams(pairs)}`;
+}
+
+export function picture(of: string, { script, version, part, pixels }: Frame): string {
+  return resource("frame.png", { run: of, script, version, part, pixels });
+}
+
+async function asked(what: string, body?: object): Promise<unknown> {
+  refusal.value = null;
+  waiting.value = true;
+  try {
+    const sent = body === undefined ? {} : { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) };
+    const answer = await fetch(what, sent);
+    const text = await answer.text();
+    if (answer.ok) return text === "" ? {} : (JSON.parse(text) as unknown);
+    refusal.value = text.startsWith("{") ? (JSON.parse(text) as Refusal) : { why: text };
+  } catch {
+    refusal.value = { why: "the studio does not answer: does it still run?" };
+  } finally {
+    waiting.value = false;
+  }
+  return null;
+}
+
+export async function fetchList(): Promise<void> {
+  list.value = (await asked("runs/list")) as List | null;
+}
+
+/** What would be sent under a name, and what it would cost. */
+export async function fetchOffer(name: string): Promise<void> {
+  offer.value = null;
+  offer.value = (await asked(resource("offer", { run: name }))) as Offer | null;
+}
+
+export async function submit(name: string, deleting: readonly string[]): Promise<void> {
+  if (await asked("runs/submit", { run: name, delete: deleting })) go({ what: "run", run: name });
+}
+
+export async function retry(name: string, fault?: Fault): Promise<void> {
+  const one = fault?.script === undefined ? {} : { script: fault.script, part: fault.part };
+  const woken = (await asked("runs/retry", { run: name, ...one })) as { readonly woken: number } | null;
+  if (woken) notice.value = woken.woken === 1 ? "1 frame is drawn again." : `${woken.woken} frames are drawn again.`;
+}
+
+function hear(told: Told): void {
+  const frames = told.frames ?? run.value?.frames.slice() ?? [];
+  const all = frames.slice();
+  for (const [at, frame] of told.changed ?? []) all[at] = frame;
+  run.value = { ...told, frames: all };
+}
+
+/** Shows what the address says. */
+function look(): void {
+  const next = viewOf(location.hash);
+  view.value = next;
+  source?.close();
+  source = null;
+  run.value = null;
+  refusal.value = null;
+  offer.value = null;
+  if (next.what === "list" || next.what === "submit") void fetchList();
+  if (next.what === "run") {
+    // The browser connects again by itself, and is told all frames then.
+    source = new EventSource(resource("events", { run: next.run }));
+    source.onmessage = (message: MessageEvent<string>) => hear(JSON.parse(message.data) as Told);
+  }
+}
+
+export function follow(): void {
+  addEventListener("hashchange", look);
+  look();
+}

@@ -1,0 +1,202 @@
+// Measures the page in headless Chromium: how soon the first picture is there, how many come a second while an object is
+// dragged, and how long each takes from the pointer to the canvas. Writes a line of JSON a run; `rayfold-bench studio`
+// makes the report of them.
+//
+//     RAYFOLD=target/release/rayfold CHROMIUM=chromium node tests/bench.mjs SCRIPT RUNS SECONDS
+//
+// It speaks the browser's debugging protocol itself, over a pipe and without its Network domain: that one copies every
+// picture to whoever listens, and halves their rate.
+
+import { spawn } from "node:child_process";
+import { cpSync, mkdtempSync, readFileSync, readdirSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+
+import { start } from "./processes.mjs";
+
+const [script, runs = "5", seconds = "5"] = process.argv.slice(2);
+
+/** Width and height of the picture. */
+const SIZE = [960, 540];
+
+/** Between two moves of the pointer, in milliseconds: those of a usual mouse. The browser hands on one a frame. */
+const MOVE_MS = 8;
+
+/** Once round the circle on which the object is dragged, in milliseconds, and the circle's radius in pixels. */
+const [ROUND_MS, RADIUS] = [2000, 50];
+
+/** Where the object is, in shares of the picture. */
+const [GRAB_X, GRAB_Y] = [0.59, 0.67];
+
+/** A second, as the system counts processor time. */
+const JIFFIES = 100;
+
+/** Runs in the page before its own scripts: notes when what was asked for by the pointer is on the canvas. */
+const PROBE = `(() => {
+  const probe = { first: null, sizes: {}, pictures: 0, waits: [], sent: 0, asked: [], recording: false };
+  window.probe = probe;
+  let pointer = 0;
+  addEventListener("pointermove", (event) => (pointer = event.timeStamp), true);
+  const Socket = window.WebSocket;
+  window.WebSocket = class extends Socket {
+    constructor(...args) {
+      super(...args);
+      this.addEventListener("message", ({ data }) => {
+        if (typeof data !== "string" || !data.includes('"asked"')) return;
+        const asked = Number(/"asked":(\\d+)/.exec(data)[1]);
+        const picture = /"picture":\\[(\\d+)/.exec(data);
+        for (const drag of probe.asked) if (drag.picture === null && drag.number <= asked && picture) drag.picture = Number(picture[1]);
+      });
+    }
+    send(text) {
+      probe.sent += 1;
+      if (probe.recording && text.startsWith('{"ask":"drag"')) probe.asked.push({ number: probe.sent, at: pointer, picture: null });
+      super.send(text);
+    }
+  };
+  addEventListener("picture", ({ detail, target }) => {
+    const now = performance.now();
+    probe.first ??= now;
+    if (!probe.recording) return;
+    probe.pictures += 1;
+    const size = target.width + "x" + target.height;
+    probe.sizes[size] = (probe.sizes[size] ?? 0) + 1;
+    probe.asked = probe.asked.filter((drag) => {
+      if (drag.picture === null || drag.picture > detail) return true;
+      probe.waits.push(now - drag.at);
+      return false;
+    });
+  }, true);
+})()`;
+
+const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+/** A browser, and a way to ask it. */
+function browse(folder) {
+  const flags = ["--headless=new", "--no-sandbox", "--remote-debugging-pipe", "--no-first-run", `--user-data-dir=${folder}`, "about:blank"];
+  const browser = spawn(process.env.CHROMIUM, flags, { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] });
+  const [, , , to, from] = browser.stdio;
+  const answers = new Map();
+  let [next, held] = [0, Buffer.alloc(0)];
+  from.on("data", (bytes) => {
+    held = Buffer.concat([held, bytes]);
+    for (let end = held.indexOf(0); end >= 0; end = held.indexOf(0)) {
+      const message = JSON.parse(held.subarray(0, end).toString());
+      held = held.subarray(end + 1);
+      const answer = answers.get(message.id);
+      answers.delete(message.id);
+      if (message.error) answer?.reject(new Error(JSON.stringify(message.error)));
+      else answer?.resolve(message.result);
+    }
+  });
+  const ended = new Promise((resolve) => browser.on("exit", resolve));
+  const ask = (method, params = {}, sessionId = undefined) =>
+    new Promise((resolve, reject) => {
+      next += 1;
+      answers.set(next, { resolve, reject });
+      to.write(`${JSON.stringify({ id: next, method, params, sessionId })}\0`);
+    });
+  return { ask, ended, pid: browser.pid };
+}
+
+/** Jiffies that all processors worked, and that there were. */
+function processors() {
+  const [user, nice, system, idle, iowait, irq, softirq, steal] = readFileSync("/proc/stat", "utf8").split("\n")[0].split(/\s+/).slice(1).map(Number);
+  const busy = user + nice + system + irq + softirq + steal;
+  return { busy, all: busy + idle + iowait };
+}
+
+/** Jiffies that these processes and their children worked. */
+function ours(roots) {
+  const of = new Map();
+  for (const pid of readdirSync("/proc").filter((name) => /^\d+$/.test(name))) {
+    try {
+      const stat = readFileSync(`/proc/${pid}/stat`, "utf8");
+      const fields = stat.slice(stat.lastIndexOf(")") + 2).split(" ");
+      of.set(Number(pid), { parent: Number(fields[1]), time: Number(fields[11]) + Number(fields[12]) });
+    } catch {
+      // It has ended meanwhile.
+    }
+  }
+  const isOurs = (pid) => roots.includes(pid) || (of.has(pid) && isOurs(of.get(pid).parent));
+  return [...of].filter(([pid]) => isOurs(pid)).reduce((sum, [, { time }]) => sum + time, 0);
+}
+
+async function measure(run) {
+  const folder = mkdtempSync(join(tmpdir(), "rayfold-bench-"));
+  const path = join(folder, "scene.txt");
+  cpSync(script, path);
+  const studio = start(process.env.RAYFOLD, ["studio", path, "--no-open"]);
+  const browser = browse(join(folder, "browser"));
+  try {
+    const address = (await studio.said((text) => text.includes("\n"))).trim();
+    const { targetInfos } = await browser.ask("Target.getTargets");
+    const { targetId } = targetInfos.find(({ type }) => type === "page");
+    const { sessionId } = await browser.ask("Target.attachToTarget", { targetId, flatten: true });
+    const page = (method, params) => browser.ask(method, params, sessionId);
+    const evaluate = async (expression) => {
+      const { result, exceptionDetails } = await page("Runtime.evaluate", { expression, awaitPromise: true, returnByValue: true });
+      if (exceptionDetails) throw new Error(JSON.stringify(exceptionDetails));
+      return result.value;
+    };
+    await page("Page.enable");
+    await page("Page.addScriptToEvaluateOnNewDocument", { source: PROBE });
+    const room = (width, height) => page("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor: 1, mobile: false });
+    await room(1600, 700);
+    const open = async () => {
+      await page("Page.navigate", { url: address });
+      for (let round = 0; ; round += 1) {
+        await wait(50);
+        if ((await evaluate("window.probe?.first ?? null")) !== null) return;
+        if (round > 600) throw new Error("no picture came");
+      }
+    };
+    await open();
+    const box = (of) => evaluate(`(() => { const b = document.querySelector("${of}").getBoundingClientRect(); return [b.left, b.top, b.width, b.height]; })()`);
+    const [, , width, height] = await box(".viewport");
+    await room(1600 + SIZE[0] - width, 700 + SIZE[1] - height);
+    // Opened anew in this size, by a browser that has started.
+    await page("Page.navigate", { url: "about:blank" });
+    await open();
+    const first = await evaluate("probe.first");
+    await wait(800);
+    const [left, top] = await box("canvas");
+    const [x, y] = [left + GRAB_X * SIZE[0], top + GRAB_Y * SIZE[1]];
+    const mouse = (type, x, y, buttons) => page("Input.dispatchMouseEvent", { type, x, y, button: buttons || type === "mouseReleased" ? "left" : "none", buttons, clickCount: 1 });
+    await mouse("mouseMoved", x, y, 0);
+    await mouse("mousePressed", x, y, 1);
+    const begin = performance.now();
+    let [from, before] = [null, null];
+    const pids = [studio.server.pid, browser.pid, process.pid];
+    const moves = [];
+    // The first second is not counted: caches fill, and the browser compiles.
+    for (let now = 0; now < 1000 * (1 + Number(seconds)); now = performance.now() - begin) {
+      if (from === null && now >= 1000) {
+        await evaluate("probe.recording = true");
+        [from, before] = [performance.now(), { ...processors(), ours: ours(pids) }];
+      }
+      const turn = (2 * Math.PI * now) / ROUND_MS;
+      moves.push(mouse("mouseMoved", x + RADIUS * Math.sin(turn), y - RADIUS * (1 - Math.cos(turn)), 1));
+      await wait(MOVE_MS);
+    }
+    await evaluate("probe.recording = false");
+    const took = (performance.now() - from) / 1000;
+    const [total, own] = [processors(), ours(pids)];
+    await Promise.all(moves);
+    await mouse("mouseReleased", x, y, 0);
+    const selected = await evaluate(`document.querySelectorAll("[aria-selected=true]").length`);
+    if (selected === 0) throw new Error("no object is where the pointer went down");
+    const probe = await evaluate("JSON.stringify({ sizes: probe.sizes, pictures: probe.pictures, waits: probe.waits })");
+    const others = (total.busy - before.busy - (own - before.ours)) / (total.all - before.all);
+    const processorMs = (1000 * (own - before.ours)) / JIFFIES;
+    console.log(JSON.stringify({ run, first, seconds: took, others, processorMs, ...JSON.parse(probe) }));
+  } finally {
+    await browser.ask("Browser.close").catch(() => {});
+    await browser.ended;
+    studio.server.kill("SIGINT");
+    await studio.ended;
+    rmSync(folder, { recursive: true, force: true });
+  }
+}
+
+for (let run = 1; run <= Number(runs); run += 1) await measure(run);
