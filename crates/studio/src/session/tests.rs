@@ -3,8 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::sight::PIXELS;
 use super::*;
-use crate::handles::Handle;
+use crate::handles::{Grip, Handle, Manner};
+use crate::protocol::State;
 
 struct Desk {
     _folder: tempfile::TempDir,

@@ -1,0 +1,136 @@
+//! What the page is told: how everything stands, and which lines have changed.
+
+use rayfold_scene::{Command, Scene};
+
+use super::hold::Held;
+use super::sight::grid_path;
+use super::{Answer, Change, Session};
+use crate::document::Splice;
+use crate::edits;
+use crate::handles::{Values, handles};
+use crate::line::Line;
+use crate::pictures::Wanted;
+use crate::project::Project;
+use crate::protocol::{FaultState, FileState, Inspected, LineState, LinesChanged, State, Tell};
+use crate::tables::role;
+use crate::view::Projection;
+
+impl Session {
+    pub(super) fn answer(&mut self, project: &Project, mut tell: Tell, change: Change) -> Answer {
+        let files: Vec<_> = project
+            .files
+            .iter()
+            .map(|file| FileState {
+                name: file.name.clone(),
+                frames: file.frame_count(),
+                faulty: !file.is_sound(),
+            })
+            .collect();
+        if files != self.files {
+            tell.files = Some(files.clone());
+            self.files = files;
+        }
+        let scene = self.scene(project);
+        let picture = match (change, &scene) {
+            (Change::Nothing, _) | (_, None) => None,
+            (change, Some(scene)) => {
+                self.pictures = self.pictures.wrapping_add(1);
+                let moving = change == Change::Moving;
+                Some(Wanted { scene: scene.clone(), moving, number: self.pictures })
+            }
+        };
+        tell.state = Some(self.state(project, scene.as_ref()));
+        Answer { tell, picture, shown: false, output: None }
+    }
+
+    pub(super) fn state(&self, project: &Project, scene: Option<&Scene>) -> State {
+        let place = self.place(project);
+        let file = &project.files[place.file];
+        let lines = file.document.lines();
+        let mut shown = Vec::new();
+        let mut grid = String::new();
+        if let Some(scene) = scene {
+            let projection = Projection::new(scene);
+            let around = self.around(project);
+            if !matches!(self.held, Some(Held::Turn(_)))
+                && let Some(&line) = self.selection.last()
+                && let Some(text) = lines.get(line)
+            {
+                shown = handles(line, text, &projection, around);
+            }
+            if self.free.is_some() {
+                grid = grid_path(&projection, self.bounds(project));
+            }
+        }
+        let inspected = self.selection.last().and_then(|&line| {
+            let text = lines.get(line)?;
+            let (values, words) = (Values::of(text)?, text.words()?);
+            let numbers = (0..words.parameters.len()).map(|at| values.number(at)).collect();
+            Some(Inspected { line, command: values.command.name(), values: numbers })
+        });
+        let faults = file
+            .diagnostics
+            .iter()
+            .map(|fault| FaultState {
+                line: fault.line - 1,
+                column: fault.column - 1,
+                length: fault.excerpt.text.get(fault.excerpt.marked.clone()).map_or(0, |t| t.chars().count()),
+                error: fault.is_error(),
+                message: fault.message.clone(),
+                help: fault.help.clone().or_else(|| fault.expected.clone()).unwrap_or_default(),
+            })
+            .collect();
+        State {
+            asked: self.asked,
+            title: project.name.clone(),
+            fps: project.settings.fps(),
+            frame: self.frame.min(project.frame_count() - 1),
+            frames: project.frame_count(),
+            file: place.file,
+            saved: file.saved(),
+            can_undo: file.document.can_undo(),
+            can_redo: file.document.can_redo(),
+            selection: self.selection.clone(),
+            inspected,
+            faults,
+            handles: shown,
+            grid,
+            free: self.free.is_some(),
+            picture: scene.map(|scene| (self.pictures, scene.screen.width(), scene.screen.height())),
+        }
+    }
+
+    pub(super) fn lines(&self, project: &Project) -> Vec<LineState> {
+        self.file_lines(project).iter().map(line_state).collect()
+    }
+
+    /// The selection stays with its lines.
+    pub(super) fn told(&mut self, splices: Vec<Splice>, tell: &mut Tell) {
+        for splice in &splices {
+            let (end, inserted) = (splice.at + splice.removed, splice.inserted.len());
+            self.selection.retain(|&line| line < splice.at || line >= end || inserted == splice.removed);
+            for line in self.selection.iter_mut().filter(|line| **line >= end) {
+                *line = *line + inserted - splice.removed;
+            }
+        }
+        tell.splices.extend(splices.into_iter().map(|splice| LinesChanged {
+            at: splice.at,
+            removed: splice.removed,
+            lines: splice.inserted.iter().map(line_state).collect(),
+        }));
+    }
+}
+
+fn line_state(line: &Line) -> LineState {
+    let text = line.text();
+    let hidden = if text.trim_start().starts_with('#') { edits::hidden(line) } else { None };
+    let of = hidden.as_ref().unwrap_or(line);
+    let command = of.command();
+    LineState {
+        text,
+        command: command.map(Command::name),
+        role: command.map(role),
+        name: of.name(),
+        hidden: hidden.is_some(),
+    }
+}
