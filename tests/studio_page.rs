@@ -1,4 +1,4 @@
-//! The studio's page in a real browser, against the real program: what `crates/studio/web/tests/page.mjs` does.
+//! The studio's page in a real browser, against the real program: what `crates/studio/web/tests` does.
 //!
 //! It takes Node, Chromium and the page's packages (`npm ci` in `crates/studio/web`). Where one of them is not there one
 //! line says that the page was not tested; nothing is installed here.
@@ -6,6 +6,9 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+
+/// The files of tests, in the page's folder.
+const TESTS: [&str; 2] = ["tests/page.mjs", "tests/time.mjs"];
 
 /// The names of the browser, in the order in which they are tried.
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
@@ -25,14 +28,12 @@ fn the_page_does_in_a_browser_what_it_promises() {
             return;
         }
     };
-    let status = Command::new("node")
-        .args(["--test", "--test-reporter=spec", "tests/page.mjs"])
-        .current_dir(&web)
-        .env("RAYFOLD", env!("CARGO_BIN_EXE_rayfold"))
-        .env("CHROMIUM", browser)
-        .stdin(Stdio::null())
-        .status()
-        .expect("node runs");
+    let program = Path::new(env!("CARGO_BIN_EXE_rayfold"));
+    let mut node = Command::new("node");
+    // One after the other: each draws on all cores.
+    node.args(["--test", "--test-reporter=spec", "--test-concurrency=1"]).args(TESTS);
+    node.current_dir(&web).env("RAYFOLD", program).env("CHROMIUM", browser).stdin(Stdio::null());
+    let status = node.status().expect("node runs");
     assert!(status.success(), "see above which of the page's tests failed");
 }
 

@@ -14,18 +14,25 @@
 mod document;
 mod edits;
 mod error;
+mod extent;
+mod groups;
 mod handles;
 mod line;
+mod materials;
 mod output;
 mod page;
 mod pictures;
 mod project;
 mod protocol;
+mod resting;
 mod server;
 mod session;
 mod silhouette;
 mod stage;
 mod tables;
+mod tracks;
+mod turning;
+mod values;
 mod view;
 
 pub use document::{Document, Splice};

@@ -7,19 +7,23 @@ mod editing;
 mod hold;
 mod sight;
 mod telling;
+mod time;
 
 use glam::{DVec2, DVec3};
 
 use crate::document::Splice;
 use crate::edits;
 use crate::line::Line;
+use crate::materials;
 use crate::pictures::Wanted;
 use crate::project::{Place, Project};
 use crate::protocol::{Ask, FileState, Tell};
+use crate::resting;
 use crate::stage::Stage;
 use crate::tables::commands;
+use crate::tracks::{Copied, Tracks};
+use crate::values::changed;
 use crate::view::Orbit;
-use editing::whole;
 use hold::Held;
 
 /// Bytes of a text that the page sends for a line.
@@ -40,7 +44,20 @@ pub(crate) struct Session {
     /// The line that is being typed in, and its gesture.
     typing: Option<(usize, u64)>,
     pictures: u32,
+    /// Lines that cannot be taken hold of in the picture, each with its file. They are kept as long as the page is open: the
+    /// script does not say it.
+    locked: Vec<(usize, usize)>,
+    /// What is under the pointer.
+    hovered: Option<usize>,
+    /// Whether still numbers become curves when they are changed.
+    auto_key: bool,
+    /// Whether the way of what is selected is shown.
+    path: bool,
+    /// Whether it is outlined where it is at other frames.
+    onion: bool,
+    copied: Vec<Copied>,
     /// What the page was told last.
+    tracks: Option<Tracks>,
     files: Vec<FileState>,
     shown_file: usize,
     /// What the server is to do about the GIF.
@@ -92,12 +109,20 @@ impl Session {
             gestures: 0,
             typing: None,
             pictures: 0,
+            locked: Vec::new(),
+            hovered: None,
+            auto_key: false,
+            path: true,
+            onion: false,
+            copied: Vec::new(),
+            tracks: None,
             files: Vec::new(),
             shown_file: 0,
             output: None,
         };
         let tell = Tell {
             tables: Some(commands()),
+            presets: materials::presets(),
             lines: Some(session.lines(project)),
             notice: None,
             ..Tell::default()
@@ -153,7 +178,12 @@ impl Session {
             }
             Ask::Frame { frame, moving } => {
                 self.show(project, frame, tell);
-                if moving { Change::Moving } else { Change::Still }
+                if moving {
+                    (tell.outline, tell.ghosts) = (Some(String::new()), Some(Vec::new()));
+                    return Some(Change::Moving);
+                }
+                self.outline(project, tell);
+                Change::Still
             }
             Ask::Select { lines } => {
                 self.select(project, lines);
@@ -161,7 +191,7 @@ impl Session {
                 Change::Nothing
             }
             Ask::Hover { x, y } => {
-                tell.hovered = Some(self.pick(project, x, y).map(|(line, _)| line));
+                self.hover(project, x, y, tell);
                 Change::Nothing
             }
             Ask::Press { x, y, extend, grip, line } => {
@@ -187,7 +217,8 @@ impl Session {
             }
             Ask::KeepCamera => self.keep_camera(project, tell),
             Ask::Set { line, first, values, gesture } => {
-                let to = self.line(project, line).and_then(|line| whole(line, first, &values));
+                let keying = self.keying(project);
+                let to = self.line(project, line).and_then(|line| changed(line, first, &values, keying));
                 let is_fit = values.iter().all(|value| value.is_finite()) && first + values.len() <= 64;
                 match to {
                     // The page's own gestures and the pointer's are not to meet.
@@ -259,17 +290,54 @@ impl Session {
             Ask::Drop { lines } => {
                 let stage = self.stage(project);
                 if let Some(scene) = self.sound_scene(project, &stage) {
-                    let splices = edits::drop_down(self.file_lines(project), &stage, &scene, &lines);
+                    let (of, keying) = (self.file_lines(project), self.keying(project));
+                    let splices = resting::drop_down(of, &stage, &scene, &lines, keying);
                     self.edit(project, splices, None, tell);
                     self.outline(project, tell);
                 }
                 Change::Still
             }
+            Ask::Ground { lines } => {
+                let stage = self.stage(project);
+                if let Some(scene) = self.sound_scene(project, &stage) {
+                    let (of, keying) = (self.file_lines(project), self.keying(project));
+                    let splices = resting::to_ground(of, &stage, &scene, &lines, keying);
+                    self.edit(project, splices, None, tell);
+                    self.outline(project, tell);
+                }
+                Change::Still
+            }
+            Ask::Lock { lines } => {
+                self.lock(project, &lines);
+                Change::Nothing
+            }
+            Ask::Group { lines } => {
+                self.group(project, &lines, tell);
+                Change::Still
+            }
+            Ask::Ungroup { line } => {
+                self.ungroup(project, line, tell);
+                Change::Still
+            }
+            Ask::Surface { lines, material } => {
+                let splices = materials::give(self.file_lines(project), &lines, &material);
+                self.edit(project, splices, None, tell);
+                Change::Still
+            }
+            Ask::Preset { lines, preset } => {
+                let splices = materials::give_preset(self.file_lines(project), &lines, &preset);
+                self.edit(project, splices, None, tell);
+                Change::Still
+            }
+            Ask::Time { wish } => self.time_wish(project, wish, tell),
             Ask::Nudge { lines, by } => {
                 let by = DVec3::from(by) * self.step(project) * 10.0;
+                let keying = self.keying(project);
                 let splices = lines
                     .iter()
-                    .filter_map(|&at| Some(edits::set(at, edits::moved(self.line(project, at)?, by)?)))
+                    .filter_map(|&at| {
+                        Some(edits::set(at, edits::moved(self.line(project, at)?, by, keying)?))
+                    })
                     .collect();
                 self.edit(project, splices, None, tell);
                 self.outline(project, tell);
@@ -318,7 +386,7 @@ impl Session {
     }
 
     fn stage(&self, project: &Project) -> Stage {
-        Stage::of(self.file_lines(project), self.place(project).frame)
+        Stage::of(self.file_lines(project), self.place(project).frame, self.time(project))
     }
 
     fn select(&mut self, project: &Project, lines: Vec<usize>) {
@@ -345,3 +413,7 @@ impl Session {
 #[cfg(test)]
 #[path = "session/tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "session/time_tests.rs"]
+mod time_tests;

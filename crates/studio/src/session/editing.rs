@@ -6,10 +6,10 @@ use rayfold_scene::Command;
 use super::Session;
 use crate::document::Splice;
 use crate::edits;
-use crate::line::Line;
+use crate::groups;
 use crate::project::Project;
 use crate::protocol::Tell;
-use crate::tables::{Role, fields, role};
+use crate::tables::{Role, role};
 use crate::view::Projection;
 
 impl Session {
@@ -77,15 +77,57 @@ impl Session {
         self.select(project, vec![place]);
         self.outline(project, tell);
     }
-}
 
-/// A line with other numbers; a parameter that was left out is there whole then.
-pub(super) fn whole(line: &Line, first: usize, values: &[f64]) -> Option<Line> {
-    let line = line.with_numbers(first, values)?;
-    let (command, words) = (line.command()?, line.words()?.parameters.len());
-    let cut = fields(command).map(|(first, field)| (first, first + field.names.len()));
-    match cut.into_iter().find(|&(first, end)| first < words && words < end) {
-        Some((_, end)) => line.with_numbers(words, &vec![0.0; end - words]),
-        None => Some(line),
+    /// Lines become a group, which is selected then.
+    pub(super) fn group(&mut self, project: &mut Project, lines: &[usize], tell: &mut Tell) {
+        let stage = self.stage(project);
+        let Some(scene) = self.sound_scene(project, &stage) else { return };
+        match groups::group(self.file_lines(project), &stage, &scene, lines) {
+            Ok((splices, place)) => {
+                self.edit(project, splices, None, tell);
+                self.select(project, vec![place]);
+                self.outline(project, tell);
+            }
+            Err(refusal) => tell.notice = Some(refusal.told().into()),
+        }
+    }
+
+    /// A group is taken apart; its lines are selected then.
+    pub(super) fn ungroup(&mut self, project: &mut Project, line: usize, tell: &mut Tell) {
+        match groups::ungroup(self.file_lines(project), line) {
+            Ok((splices, place)) => {
+                self.edit(project, splices, None, tell);
+                self.select(project, place.collect());
+                self.outline(project, tell);
+            }
+            Err(refusal) => tell.notice = Some(refusal.told().into()),
+        }
+    }
+
+    /// Whether a line cannot be taken hold of in the picture.
+    pub(super) fn is_locked(&self, project: &Project, line: usize) -> bool {
+        self.locked.contains(&(self.place(project).file, line))
+    }
+
+    /// The lines of the file that is shown which cannot be taken hold of.
+    pub(super) fn locked_lines(&self, project: &Project) -> Vec<usize> {
+        let file = self.place(project).file;
+        self.locked.iter().filter(|(of, _)| *of == file).map(|(_, line)| *line).collect()
+    }
+
+    /// Locks lines, or unlocks them if all of them are locked.
+    pub(super) fn lock(&mut self, project: &Project, lines: &[usize]) {
+        let file = self.place(project).file;
+        let is_locked = |session: &Self, line: usize| session.locked.contains(&(file, line));
+        if lines.iter().all(|&line| is_locked(self, line)) {
+            self.locked.retain(|(of, line)| *of != file || !lines.contains(line));
+            return;
+        }
+        let count = self.file_lines(project).len();
+        for &line in lines.iter().filter(|&&line| line < count) {
+            if !is_locked(self, line) {
+                self.locked.push((file, line));
+            }
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 
+use super::time::HeldKeys;
 use super::{Change, Session};
 use crate::edits;
 use crate::handles::{Drag, Grip, Manner};
@@ -16,6 +17,8 @@ pub(super) enum Held {
     Drag(Drag, DVec2),
     /// The free camera; where the pointer was last.
     Turn(DVec2),
+    /// Keys of the timeline.
+    Keys(HeldKeys),
 }
 
 impl Session {
@@ -56,8 +59,11 @@ impl Session {
         let all = matches!(grip, Grip::Body | Grip::Axis { .. });
         let main = self.selection.last().copied();
         let lines = self.selection.iter().rev().copied().filter(|&line| all || Some(line) == main);
+        let stage = self.stage(project);
+        let lines = lines.filter(|&line| !stage.is_in_group(line) && !self.is_locked(project, line));
         let lines = lines.filter_map(|line| Some((line, self.line(project, line)?.clone()))).collect();
-        self.held = Drag::new(grip, lines, grabbed, around).map(|drag| Held::Drag(drag, at));
+        let keying = self.keying(project);
+        self.held = Drag::new(grip, lines, grabbed, around, keying).map(|drag| Held::Drag(drag, at));
     }
 
     pub(super) fn drag(
@@ -69,7 +75,7 @@ impl Session {
     ) -> Change {
         let Some(scene) = self.scene(project) else { return Change::Nothing };
         match &mut self.held {
-            None => Change::Nothing,
+            None | Some(Held::Keys(_)) => Change::Nothing,
             Some(Held::Turn(last)) => {
                 let moved = (at - *last) / f64::from(scene.screen.height());
                 *last = at;

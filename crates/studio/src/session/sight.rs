@@ -6,6 +6,7 @@ use rayfold_scene::{Camera, Command, Pinhole, Scene, Screen};
 use super::{Change, Session};
 use crate::document::Splice;
 use crate::edits;
+use crate::extent;
 use crate::line::Line;
 use crate::project::Project;
 use crate::protocol::{Navigation, Standpoint, Tell};
@@ -44,14 +45,38 @@ impl Session {
     /// The same, if its objects are those of the lines.
     pub(super) fn sound_scene(&self, project: &Project, stage: &Stage) -> Option<Scene> {
         let is_sound = project.files[self.place(project).file].is_sound();
-        self.scene(project).filter(|scene| is_sound && scene.objects.len() == stage.objects.len())
+        self.scene(project).filter(|scene| is_sound && scene.objects.len() == stage.object_count())
     }
 
     pub(super) fn bounds(&self, project: &Project) -> Bounds {
-        let lines = self.file_lines(project);
+        let place = self.place(project);
+        let script = project.files[place.file].script.as_ref();
+        let scene = script.and_then(|script| script.frame(place.frame));
+        let lamps = || {
+            let (lines, time) = (self.file_lines(project), self.time(project));
+            let lights = self.stage(project).lights.into_iter().filter_map(|line| lines.get(line));
+            edits::places(lights.collect::<Vec<_>>(), time)
+        };
+        scene
+            .and_then(|scene| extent::bounds(scene.objects.iter()))
+            .or_else(lamps)
+            .unwrap_or(Bounds { low: DVec3::splat(-1.0), high: DVec3::splat(1.0) })
+    }
+
+    /// Where what is selected is.
+    fn selected_bounds(&self, project: &Project) -> Option<Bounds> {
         let stage = self.stage(project);
-        let objects = stage.objects.iter().filter_map(|&line| lines.get(line));
-        edits::bounds(objects).unwrap_or(Bounds { low: DVec3::splat(-1.0), high: DVec3::splat(1.0) })
+        let objects = self.sound_scene(project, &stage).and_then(|scene| {
+            let own = scene
+                .objects
+                .iter()
+                .enumerate()
+                .filter(|(at, _)| stage.line_of(*at).is_some_and(|line| self.selection.contains(&line)));
+            extent::bounds(own.map(|(_, object)| object))
+        });
+        let lights = self.selection.iter().filter(|line| stage.lights.contains(line));
+        let lights = lights.filter_map(|&line| self.line(project, line));
+        objects.or_else(|| edits::places(lights.collect::<Vec<_>>(), self.time(project)))
     }
 
     /// Where lights without a place are shown.
@@ -75,17 +100,36 @@ impl Session {
             && (0.0..f64::from(scene.screen.height())).contains(&row);
         let found = if inside { silhouette::pick(&scene, column, row).ok().flatten()? } else { return None };
         let (origin, direction) = Projection::new(&scene).ray(DVec2::new(column + 0.5, row + 0.5));
-        Some((*stage.objects.get(found.object)?, origin + found.distance * direction))
+        let line = stage.line_of(found.object)?;
+        (!self.is_locked(project, line)).then(|| (line, origin + found.distance * direction))
+    }
+
+    /// The outline of some lines' objects.
+    fn outline_of(&self, project: &Project, stage: &Stage, is_in: impl Fn(usize) -> bool) -> Option<String> {
+        let scene = self.sound_scene(project, stage)?;
+        let is_any = stage.objects.iter().any(|&line| is_in(line));
+        let is_in = |object: usize| stage.line_of(object).is_some_and(&is_in);
+        if is_any { silhouette::outline(&scene, is_in).ok() } else { None }
+    }
+
+    /// What is under the pointer now, and its outline, if that is something else than before.
+    pub(super) fn hover(&mut self, project: &Project, x: f64, y: f64, tell: &mut Tell) {
+        let line = self.pick(project, x, y).map(|(line, _)| line);
+        tell.hovered = Some(line);
+        if line != self.hovered {
+            self.hovered = line;
+            let stage = self.stage(project);
+            let path = line.filter(|line| !self.selection.contains(line));
+            let path = path.and_then(|line| self.outline_of(project, &stage, |other| other == line));
+            tell.hover_outline = Some(path.unwrap_or_default());
+        }
     }
 
     pub(super) fn outline(&self, project: &Project, tell: &mut Tell) {
         let stage = self.stage(project);
-        let scene = self.sound_scene(project, &stage);
-        let is_in =
-            |object: usize| stage.objects.get(object).is_some_and(|line| self.selection.contains(line));
-        let any = self.selection.iter().any(|line| stage.objects.contains(line));
-        let path = scene.filter(|_| any).and_then(|scene| silhouette::outline(&scene, is_in).ok());
+        let path = self.outline_of(project, &stage, |line| self.selection.contains(&line));
         tell.outline = Some(path.unwrap_or_default());
+        tell.ghosts = Some(self.ghosts(project));
     }
 
     pub(super) fn navigate(&mut self, project: &Project, how: Navigation, moved: DVec2) {
@@ -118,8 +162,7 @@ impl Session {
             Standpoint::Side => Some(Orbit::at(bounds, quarter, 0.0)),
             Standpoint::Top => Some(Orbit::at(bounds, 0.0, quarter)),
             Standpoint::Selection => {
-                let lines = self.selection.iter().filter_map(|&line| self.line(project, line));
-                let what = edits::bounds(lines).unwrap_or(bounds);
+                let what = self.selected_bounds(project).unwrap_or(bounds);
                 let from = self.orbit(project);
                 from.map(|from| Orbit { half_fov: from.half_fov, ..Orbit::at(what, from.yaw, from.pitch) })
             }
@@ -151,6 +194,11 @@ impl Session {
         self.free = None;
         Change::Still
     }
+}
+
+/// A scene of another frame as it is seen now.
+pub(super) fn picture_of(scene: Scene, now: &Scene) -> Scene {
+    Scene { screen: now.screen, camera: now.camera.clone(), ..scene }
 }
 
 /// A size of a picture, smaller than asked for where that is too large.

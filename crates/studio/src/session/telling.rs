@@ -7,12 +7,13 @@ use super::sight::grid_path;
 use super::{Answer, Change, Session};
 use crate::document::Splice;
 use crate::edits;
-use crate::handles::{Values, handles};
+use crate::handles::handles;
 use crate::line::Line;
 use crate::pictures::Wanted;
 use crate::project::Project;
-use crate::protocol::{FaultState, FileState, Inspected, LineState, LinesChanged, State, Tell};
+use crate::protocol::{FaultState, FileState, LineState, LinesChanged, State, Tell};
 use crate::tables::role;
+use crate::values::Values;
 use crate::view::Projection;
 
 impl Session {
@@ -39,6 +40,11 @@ impl Session {
                 Some(Wanted { scene: scene.clone(), moving, number: self.pictures })
             }
         };
+        if change != Change::Nothing {
+            // What was outlined may look otherwise now.
+            self.hovered = None;
+        }
+        tell.tracks = self.new_tracks(project);
         tell.state = Some(self.state(project, scene.as_ref()));
         Answer { tell, picture, shown: false, output: None }
     }
@@ -49,25 +55,25 @@ impl Session {
         let lines = file.document.lines();
         let mut shown = Vec::new();
         let mut grid = String::new();
+        let (mut way, mut marks) = (String::new(), String::new());
+        let (stage, time) = (self.stage(project), self.time(project));
         if let Some(scene) = scene {
             let projection = Projection::new(scene);
             let around = self.around(project);
             if !matches!(self.held, Some(Held::Turn(_)))
                 && let Some(&line) = self.selection.last()
-                && let Some(text) = lines.get(line)
+                && let Some(values) = lines.get(line).and_then(|text| Values::of(text, time))
+                && !stage.is_in_group(line)
+                && !self.is_locked(project, line)
             {
-                shown = handles(line, text, &projection, around);
+                shown = handles(line, &values, &projection, around);
             }
+            (way, marks) = self.motion_path(project, &projection, &stage);
             if self.free.is_some() {
                 grid = grid_path(&projection, self.bounds(project));
             }
         }
-        let inspected = self.selection.last().and_then(|&line| {
-            let text = lines.get(line)?;
-            let (values, words) = (Values::of(text)?, text.words()?);
-            let numbers = (0..words.parameters.len()).map(|at| values.number(at)).collect();
-            Some(Inspected { line, command: values.command.name(), values: numbers })
-        });
+        let inspected = self.selection.last().and_then(|&line| self.inspected(project, line));
         let faults = file
             .diagnostics
             .iter()
@@ -95,6 +101,10 @@ impl Session {
             faults,
             handles: shown,
             grid,
+            way,
+            marks,
+            locked: self.locked_lines(project),
+            time: self.time_state(project),
             free: self.free.is_some(),
             picture: scene.map(|scene| (self.pictures, scene.screen.width(), scene.screen.height())),
         }
@@ -104,14 +114,29 @@ impl Session {
         self.file_lines(project).iter().map(line_state).collect()
     }
 
-    /// The selection stays with its lines.
+    /// What is selected, locked and copied stays with its lines.
     pub(super) fn told(&mut self, splices: Vec<Splice>, tell: &mut Tell) {
+        let file = self.shown_file;
+        if splices.iter().any(|splice| splice.removed != splice.inserted.len())
+            && !matches!(self.held, Some(Held::Turn(_)))
+        {
+            // What is held stands elsewhere now.
+            self.held = None;
+        }
         for splice in &splices {
-            let (end, inserted) = (splice.at + splice.removed, splice.inserted.len());
-            self.selection.retain(|&line| line < splice.at || line >= end || inserted == splice.removed);
-            for line in self.selection.iter_mut().filter(|line| **line >= end) {
-                *line = *line + inserted - splice.removed;
-            }
+            self.selection = self.selection.iter().filter_map(|&line| after(splice, line)).collect();
+            let locked = self
+                .locked
+                .iter()
+                .filter_map(|&(of, line)| Some((of, if of == file { after(splice, line)? } else { line })));
+            self.locked = locked.collect();
+            self.copied.retain_mut(|copied| match after(splice, copied.place.line) {
+                Some(line) => {
+                    copied.place.line = line;
+                    true
+                }
+                None => false,
+            });
         }
         tell.splices.extend(splices.into_iter().map(|splice| LinesChanged {
             at: splice.at,
@@ -119,6 +144,15 @@ impl Session {
             lines: splice.inserted.iter().map(line_state).collect(),
         }));
     }
+}
+
+/// Where a line is after a change; `None` if it has gone.
+fn after(splice: &Splice, line: usize) -> Option<usize> {
+    let (end, inserted) = (splice.at + splice.removed, splice.inserted.len());
+    if line < splice.at || line < end && inserted == splice.removed {
+        return Some(line);
+    }
+    (line >= end).then(|| line + inserted - splice.removed)
 }
 
 fn line_state(line: &Line) -> LineState {
@@ -131,6 +165,7 @@ fn line_state(line: &Line) -> LineState {
         command: command.map(Command::name),
         role: command.map(role),
         name: of.name(),
+        subject: of.subject().map(str::to_owned),
         hidden: hidden.is_some(),
     }
 }

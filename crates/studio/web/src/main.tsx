@@ -3,12 +3,14 @@
 import { render } from "preact";
 
 import { listen } from "./actions";
-import { Bar, Frames, Keys, Notices, Palette } from "./chrome";
+import { Bar, Keys, Notices, Palette } from "./chrome";
 import { Inspector } from "./inspector";
+import { Materials } from "./materials";
 import { Outliner } from "./outliner";
 import { Script } from "./script";
 import { connect } from "./store";
 import "./studio.css";
+import { Timeline } from "./timeline";
 import { Viewport } from "./viewport";
 
 function Studio() {
@@ -20,10 +22,11 @@ function Studio() {
         <div class="side">
           <Palette />
           <Outliner />
+          <Materials />
         </div>
         <div class="middle">
           <Viewport />
-          <Frames />
+          <Timeline />
         </div>
         <div class="side">
           <Inspector />

@@ -3,15 +3,20 @@
 
 import { batch, computed, signal } from "@preact/signals";
 
-import type { Ask, Command, FileState, Line, Output, State, Tell } from "./protocol";
+import type { Ask, Command, FileState, Ghost, Line, Output, State, Tell, Tracks } from "./protocol";
 
 export const connected = signal(true);
 export const tables = signal<readonly Command[]>([]);
+/** The names of materials to begin with. */
+export const presets = signal<readonly string[]>([]);
 export const files = signal<readonly FileState[]>([]);
 export const lines = signal<readonly Line[]>([]);
 export const state = signal<State | null>(null);
 export const hovered = signal<number | null>(null);
 export const outline = signal("");
+export const hoverOutline = signal("");
+export const ghosts = signal<readonly Ghost[]>([]);
+export const tracks = signal<Tracks>({ tracks: [], more: false });
 export const output = signal<Output | null>(null);
 export const notice = signal("");
 export const playing = signal(false);
@@ -94,6 +99,7 @@ export function connect(): void {
 function hear(tell: Tell): void {
   batch(() => {
     if (tell.tables) tables.value = tell.tables;
+    if (tell.presets) presets.value = tell.presets;
     if (tell.files) files.value = tell.files;
     if (tell.lines) lines.value = tell.lines;
     if (tell.splices) {
@@ -117,6 +123,9 @@ function hear(tell: Tell): void {
       }
     }
     if (tell.outline !== undefined) outline.value = tell.outline;
+    if (tell.hoverOutline !== undefined) hoverOutline.value = tell.hoverOutline;
+    if (tell.ghosts) ghosts.value = tell.ghosts;
+    if (tell.tracks) tracks.value = tell.tracks;
     if (tell.output) output.value = tell.output;
     if (tell.notice) notice.value = tell.notice;
   });

@@ -1,0 +1,118 @@
+// What the page's tests share: a browser, and pages of servers of their own. Whatever is started here is ended here.
+
+import assert from "node:assert/strict";
+import { spawnSync } from "node:child_process";
+import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before } from "node:test";
+
+import { chromium } from "playwright-core";
+
+import { start } from "./processes.mjs";
+
+export const program = process.env.RAYFOLD;
+export const scenes = join(import.meta.dirname, "../../../../scenes");
+const shots = process.env.SHOTS;
+
+let browser;
+before(async () => {
+  browser = await chromium.launch({ executablePath: process.env.CHROMIUM, args: ["--no-sandbox"] });
+});
+after(() => browser?.close());
+
+/** A page of a server that serves a copy of `from`, or a new script with `text`. */
+export async function open(t, { from, text, name = "scene.txt", scheme = "light", blank = text === "", args = [], env = {} }) {
+  const folder = mkdtempSync(join(tmpdir(), "rayfold-studio-"));
+  const path = join(folder, name);
+  if (from) cpSync(from, path, { recursive: true });
+  if (text !== undefined) writeFileSync(path, text);
+  const { server, ended, said } = start(program, ["studio", path, "--no-open", ...args], env);
+  const address = (await said((text) => text.includes("\n"))).trim();
+  const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, colorScheme: scheme });
+  const page = await context.newPage();
+  const faults = [];
+  const outside = [];
+  page.on("pageerror", (error) => faults.push(String(error)));
+  page.on("console", (message) => message.type() === "error" && faults.push(message.text()));
+  page.on("request", (sent) => {
+    if (!sent.url().startsWith(address) && !/^(data|blob):/.test(sent.url())) outside.push(sent.url());
+  });
+  t.after(async () => {
+    await context.close();
+    server.kill("SIGINT");
+    await ended;
+    rmSync(folder, { recursive: true, force: true });
+  });
+  await page.goto(address);
+  const drawn = () => page.locator("canvas").getAttribute("data-picture");
+  if (!blank) await until(async () => (await drawn()) !== null);
+  /** Waits until the picture that was ordered last is on the canvas. */
+  const settled = async () => {
+    let last = "";
+    await until(async () => {
+      const now = `${await drawn()}`;
+      const same = now === last;
+      last = now;
+      await page.waitForTimeout(150);
+      return same;
+    });
+  };
+  const saved = async () => {
+    await page.waitForTimeout(300);
+    await page.getByText("saved", { exact: true }).waitFor();
+    return readFileSync(path, "utf8");
+  };
+  const check = () => {
+    assert.deepEqual(faults, [], "errors of the page");
+    assert.deepEqual(outside, [], "nothing but its own server");
+  };
+  return { page, context, path, folder, address, settled, saved, check, ended, server };
+}
+
+export async function until(condition, patience = 20_000) {
+  const end = Date.now() + patience;
+  while (!(await condition())) {
+    assert.ok(Date.now() < end, `waited in vain for ${condition}`);
+    await new Promise((resolve) => setTimeout(resolve, 40));
+  }
+}
+
+/** Whether the canvas shows what the command line draws of a script, level by level. */
+export async function isDrawn(page, path, frame = 1) {
+  const size = await page.locator("canvas").evaluate((canvas) => `${canvas.width}x${canvas.height}`);
+  const out = `${path}.${frame}.png`;
+  const run = spawnSync(program, ["render", path, "-o", out, "--size", size, "--frame", String(frame)]);
+  assert.equal(run.status, 0, String(run.stderr));
+  const png = readFileSync(out).toString("base64");
+  rmSync(out);
+  const differ = await page.locator("canvas").evaluate(async (shown, png) => {
+    const image = new Image();
+    image.src = `data:image/png;base64,${png}`;
+    await image.decode();
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [image.width, image.height];
+    canvas.getContext("2d").drawImage(image, 0, 0);
+    const levels = (of) => of.getContext("2d").getImageData(0, 0, image.width, image.height).data;
+    const [a, b] = [levels(shown), levels(canvas)];
+    return a.reduce((differ, level, at) => differ + (level === b[at] ? 0 : 1), 0);
+  }, png);
+  assert.equal(differ, 0, `levels that differ, of ${size}`);
+}
+
+/** A point of the window over a point of the picture, given by shares of its sides. */
+export async function over(page, x, y) {
+  const box = await page.locator("canvas").boundingBox();
+  return [box.x + x * box.width, box.y + y * box.height];
+}
+
+export async function drag(page, from, to, steps = 8) {
+  await page.mouse.move(...from);
+  await page.mouse.down();
+  await page.mouse.move(...to, { steps });
+  await page.mouse.up();
+}
+
+export async function shot(page, name) {
+  if (shots) await page.screenshot({ path: join(shots, `studio-${name}.png`) });
+}
