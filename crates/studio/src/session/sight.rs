@@ -198,7 +198,7 @@ impl Session {
 
 /// A scene of another frame as it is seen now.
 pub(super) fn picture_of(scene: Scene, now: &Scene) -> Scene {
-    Scene { screen: now.screen, camera: now.camera.clone(), ..scene }
+    Scene { screen: now.screen, camera: now.camera, ..scene }
 }
 
 /// A size of a picture, smaller than asked for where that is too large.

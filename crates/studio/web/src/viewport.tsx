@@ -105,6 +105,8 @@ export function Viewport(): JSX.Element {
   const release = (): void => {
     if (held.current) ask({ ask: "release" });
     held.current = null;
+    // It was that of what stood there before.
+    hoverOutline.value = "";
   };
   const keyed = (event: KeyboardEvent, handle: Handle): void => {
     const ways: Record<string, Point> = {
