@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The files of tests, in the page's folder.
-const TESTS: [&str; 3] = ["tests/page.mjs", "tests/files.mjs", "tests/runs.mjs"];
+const TESTS: [&str; 4] = ["tests/page.mjs", "tests/files.mjs", "tests/runs.mjs", "tests/time.mjs"];
 
 /// The names of the browser, in the order in which they are tried.
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];

@@ -4,15 +4,22 @@
 //! `docs/language.md` writes it, with no function whose last bit differs between machines. Knows nothing of text but
 //! how a curve is written.
 //!
-//! Invariants: at least two keys, their frames finite and strictly increasing; no value overflows at any time.
+//! Invariants: at least one key, and two where it cycles, their frames finite and strictly increasing; no value overflows
+//! at any time.
 
 use std::fmt::{self, Display, Formatter};
 
 use crate::form::write_number;
 
 /// A number that changes with time.
+///
+/// ```
+/// let curve = rayfold_scene::parse_curve("(smooth 1:0 25:3)").unwrap();
+/// assert_eq!(curve.at(13.0), 1.5);
+/// assert_eq!(curve.with_key(13.0, 2.0).unwrap().to_string(), "(smooth 1:0 13:2 25:3)");
+/// ```
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Curve {
+pub struct Curve {
     mode: Mode,
     cycle: bool,
     keys: Vec<Key>,
@@ -21,14 +28,16 @@ pub(crate) struct Curve {
 
 /// What a number is at a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Key {
-    pub(crate) frame: f64,
-    pub(crate) value: f64,
+pub struct Key {
+    /// When; not always a whole number.
+    pub frame: f64,
+    /// What.
+    pub value: f64,
 }
 
 /// What happens between two keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Mode {
+pub enum Mode {
     /// In a straight line.
     #[default]
     Linear,
@@ -41,10 +50,10 @@ pub(crate) enum Mode {
 
 impl Mode {
     /// All of them, in the order of the documentation.
-    pub(crate) const ALL: &[Self] = &[Self::Linear, Self::Smooth, Self::Step];
+    pub const ALL: &[Self] = &[Self::Linear, Self::Smooth, Self::Step];
 
     /// The word that asks for it.
-    pub(crate) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
             Self::Smooth => "smooth",
@@ -81,12 +90,58 @@ pub(crate) struct Moment {
 const SLACK: f64 = 1.0 / (1u64 << 43) as f64;
 
 impl Curve {
-    /// `keys` are at least two, their frames finite and strictly increasing.
+    /// Through keys; `None` where there is no key, or one of a cycle, where their frames and values are not finite or the
+    /// frames not strictly increasing, and where a value between them overflows.
+    pub fn through(mode: Mode, cycle: bool, keys: Vec<Key>) -> Option<Self> {
+        let is_finite = keys.iter().all(|key| key.frame.is_finite() && key.value.is_finite());
+        let is_in_order = keys.windows(2).all(|pair| pair[0].frame < pair[1].frame);
+        let is_enough = keys.len() > usize::from(cycle);
+        if is_finite && is_in_order && is_enough { Self::new(mode, cycle, keys).ok() } else { None }
+    }
+
+    /// What happens between two keys.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Whether it starts again at its last key.
+    pub fn is_cycle(&self) -> bool {
+        self.cycle
+    }
+
+    /// Its keys, their frames strictly increasing; at least one.
+    pub fn keys(&self) -> &[Key] {
+        &self.keys
+    }
+
+    /// The key that decides the value at a time, if one stands just there: of a cycle that of its first time around, and at
+    /// its end the first.
+    pub fn key_at(&self, frame: f64) -> Option<Key> {
+        let frame = if self.cycle { self.within_cycle(frame) } else { frame };
+        self.keys.iter().find(|key| key.frame == frame).copied()
+    }
+
+    /// The same with a key at a time, instead of one that stands there; of a cycle where that time lies the first time around.
+    /// `None` where a value overflows then.
+    pub fn with_key(&self, frame: f64, value: f64) -> Option<Self> {
+        let frame = if self.cycle { self.within_cycle(frame) } else { frame };
+        let mut keys = self.keys.clone();
+        let at = keys.partition_point(|key| key.frame < frame);
+        match keys.get_mut(at) {
+            Some(key) if key.frame == frame => key.value = value,
+            _ => keys.insert(at, Key { frame, value }),
+        }
+        Self::through(self.mode, self.cycle, keys)
+    }
+
+    /// `keys` are at least one, and two of a cycle, their frames finite and strictly increasing.
     ///
     /// # Errors
     /// The place of the first key after which a value overflows.
     pub(crate) fn new(mode: Mode, cycle: bool, keys: Vec<Key>) -> Result<Self, Overflow> {
-        debug_assert!(keys.len() >= 2 && keys.windows(2).all(|pair| pair[0].frame < pair[1].frame));
+        debug_assert!(
+            keys.len() > usize::from(cycle) && keys.windows(2).all(|pair| pair[0].frame < pair[1].frame)
+        );
         let largest = keys.iter().fold(0.0, |largest: f64, key| largest.max(key.value.abs()));
         let curve = Self { mode, cycle, keys, largest };
         match (0..curve.keys.len() - 1).find(|&i| !curve.is_bounded(i)) {
@@ -97,7 +152,7 @@ impl Curve {
     }
 
     /// Its value at a time.
-    pub(crate) fn at(&self, frame: f64) -> f64 {
+    pub fn at(&self, frame: f64) -> f64 {
         let (first, last) = (self.keys[0], self.keys[self.keys.len() - 1]);
         let frame = if self.cycle { self.within_cycle(frame) } else { frame };
         if frame <= first.frame {
@@ -282,6 +337,31 @@ mod tests {
         check(30.0, 2.2);
         check(50.0, -1.0);
         check(1e300, -1.0);
+    }
+
+    #[test]
+    fn keys_are_set_where_a_cycle_is_for_the_first_time() {
+        let key = |frame, value| Key { frame, value };
+        let once = curve(Mode::Smooth, false, &[(1.0, 5.0)]);
+        assert_eq!((once.at(-3.0), once.at(1.0), once.at(9.0)), (5.0, 5.0, 5.0));
+        assert_eq!(once.to_string(), "(smooth 1:5)");
+        assert_eq!(once.with_key(7.0, 2.0).unwrap().keys(), [key(1.0, 5.0), key(7.0, 2.0)]);
+        assert_eq!(once.with_key(1.0, 2.0).unwrap().keys(), [key(1.0, 2.0)]);
+        let cycle = curve(Mode::Linear, true, &[(1.0, 0.0), (5.0, 8.0)]);
+        for (frame, expected) in
+            [(7.0, "(cycle 1:0 3:9 5:8)"), (5.0, "(cycle 1:9 5:8)"), (-3.0, "(cycle 1:9 5:8)")]
+        {
+            let set = cycle.with_key(frame, 9.0).unwrap();
+            assert_eq!((set.to_string().as_str(), set.at(frame)), (expected, 9.0));
+            assert_eq!(set.key_at(frame).unwrap().value, 9.0);
+        }
+        assert_eq!(cycle.key_at(3.0), None);
+        let through = |cycle, keys: &[Key]| Curve::through(Mode::Linear, cycle, keys.to_vec());
+        assert_eq!(through(false, &[]), None);
+        assert_eq!(through(true, &[key(1.0, 0.0)]), None);
+        assert_eq!(through(false, &[key(1.0, 0.0), key(1.0, 1.0)]), None);
+        assert_eq!(through(false, &[key(1.0, f64::NAN)]), None);
+        assert_eq!(through(false, &[key(0.0, -1e308), key(1.0, 1e308)]), None);
     }
 
     #[test]

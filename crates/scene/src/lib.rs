@@ -30,6 +30,7 @@ mod shared_slice;
 mod shown;
 
 pub use command::Command;
+pub use curve::{Curve, Key, Mode};
 pub use diagnostic::{Code, Diagnostic, Severity};
 pub use form::{Field, Form, Kind, Names, Presence, Subject, Together, Unit, Values};
 pub use language::{CommandEntry, Language, ModeEntry, ParameterEntry, SubjectEntry, language};
@@ -40,7 +41,7 @@ pub use model::{
     Placement, Plane, Samples, Scene, Screen, Shine, Shutter, Sphere, Tone, Torus, Triangle, Weight,
 };
 pub use natural::{SETTINGS_FILE, natural_cmp, script_name};
-pub use parse::{Parsed, parse};
+pub use parse::{Parsed, parse, parse_curve};
 pub use script::{Script, ShotSummary};
 pub use settings::{AnimationSettings, ParsedSettings, parse_settings};
 pub use shared_slice::SharedSlice;

@@ -2,15 +2,13 @@
 //! splices out.
 
 use glam::DVec3;
-use rayfold_scene::{Command, Kind, Parameter, Presence, Scene};
-use rayfold_tracer::RenderOptions;
-use rayfold_tracer::probe::nearest_hits;
+use rayfold_scene::{Command, Kind, Parameter, Presence, parse_curve};
 
 use crate::document::Splice;
-use crate::handles::Values;
 use crate::line::{Line, written};
 use crate::stage::Stage;
 use crate::tables::{Role, fields, role};
+use crate::values::{Keying, Values, changed, tidy};
 use crate::view::Bounds;
 
 /// The colours of new objects, in turn: diffuse coefficients.
@@ -40,14 +38,16 @@ pub(crate) fn new_line(command: Command, ground: DVec3, size: f64, count: usize)
     let round = |x: f64| format!("{x:.decimals$}").parse::<f64>().unwrap_or(x);
     let all = || fields(command).map(|(_, field)| field).filter(|field| field.presence == Presence::Required);
     let places = all().filter(|field| field.kind == Kind::Position).count();
-    let is_round = all().any(|field| field.kind == Kind::Length) && places == 1;
+    let has_length = all().any(|field| field.kind == Kind::Length);
+    let is_round = has_length && places == 1;
     let color = COLORS[count % COLORS.len()];
-    let (mut place, mut length) = (0, 0);
+    let (mut place, mut length) = (0u8, 0);
     let mut text = command.name().to_owned();
     for field in all() {
         let values: Vec<f64> = match field.kind {
             Kind::Position => {
                 let off = match (places, place) {
+                    (2, _) if has_length => DVec3::Y * (1.6 * f64::from(place)),
                     (1, _) => DVec3::Y * if is_round { 1.0 } else { 0.0 },
                     (2, 0) => DVec3::new(-0.8, 0.0, -0.8),
                     (2, _) => DVec3::new(0.8, 1.6, 0.8),
@@ -121,7 +121,8 @@ pub(crate) fn duplicate(lines: &[Line], which: &[usize], aside: f64) -> (Vec<Spl
     which.dedup();
     let copies = which.iter().enumerate().map(|(i, line)| line + 1 + i).collect();
     let copy = |at: usize| {
-        let line = moved(&lines[at], DVec3::new(aside, 0.0, 0.0)).unwrap_or_else(|| lines[at].clone());
+        let line = moved(&lines[at], DVec3::new(aside, 0.0, 0.0), Keying::ALWAYS)
+            .unwrap_or_else(|| lines[at].clone());
         let name = line.name().map(|name| format!("{name} copy"));
         let line = name.and_then(|name| line.named(&name)).unwrap_or(line);
         Splice { at: at + 1, removed: 0, inserted: vec![line] }
@@ -130,14 +131,12 @@ pub(crate) fn duplicate(lines: &[Line], which: &[usize], aside: f64) -> (Vec<Spl
 }
 
 /// A line with all its positions moved; those numbers that stay are not touched.
-pub(crate) fn moved(line: &Line, by: DVec3) -> Option<Line> {
-    let values = Values::of(line)?;
+pub(crate) fn moved(line: &Line, by: DVec3, keying: Keying) -> Option<Line> {
+    let values = Values::of(line, keying.time)?;
     values.positions().try_fold(line.clone(), |line, (first, position)| {
-        let to = position + by;
-        let tidy = |axis: usize| {
-            if by[axis] == 0.0 { position[axis] } else { (to[axis] * 1e9).round() / 1e9 }
-        };
-        line.with_numbers(first, &[tidy(0), tidy(1), tidy(2)])
+        let to = [0, 1, 2]
+            .map(|axis| if by[axis] == 0.0 { position[axis] } else { tidy(position[axis] + by[axis]) });
+        changed(&line, first, &to, keying)
     })
 }
 
@@ -148,9 +147,20 @@ pub(crate) fn hidden(line: &Line) -> Option<Line> {
     let inner = line.with_text(inner.strip_prefix(' ').unwrap_or(inner));
     let command = inner.command()?;
     let words = inner.words()?;
-    let is_meant = role(command) != Role::Setting
-        && command.form().takes(words.parameters.len())
-        && words.parameters.iter().all(|word| inner.number(word).is_some());
+    let form = command.form();
+    let is_number = |word| inner.number(word).is_some() || parse_curve(inner.word(word)).is_some();
+    let is_named = form.surface().is_some_and(|at| {
+        words.parameters.len() == at + 1 && words.parameters.last().is_some_and(|word| !is_number(word))
+    });
+    let numbers = words.parameters.len() - usize::from(is_named);
+    let is_meant = match role(command) {
+        Role::Object | Role::Light | Role::Camera | Role::Use => {
+            (is_named || form.takes(numbers))
+                && words.parameters.iter().take(numbers).all(is_number)
+                && form.subject.is_some() == words.subject.is_some()
+        }
+        Role::Group | Role::Material | Role::Setting => false,
+    };
     is_meant.then_some(inner)
 }
 
@@ -184,35 +194,37 @@ pub(crate) fn reorder(
     Some((vec![Splice { at: first, removed: last + 1, inserted }], other))
 }
 
-/// Where the objects and lamps of some lines are.
-pub(crate) fn bounds<'a>(lines: impl IntoIterator<Item = &'a Line>) -> Option<Bounds> {
-    let values = lines.into_iter().filter_map(Values::of);
+/// The `Trace` of a frame is so many frames.
+pub(crate) fn set_frames(lines: &[Line], stage: &Stage, count: u32) -> Vec<Splice> {
+    let number = |count: u32| f64::from(count);
+    let old = stage.frames.and_then(|at| Some((at, lines.get(at)?)));
+    if let Some((at, line)) = old {
+        let words = line.words().map_or(0, |words| words.parameters.len());
+        let changed = match Values::of(line, 1.0).and_then(|values| values.number(0)) {
+            Some(first) if words > 1 => line.with_numbers(1, &[first - 1.0 + number(count)]),
+            _ => line.with_numbers(0, &[number(count)]),
+        };
+        return changed.map(|line| set(at, line)).into_iter().collect();
+    }
+    let frames = |count: u32| Line::new(&format!("{} {count}", Command::Frames.name()));
+    let Some(trace) = stage.trace else {
+        let inserted = vec![frames(count)];
+        return vec![Splice { at: lines.len(), removed: 0, inserted }];
+    };
+    // Those that follow stay what they were.
+    let follows = lines[trace + 1..].iter().any(|line| line.command() == Some(Command::Trace));
+    let behind = Splice { at: trace + 1, removed: 0, inserted: vec![frames(1)] };
+    let before = Splice { at: trace, removed: 0, inserted: vec![frames(count)] };
+    if follows { vec![behind, before] } else { vec![before] }
+}
+
+/// Where the lamps and groups of some lines are.
+pub(crate) fn places<'a>(lines: impl IntoIterator<Item = &'a Line>, time: f64) -> Option<Bounds> {
+    let values = lines.into_iter().filter_map(|line| Values::of(line, time));
     Bounds::of(values.filter(|values| role(values.command) != Role::Camera).flat_map(|values| {
         let reach = values.reach();
         values.positions().map(|(_, position)| (position, reach)).collect::<Vec<_>>()
     }))
-}
-
-/// Objects fall together until one of them rests on what is below, or on the height 0 where nothing is.
-pub(crate) fn drop_down(lines: &[Line], stage: &Stage, scene: &Scene, which: &[usize]) -> Vec<Splice> {
-    let chosen = || which.iter().filter_map(|&at| Some((at, lines.get(at)?)));
-    let others = stage.objects.iter().zip(scene.objects.iter()).filter(|(line, _)| !which.contains(line));
-    let others: Vec<_> = others.map(|(_, object)| object).cloned().collect();
-    let mut below = scene.clone();
-    below.objects = others.into();
-    let falls = chosen().filter_map(|(_, line)| {
-        let bounds = bounds([line])?;
-        // From its middle: what it lies on is not below its lowest point.
-        let from = bounds.center();
-        let hit = nearest_hits(&below, &[(from, DVec3::NEG_Y)], &RenderOptions::default()).ok()?;
-        let height = from.y - bounds.low.y;
-        Some(
-            hit.into_iter().next().flatten().map_or(bounds.low.y, |found| (found.distance - height).max(0.0)),
-        )
-    });
-    let Some(fall) = falls.reduce(f64::min) else { return Vec::new() };
-    let fall = (fall * 1e9).round() / 1e9;
-    chosen().filter_map(|(at, line)| Some(set(at, moved(line, DVec3::NEG_Y * fall)?))).collect()
 }
 
 #[cfg(test)]
@@ -228,10 +240,9 @@ mod tests {
         String::from_utf8(document.bytes()).unwrap()
     }
 
-    fn sound(text: &str) -> Scene {
+    fn check(text: &str) {
         let parsed = rayfold_scene::parse("a", text.as_bytes(), &Default::default());
         assert!(parsed.diagnostics.is_empty(), "{text}\n{:?}", parsed.diagnostics);
-        parsed.script.unwrap().frame(0).unwrap()
     }
 
     #[test]
@@ -243,9 +254,9 @@ mod tests {
             for text in ["", "# mine", "Screen 4 3\r\nTrace\r\n", "Screen 4 3\nTrace"] {
                 let lines = Line::split(text.as_bytes());
                 let line = new_line(command, DVec3::new(1.0, 0.0, -2.0), 0.7, 3);
-                let (splices, at) = add(&lines, &Stage::of(&lines, 0), line);
+                let (splices, at) = add(&lines, &Stage::of(&lines, 0, 1.0), line);
                 let text = after(text, splices);
-                sound(&text);
+                check(&text);
                 assert_eq!(Line::split(text.as_bytes())[at].command(), Some(command), "{text}");
             }
         }
@@ -268,20 +279,24 @@ mod tests {
         let lines = Line::split(gone.as_bytes());
         assert_eq!(after(&gone, hide(&lines, &[1, 3])), TEXT);
         assert!(hidden(&lines[2]).is_some() && hidden(&lines[4]).is_none());
+        let is_hidden = |text: &str| hidden(&Line::new(text)).is_some();
+        assert!(is_hidden("# Sphere (1:1 9:2) 0 0 0 red") && is_hidden("#Use table 1 2 3"));
+        assert!(!is_hidden("# Use of tools") && !is_hidden("# Sphere of influence"));
     }
 
     #[test]
-    fn an_object_falls_onto_what_is_below() {
-        let lines = Line::split(TEXT.as_bytes());
-        let fallen = after(TEXT, drop_down(&lines, &Stage::of(&lines, 0), &sound(TEXT), &[1]));
-        assert_eq!(fallen, TEXT.replace("0 5 0", "0 1.5 0"));
-        let lines = Line::split(fallen.as_bytes());
-        let again = drop_down(&lines, &Stage::of(&lines, 0), &sound(&fallen), &[1]);
-        assert_eq!(after(&fallen, again), fallen, "it lies");
-        let raised = TEXT.replace("-2 0 -2  2 .5 2", "-2 2 -2  2 2.5 2");
-        let lines = Line::split(raised.as_bytes());
-        let fallen = after(&raised, drop_down(&lines, &Stage::of(&lines, 0), &sound(&raised), &[3]));
-        assert_eq!(fallen, raised.replace("-2 2 -2  2 2.5 2", "-2 0 -2  2 0.5 2"), "the ground is at 0");
+    fn a_trace_becomes_so_many_frames() {
+        let set = |text: &str, frame, count| {
+            let lines = Line::split(text.as_bytes());
+            after(text, set_frames(&lines, &Stage::of(&lines, frame, 1.0), count))
+        };
+        assert_eq!(set("Screen 4 3\nTrace\n", 0, 50), "Screen 4 3\nFrames 50\nTrace\n");
+        assert_eq!(set("Screen 4 3\nFrames 9 # all\nTrace\n", 4, 50), "Screen 4 3\nFrames 50 # all\nTrace\n");
+        assert_eq!(set("Screen 4 3\nFrames 11 20\nTrace\n", 4, 5), "Screen 4 3\nFrames 11 15\nTrace\n");
+        let two = "Screen 4 3\nTrace\nClear\nTrace";
+        assert_eq!(set(two, 0, 5), "Screen 4 3\nFrames 5\nTrace\nFrames 1\nClear\nTrace");
+        assert_eq!(set(two, 1, 5), "Screen 4 3\nTrace\nClear\nFrames 5\nTrace");
+        assert_eq!(set("", 0, 5), "Frames 5\n");
     }
 
     #[test]
@@ -296,9 +311,9 @@ mod tests {
             [Some(Command::Sphere), Some(Command::Cuboid)]
         );
         let lines = Line::split(TEXT.as_bytes());
-        let (splices, at) = reorder(&lines, &Stage::of(&lines, 0), 1, true).unwrap();
+        let (splices, at) = reorder(&lines, &Stage::of(&lines, 0, 1.0), 1, true).unwrap();
         let text = after(TEXT, splices);
         assert_eq!((at, Line::split(text.as_bytes())[3].command()), (3, Some(Command::Sphere)));
-        assert!(reorder(&lines, &Stage::of(&lines, 0), 1, false).is_none());
+        assert!(reorder(&lines, &Stage::of(&lines, 0, 1.0), 1, false).is_none());
     }
 }

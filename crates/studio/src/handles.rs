@@ -2,15 +2,19 @@
 //! which numbers of its line become what.
 //!
 //! It knows commands only by the kinds of their parameters: a position is a handle, a length is one at its distance
-//! from the first position, a direction is the tip of an arrow. Invariant: a drag is computed from what stood when it
+//! from the first position, a direction is the tip of an arrow; angles and a scale are turned and pulled (`turning`). Invariant: a drag is computed from what stood when it
 //! began, so that going back to its start changes nothing.
 
+use std::cell::Cell;
+
 use glam::{DVec2, DVec3};
-use rayfold_scene::{Command, Kind};
+use rayfold_scene::{Command, Kind, Parameter};
 use serde::{Deserialize, Serialize};
 
 use crate::line::Line;
-use crate::tables::{Role, fields, of_kind, role};
+use crate::tables::{Role, fields, role};
+use crate::turning;
+use crate::values::{Keying, Values, changed};
 use crate::view::Projection;
 
 /// How long arrows are, in pixels of the picture.
@@ -48,6 +52,18 @@ pub(crate) enum Grip {
         /// Of the line's numbers, from 0.
         first: usize,
     },
+    /// One of the angles whose numbers begin here.
+    Turn {
+        /// Of the line's numbers, from 0.
+        first: usize,
+        /// Which: 0 is about x.
+        axis: usize,
+    },
+    /// The scale that is this number.
+    Scale {
+        /// Of the line's numbers, from 0.
+        first: usize,
+    },
 }
 
 /// Something to take hold of, in the picture.
@@ -63,54 +79,21 @@ pub(crate) struct Handle {
     pub(crate) at: [f64; 2],
     /// Where the line to it starts, in pixels.
     pub(crate) from: [f64; 2],
+    /// The way along which it goes, as the path of an SVG.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub(crate) way: String,
 }
 
-/// A line as numbers of its command; those that are not plain numbers are `None`.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Values {
-    /// Its command.
-    pub(crate) command: Command,
-    numbers: Vec<Option<f64>>,
-}
-
-impl Values {
-    /// `None` for a line without a command.
-    pub(crate) fn of(line: &Line) -> Option<Self> {
-        let (command, words) = (line.command()?, line.words()?);
-        Some(Self { command, numbers: words.parameters.iter().map(|word| line.number(word)).collect() })
-    }
-
-    /// A number of the line.
-    pub(crate) fn number(&self, at: usize) -> Option<f64> {
-        self.numbers.get(at).copied().flatten()
-    }
-
-    /// Three numbers of the line.
-    pub(crate) fn vector(&self, first: usize) -> Option<DVec3> {
-        Some(DVec3::new(self.number(first)?, self.number(first + 1)?, self.number(first + 2)?))
-    }
-
-    /// Its positions, each with where its numbers begin.
-    pub(crate) fn positions(&self) -> impl Iterator<Item = (usize, DVec3)> {
-        of_kind(self.command, Kind::Position).filter_map(|first| Some((first, self.vector(first)?)))
-    }
-
-    /// The greatest of its lengths.
-    pub(crate) fn reach(&self) -> f64 {
-        of_kind(self.command, Kind::Length).filter_map(|first| self.number(first)).fold(0.0, f64::max)
-    }
-}
-
-/// The handles of a line; `around` is where lights without a place are shown.
-pub(crate) fn handles(number: usize, line: &Line, projection: &Projection, around: DVec3) -> Vec<Handle> {
-    let Some(values) = Values::of(line) else { return Vec::new() };
+/// The handles of a line with these values; `around` is where lights without a place are shown.
+pub(crate) fn handles(number: usize, values: &Values, projection: &Projection, around: DVec3) -> Vec<Handle> {
     let mut handles = Vec::new();
-    let mut add = |grip, from: DVec3, to: DVec3, label: &str| {
+    let mut add = |grip, from: DVec3, to: DVec3, label: &str, way: String| {
         if let (Some(from), Some(at)) = (projection.point(from), projection.point(to)) {
             let label = format!("{} of {}", label, values.command.name());
-            handles.push(Handle { grip, line: number, label, at: at.into(), from: from.into() });
+            handles.push(Handle { grip, line: number, label, at: at.into(), from: from.into(), way });
         }
     };
+    let straight = String::new;
     let anchor = values.positions().next().map_or(around, |(_, position)| position);
     let arrow = ARROW * projection.pixel_at(anchor);
     let positions: Vec<_> = values.positions().collect();
@@ -124,6 +107,7 @@ pub(crate) fn handles(number: usize, line: &Line, projection: &Projection, aroun
                 middle,
                 middle + arrow * DVec3::AXES[axis],
                 &format!("along {name}: place"),
+                straight(),
             );
         }
     }
@@ -133,23 +117,47 @@ pub(crate) fn handles(number: usize, line: &Line, projection: &Projection, aroun
         match field.kind {
             Kind::Position => {
                 if let (Some(position), true) = (values.vector(first), positions.len() > 1) {
-                    add(Grip::Point { first }, position, position, &label);
+                    add(Grip::Point { first }, position, position, &label, straight());
                 }
             }
             Kind::Length if !positions.is_empty() => {
                 if let Some(length) = values.number(first) {
                     let at = anchor + length * toward(lengths, projection);
                     lengths += 1;
-                    add(Grip::Length { first }, anchor, at, &label);
+                    add(Grip::Length { first }, anchor, at, &label, straight());
                 }
             }
             Kind::Direction => {
                 if let Some(direction) = values.vector(first).and_then(DVec3::try_normalize) {
                     let tip = anchor + arrow * facing(values.command) * direction;
-                    add(Grip::Direction { first }, anchor, tip, &label);
+                    add(Grip::Direction { first }, anchor, tip, &label, straight());
                 }
             }
-            _ => {}
+            Kind::Rotation => {
+                if let Some(degrees) = values.vector(first) {
+                    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+                        let (_, reference) = turning::frame(degrees, axis);
+                        let radius = turning::RADIUS * arrow;
+                        let way = turning::circle(projection, anchor, degrees, axis, radius);
+                        let label = format!("about {name}: {label}");
+                        add(Grip::Turn { first, axis }, anchor, anchor + radius * reference, &label, way);
+                    }
+                }
+            }
+            Kind::Plain if field.parameter == Parameter::Scale => {
+                let (right, up, _) = projection.axes();
+                let at = anchor + arrow * turning::SCALE * (right + up);
+                add(Grip::Scale { first }, anchor, at, &label, straight());
+            }
+            Kind::Count(_)
+            | Kind::Length
+            | Kind::WindowPosition
+            | Kind::Angle
+            | Kind::Plain
+            | Kind::Color
+            | Kind::Coefficients
+            | Kind::Error
+            | Kind::Word => {}
         }
     }
     handles
@@ -179,6 +187,9 @@ pub(crate) struct Drag {
     lines: Vec<(usize, Line, Values)>,
     /// Where it was taken hold of, in the world.
     grabbed: DVec3,
+    keying: Keying,
+    /// How far it has turned, so that several turns are.
+    turned: Cell<f64>,
 }
 
 /// How a drag is to be taken.
@@ -190,6 +201,9 @@ pub(crate) struct Manner {
     /// In steps of a grid.
     #[serde(default)]
     pub(crate) snap: bool,
+    /// Numbers that change are moved for all frames.
+    #[serde(default)]
+    pub(crate) whole: bool,
 }
 
 impl Drag {
@@ -199,10 +213,11 @@ impl Drag {
         lines: Vec<(usize, Line)>,
         grabbed: Option<DVec3>,
         around: DVec3,
+        keying: Keying,
     ) -> Option<Self> {
         let lines: Vec<_> = lines
             .into_iter()
-            .filter_map(|(number, line)| Values::of(&line).map(|values| (number, line, values)))
+            .filter_map(|(number, line)| Values::of(&line, keying.time).map(|values| (number, line, values)))
             .collect();
         let (_, _, values) = lines.first()?;
         let anchor = values.positions().next().map_or(around, |(_, position)| position);
@@ -211,9 +226,9 @@ impl Drag {
             Grip::Body => grabbed.unwrap_or(anchor),
             Grip::Axis { .. } => middle(&positions),
             Grip::Point { first } => values.vector(first)?,
-            Grip::Length { .. } | Grip::Direction { .. } => anchor,
+            Grip::Length { .. } | Grip::Direction { .. } | Grip::Turn { .. } | Grip::Scale { .. } => anchor,
         };
-        Some(Self { grip, lines, grabbed })
+        Some(Self { grip, lines, grabbed, keying, turned: Cell::new(0.0) })
     }
 
     /// The lines as they become when the pointer goes from one point of the picture to another.
@@ -225,11 +240,12 @@ impl Drag {
         manner: Manner,
     ) -> Vec<(usize, Line)> {
         let step = step(projection.pixel_at(self.grabbed), manner.snap);
+        let keying = Keying { whole: manner.whole, ..self.keying };
         let moved = |axes: [bool; 3], by: DVec3| {
             self.lines.iter().filter_map(move |(number, line, values)| {
                 let mut line = line.clone();
                 for (first, position) in values.positions() {
-                    line = line.with_numbers(first, &shifted(position, by, axes, step))?;
+                    line = changed(&line, first, &shifted(position, by, axes, step), keying)?;
                 }
                 Some((*number, line))
             })
@@ -260,7 +276,7 @@ impl Drag {
                 };
                 self.first(|line, values| {
                     let position = values.vector(first)?;
-                    line.with_numbers(first, &shifted(position, by, axes, step))
+                    changed(line, first, &shifted(position, by, axes, step), keying)
                 })
             }
             Grip::Length { first } => {
@@ -272,7 +288,7 @@ impl Drag {
                 }
                 self.first(|line, values| {
                     let length = values.number(first)?;
-                    line.with_numbers(first, &[rounded((length + now - before).max(step), step)])
+                    changed(line, first, &[rounded((length + now - before).max(step), step)], keying)
                 })
             }
             Grip::Direction { first } => {
@@ -287,7 +303,31 @@ impl Drag {
                     let new = facing(values.command) * tip.normalize_or(DVec3::NEG_Y) * length;
                     let step = self::step(length * 1e-2, manner.snap);
                     let new = new.to_array().map(|x| rounded(x, step));
-                    if new == [0.0; 3] { None } else { line.with_numbers(first, &new) }
+                    if new == [0.0; 3] { None } else { changed(line, first, &new, keying) }
+                })
+            }
+            Grip::Turn { first, axis } => self.first(|line, values| {
+                let degrees = values.vector(first)?;
+                let (about, _) = turning::frame(degrees, axis);
+                let by = turning::angle(projection, self.grabbed, about, from, to)?;
+                let by = turning::nearest_turn(by, self.turned.get());
+                self.turned.set(by);
+                let by = rounded(by, if manner.snap { turning::SNAP } else { turning::STEP });
+                if by == 0.0 {
+                    return None;
+                }
+                changed(line, first + axis, &[exactly(degrees[axis], by, turning::STEP)], keying)
+            }),
+            Grip::Scale { first } => {
+                let Some(center) = projection.point(self.grabbed) else { return self.start() };
+                let factor = to.distance(center) / from.distance(center);
+                if from == to || !factor.is_finite() {
+                    return self.start();
+                }
+                self.first(|line, values| {
+                    let scale = values.number(first)?;
+                    let step = self::step(scale.abs() * 3e-2, manner.snap);
+                    changed(line, first, &[rounded((scale * factor).max(step), step)], keying)
                 })
             }
         }
@@ -380,6 +420,13 @@ mod tests {
     use super::*;
     use crate::view::{Bounds, Orbit};
 
+    const STILL: Keying = Keying { time: 1.0, first: 1.0, auto: false, whole: false };
+
+    /// The handles of a line at the first frame.
+    fn handles(number: usize, line: &Line, projection: &Projection, around: DVec3) -> Vec<Handle> {
+        super::handles(number, &Values::of(line, 1.0).unwrap(), projection, around)
+    }
+
     fn scene() -> Scene {
         let bounds = Bounds { low: DVec3::splat(-2.0), high: DVec3::splat(2.0) };
         let camera = Orbit::at(bounds, 0.0, 0.6).camera(1.5).unwrap();
@@ -388,7 +435,7 @@ mod tests {
 
     fn drag(grip: Grip, text: &str, from: DVec2, by: DVec2, manner: Manner) -> String {
         let scene = scene();
-        let drag = Drag::new(grip, vec![(0, Line::new(text))], None, DVec3::ZERO).unwrap();
+        let drag = Drag::new(grip, vec![(0, Line::new(text))], None, DVec3::ZERO, STILL).unwrap();
         drag.to(&Projection::new(&scene), from, from + by, manner)[0].1.text()
     }
 
@@ -423,8 +470,13 @@ mod tests {
     #[test]
     fn upright_and_axes_change_one_number() {
         let up = DVec2::new(13.0, -31.0);
-        let upright =
-            drag(Grip::Body, BALL, DVec2::new(150.0, 80.0), up, Manner { upright: true, snap: false });
+        let upright = drag(
+            Grip::Body,
+            BALL,
+            DVec2::new(150.0, 80.0),
+            up,
+            Manner { upright: true, ..Manner::default() },
+        );
         let axis = drag(Grip::Axis { axis: 1 }, BALL, DVec2::new(150.0, 80.0), up, Manner::default());
         for text in [upright, axis] {
             let y: f64 = text.split_whitespace().nth(3).unwrap().parse().unwrap();
@@ -471,6 +523,69 @@ mod tests {
         let numbers: Vec<f64> = text.split_whitespace().skip(4).map(|n| n.parse().unwrap()).collect();
         let off = DVec3::from_slice(&numbers).distance(DVec3::new(1.2, -1.6, 0.0));
         assert!(off < 0.1, "{text}");
+    }
+
+    #[test]
+    fn a_group_turns_about_an_axis_and_grows() {
+        let scene = scene();
+        let projection = Projection::new(&scene);
+        let table = "Use table  0 0 0  0 (1:10 9:20) 0";
+        let all = handles(0, &Line::new(table), &projection, DVec3::ZERO);
+        let turn = all.iter().find(|handle| handle.grip == Grip::Turn { first: 3, axis: 1 }).unwrap();
+        assert!(turn.way.starts_with('M'));
+        let at = |degrees: f64| {
+            let text = format!("Use table  0 0 0  0 {degrees} 0");
+            let all = handles(0, &Line::new(&text), &projection, DVec3::ZERO);
+            DVec2::from(all.iter().find(|handle| handle.grip == turn.grip).unwrap().at)
+        };
+        let by = at(47.0) - at(10.0);
+        assert_eq!(
+            drag(turn.grip, table, at(10.0), by, Manner::default()),
+            "Use table  0 0 0  0 (1:47 9:20) 0"
+        );
+        let snap = Manner { snap: true, ..Manner::default() };
+        assert_eq!(drag(turn.grip, table, at(10.0), by, snap), "Use table  0 0 0  0 (1:40 9:20) 0");
+        let scale = all.iter().find(|handle| handle.grip == Grip::Scale { first: 6 }).unwrap();
+        let (from, to) = (DVec2::from(scale.from), DVec2::from(scale.at));
+        let text = drag(scale.grip, "Use table", to, to - from, Manner::default());
+        assert_eq!(text, "Use table 0 0 0 0 0 0 2", "twice as far is twice as large");
+    }
+
+    #[test]
+    fn a_drag_that_goes_around_turns_more_than_once() {
+        let scene = scene();
+        let projection = Projection::new(&scene);
+        let line = vec![(0, Line::new("Use table"))];
+        let grip = Grip::Turn { first: 3, axis: 1 };
+        let drag = Drag::new(grip, line, None, DVec3::ZERO, STILL).unwrap();
+        let at = |degrees: f64| {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            projection.point(0.5 * DVec3::new(sin, 0.0, cos)).unwrap()
+        };
+        let mut text = String::new();
+        for step in 0..=45 {
+            text = drag.to(&projection, at(0.0), at(10.0 * f64::from(step)), Manner::default())[0].1.text();
+        }
+        assert_eq!(text, "Use table 0 0 0 0 450 0");
+    }
+
+    #[test]
+    fn a_drag_at_a_later_frame_writes_a_key_there() {
+        let keying = Keying { time: 25.0, auto: true, ..STILL };
+        let scene = scene();
+        let line = vec![(0, Line::new(BALL))];
+        let drag = Drag::new(Grip::Axis { axis: 1 }, line, None, DVec3::ZERO, keying).unwrap();
+        let to = |by: f64, manner| {
+            let from = DVec2::new(150.0, 80.0);
+            drag.to(&Projection::new(&scene), from, from + DVec2::new(0.0, by), manner)[0].1.text()
+        };
+        let text = to(-30.0, Manner::default());
+        assert!(
+            text.starts_with("Sphere 1  0 (smooth 1:1 25:") && text.ends_with(") 0  .1 .1 .1  1 1 1 # ball"),
+            "{text}"
+        );
+        assert_eq!(to(0.0, Manner::default()), BALL, "back at the start there is none");
+        assert!(!to(-30.0, Manner { whole: true, ..Manner::default() }).contains('('));
     }
 
     #[test]

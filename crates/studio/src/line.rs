@@ -17,6 +17,8 @@ pub struct Line(Vec<u8>);
 pub struct Words {
     /// The first word.
     pub command: Range<usize>,
+    /// The name of a group or material that stands before the parameters.
+    pub subject: Option<Range<usize>>,
     /// The others; a curve in brackets is one.
     pub parameters: Vec<Range<usize>>,
     /// From the sign that begins the comment to the end of the text.
@@ -69,12 +71,12 @@ impl Line {
 
     /// The command, if its first word is one.
     pub fn command(&self) -> Option<Command> {
-        // Alone: a script has many lines, and each is asked again and again.
-        let code = self.body().split(|&byte| byte == b'#').next()?;
-        let code = code.strip_prefix(b"\xef\xbb\xbf").unwrap_or(code);
-        let word = code.split(|&byte| is_separator(byte)).find(|word| !word.is_empty())?;
-        let end = word.iter().position(|&byte| byte == b'(').unwrap_or(word.len());
-        Command::from_name(std::str::from_utf8(&word[..end]).ok()?)
+        let body = self.body();
+        let body = body.strip_prefix(b"\xef\xbb\xbf").unwrap_or(body);
+        let start = body.iter().position(|&byte| !is_separator(byte))?;
+        let word = &body[start..];
+        let end = word.iter().position(|&byte| is_separator(byte) || matches!(byte, b'#' | b'('));
+        Command::from_name(std::str::from_utf8(&word[..end.unwrap_or(word.len())]).ok()?)
     }
 
     /// `None` for a line without a command.
@@ -101,17 +103,26 @@ impl Line {
             words.push(from..at);
         }
         let mut words = words.into_iter();
-        Some(Words {
-            command: words.next()?,
-            parameters: words.collect(),
-            comment: comment.map(|at| at..body.len()),
-        })
+        let command = words.next()?;
+        let has_subject = self.command().is_some_and(|command| command.form().subject.is_some());
+        let subject = if has_subject { words.next() } else { None };
+        let comment = comment.map(|at| at..body.len());
+        Some(Words { command, subject, parameters: words.collect(), comment })
+    }
+
+    /// A word; nothing where it is not UTF-8.
+    pub fn word(&self, word: &Range<usize>) -> &str {
+        std::str::from_utf8(&self.0[word.clone()]).unwrap_or_default()
+    }
+
+    /// The name of a group or material that stands before its parameters.
+    pub fn subject(&self) -> Option<&str> {
+        Some(self.word(&self.words()?.subject?))
     }
 
     /// The number that a word is; `None` for a curve, a name, and what is none.
     pub fn number(&self, word: &Range<usize>) -> Option<f64> {
-        let word = std::str::from_utf8(&self.0[word.clone()]).ok()?;
-        word.parse().ok().filter(|number: &f64| number.is_finite())
+        self.word(word).parse().ok().filter(|number: &f64| number.is_finite())
     }
 
     /// The name: what the comment at the end of a command's line says.
@@ -127,7 +138,7 @@ impl Line {
         let words = self.words()?;
         let name: String = name.chars().filter(|c| !c.is_control()).collect();
         let name = name.trim().trim_start_matches('#').trim();
-        let last = words.parameters.last().unwrap_or(&words.command).end;
+        let last = words.last().end;
         let body = self.body().len();
         Some(match (&words.comment, name) {
             (Some(_), "") => self.with(&[(last..body, String::new())]),
@@ -144,18 +155,42 @@ impl Line {
         if numbers.is_empty() {
             return Some(self.clone());
         }
-        let last = words.parameters.last().unwrap_or(&words.command).end;
-        let mut changes = Vec::new();
         // What lies between the last word and the first new one may be left out only from the end: it is 0.
-        for at in words.parameters.len().min(first)..first + numbers.len() {
+        let at = words.parameters.len().min(first)..first + numbers.len();
+        let changes = at.filter_map(|at| {
             let value = at.checked_sub(first).and_then(|i| numbers.get(i)).copied().unwrap_or(0.0);
-            match words.parameters.get(at) {
-                Some(word) if self.number(word) == Some(value) => {}
-                Some(word) => changes.push((word.clone(), written(value))),
-                None => changes.push((last..last, format!(" {}", written(value)))),
-            }
-        }
+            let same = words.parameters.get(at).is_some_and(|word| self.number(word) == Some(value));
+            (!same).then(|| (at, written(value)))
+        });
+        self.with_words(&changes.collect::<Vec<_>>())
+    }
+
+    /// The same with other words for some parameters, which are in order; those beyond the last are added behind it.
+    #[must_use]
+    pub fn with_words(&self, changes: &[(usize, String)]) -> Option<Self> {
+        let words = self.words()?;
+        let last = words.last().end;
+        let changes: Vec<_> = changes
+            .iter()
+            .map(|(at, text)| match words.parameters.get(*at) {
+                Some(word) => (word.clone(), text.clone()),
+                None => (last..last, format!(" {text}")),
+            })
+            .collect();
         Some(self.with(&changes))
+    }
+
+    /// The same without the parameters from one on.
+    #[must_use]
+    pub fn cut(&self, from: usize) -> Option<Self> {
+        let words = self.words()?;
+        let Some(first) = words.parameters.get(from) else { return Some(self.clone()) };
+        let before = match from.checked_sub(1) {
+            Some(before) => words.parameters[before].end,
+            None => words.subject.as_ref().unwrap_or(&words.command).end,
+        };
+        debug_assert!(before <= first.start);
+        Some(self.with(&[(before..words.last().end, String::new())]))
     }
 
     /// The same with other bytes for some spans, which are in order.
@@ -169,6 +204,13 @@ impl Line {
         }
         bytes.extend_from_slice(&self.0[at..]);
         Self(bytes)
+    }
+}
+
+impl Words {
+    /// The last of them, without the comment.
+    fn last(&self) -> &Range<usize> {
+        self.parameters.last().or(self.subject.as_ref()).unwrap_or(&self.command)
     }
 }
 
@@ -264,6 +306,17 @@ mod tests {
         assert_eq!(words.parameters.len(), 5);
         assert_eq!(sphere.number(&words.parameters[0]), None);
         assert_eq!(sphere.with_numbers(1, &[7.0]).unwrap().text(), "Sphere (1:1 9:2)7 1 2 red # (");
+    }
+
+    #[test]
+    fn a_name_before_the_numbers_is_none_of_them() {
+        let table = line("Use table  1 (1:0 9:2) 3   # it\n");
+        assert_eq!((table.subject(), table.words().unwrap().parameters.len()), (Some("table"), 3));
+        assert_eq!(table.with_numbers(0, &[7.0]).unwrap().text(), "Use table  7 (1:0 9:2) 3   # it");
+        assert_eq!(line("Use table#").with_numbers(0, &[1.0, 2.0, 3.0]).unwrap().text(), "Use table 1 2 3#");
+        assert_eq!(table.cut(1).unwrap().text(), "Use table  1   # it");
+        assert_eq!(table.cut(0).unwrap().text(), "Use table   # it");
+        assert_eq!(line("Use").subject(), None);
     }
 
     #[test]

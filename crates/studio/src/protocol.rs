@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::handles::{Grip, Handle, Manner};
 use crate::project::Saved;
-use crate::tables::{CommandTable, Role};
+use crate::tables::{CommandTable, FieldTable, Role};
+use crate::tracks::{KeyPlace, Tracks};
 
 /// What the page asks for.
 #[derive(Clone, Debug, Deserialize)]
@@ -57,6 +58,20 @@ pub(crate) enum Ask {
     Hide { lines: Vec<usize> },
     /// Objects fall onto what is below them.
     Drop { lines: Vec<usize> },
+    /// Objects stand on the height 0.
+    Ground { lines: Vec<usize> },
+    /// Lines cannot be taken hold of in the picture, or can again.
+    Lock { lines: Vec<usize> },
+    /// Lines become a group.
+    Group { lines: Vec<usize> },
+    /// The lines of its group take the place of a `Use`.
+    Ungroup { line: usize },
+    /// Objects get a material of the script.
+    Surface { lines: Vec<usize>, material: String },
+    /// Objects get a material to begin with.
+    Preset { lines: Vec<usize>, preset: String },
+    /// What concerns keys and frames.
+    Time { wish: TimeWish },
     /// Objects move by so many steps along the axes.
     Nudge { lines: Vec<usize>, by: [f64; 3] },
     /// A new object or light; at a point of the picture, or in the middle.
@@ -87,6 +102,44 @@ pub(crate) enum Source {
     Text { text: String },
     /// What is shown.
     Shown,
+}
+
+/// What is wished of keys and frames.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case", rename_all_fields = "kebab-case", tag = "do")]
+pub(crate) enum TimeWish {
+    /// Turns something on or off.
+    Switch { what: Switch, on: bool },
+    /// Keys at the frame that is shown for the main numbers of lines; where all have one there, they go.
+    Key { lines: Vec<usize> },
+    /// The same, for some numbers of a line.
+    Toggle { line: usize, numbers: Vec<usize> },
+    /// Takes hold of keys.
+    Grab { keys: Vec<KeyPlace> },
+    /// Those that are held go so many frames from where they were.
+    Move { by: f64 },
+    /// Keys go.
+    Remove { keys: Vec<KeyPlace> },
+    /// Keys are remembered.
+    Copy { keys: Vec<KeyPlace> },
+    /// What was copied, from the frame that is shown on.
+    Paste,
+    /// What happens between the keys of their tracks.
+    Ease { keys: Vec<KeyPlace>, mode: String, cycle: bool },
+    /// How many frames the `Trace` is that is shown.
+    Frames { count: u32 },
+}
+
+/// What is on or off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Switch {
+    /// Still numbers that are changed become curves.
+    AutoKey,
+    /// The way of what is selected.
+    Path,
+    /// What is selected at other frames.
+    Onion,
 }
 
 /// A way to move the free camera.
@@ -132,6 +185,9 @@ pub(crate) struct Tell {
     /// Whether scripts can be added, once, at the start.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) can_create: Option<bool>,
+    /// Once, at the start: the names of materials to begin with.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) presets: Vec<&'static str>,
     /// All files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) files: Option<Vec<FileState>>,
@@ -150,6 +206,15 @@ pub(crate) struct Tell {
     /// The outline of what is selected, as the path of an SVG.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) outline: Option<String>,
+    /// The outline of what is under the pointer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) hover_outline: Option<String>,
+    /// What is selected, at other frames.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) ghosts: Option<Vec<Ghost>>,
+    /// The numbers that change.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) tracks: Option<Tracks>,
     /// How the GIF stands.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) output: Option<OutputState>,
@@ -185,6 +250,9 @@ pub(crate) struct LineState {
     /// The comment at its end.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) name: Option<String>,
+    /// The name of a group or material that stands before its numbers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) subject: Option<String>,
     /// It is a comment now.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub(crate) hidden: bool,
@@ -234,6 +302,14 @@ pub(crate) struct State {
     pub(crate) handles: Vec<Handle>,
     /// The ground's grid, as the path of an SVG.
     pub(crate) grid: String,
+    /// The way of what is selected, as the path of an SVG.
+    pub(crate) way: String,
+    /// Where its keys are, as dots of the path of an SVG.
+    pub(crate) marks: String,
+    /// Lines that cannot be taken hold of in the picture.
+    pub(crate) locked: Vec<usize>,
+    /// Frames and keys.
+    pub(crate) time: TimeState,
     /// Whether one looks through a free camera.
     pub(crate) free: bool,
     /// The picture that was ordered last: its number, width and height; none where there is nothing to draw.
@@ -248,8 +324,52 @@ pub(crate) struct Inspected {
     pub(crate) line: usize,
     /// Its command.
     pub(crate) command: &'static str,
-    /// Its words; those that are no numbers are `null` here.
+    /// Its words as they are now; those that are no numbers are `null` here.
     pub(crate) values: Vec<Option<f64>>,
+    /// Which of them change.
+    pub(crate) curves: Vec<usize>,
+    /// Which of these have a key just here.
+    pub(crate) keyed: Vec<usize>,
+    /// Whether they may change.
+    pub(crate) can_key: bool,
+    /// The name that stands in the place of coefficients.
+    pub(crate) material: Option<String>,
+    /// The name that stands before the numbers.
+    pub(crate) subject: String,
+    /// The parameters of a material, which each has others of.
+    pub(crate) fields: Vec<FieldTable>,
+}
+
+/// Frames and keys.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct TimeState {
+    /// The number of the frame that is shown: the time at which curves are read.
+    pub(crate) number: f64,
+    /// The first number of its `Trace`.
+    pub(crate) first: u32,
+    /// The last.
+    pub(crate) last: u32,
+    /// Which of all frames has the first number, from 0.
+    pub(crate) start: usize,
+    /// Whether still numbers that are changed become curves.
+    pub(crate) auto_key: bool,
+    /// Whether the way of what is selected is shown.
+    pub(crate) path: bool,
+    /// Whether it is shown at other frames.
+    pub(crate) onion: bool,
+    /// How many keys were copied.
+    pub(crate) copied: usize,
+}
+
+/// The outline of what is selected at another frame.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Ghost {
+    /// As the path of an SVG.
+    pub(crate) path: String,
+    /// How many steps later, or, below 0, before.
+    pub(crate) after: i32,
 }
 
 /// What is wrong with a line.

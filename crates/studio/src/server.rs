@@ -24,6 +24,7 @@ use tokio::task::JoinHandle;
 use tokio::time::MissedTickBehavior;
 
 use crate::error::Error;
+use crate::materials;
 use crate::output::{Outputs, frame_png, frames_zip, scripts_zip};
 use crate::page::Page;
 use crate::pictures::Painter;
@@ -106,6 +107,8 @@ impl Server {
             .route("/{token}/frame.png", get(frame))
             .route("/{token}/frames.zip", get(frames))
             .route("/{token}/script.txt", get(one_script))
+            .route("/{token}/material.png", get(material))
+            .route("/{token}/preset.png", get(preset))
             .with_state(Arc::clone(&shared))
             .nest("/{token}/runs", cloud.router(project))
             .layer(from_fn_with_state(Arc::clone(&shared), guard));
@@ -236,9 +239,37 @@ async fn frame(State(shared): State<Arc<Shared>>, request: Request) -> Response 
         (project.files[place.file].script.clone(), place.frame)
     };
     let png = tokio::task::block_in_place(|| script.map_or(Ok(None), |script| frame_png(&script, frame)));
+    picture(png, "this frame has nothing to draw\n")
+}
+
+/// A sphere of a material: the query is the index of its file, its line and the number of the frame, joined by commas.
+async fn material(State(shared): State<Arc<Shared>>, request: Request) -> Response {
+    let query = request.uri().query().unwrap_or_default();
+    let mut numbers = query.split(',').map(|number| number.parse().unwrap_or(0usize));
+    let mut next = || numbers.next().unwrap_or(0);
+    let (of, line, frame) = (next(), next(), next());
+    let png = tokio::task::block_in_place(|| {
+        let lines: Vec<_> = {
+            let project = shared.project();
+            project.files.get(of).map(|file| file.document.lines().iter().take(line + 1).cloned().collect())
+        }
+        .unwrap_or_default();
+        materials::sphere(&lines, line, u32::try_from(frame).unwrap_or(u32::MAX))
+    });
+    picture(png, "this line defines no material\n")
+}
+
+/// A sphere of the material to begin with that the query names.
+async fn preset(request: Request) -> Response {
+    let name = request.uri().query().unwrap_or_default();
+    let png = tokio::task::block_in_place(|| materials::preset_sphere(name));
+    picture(png, "there is no such material to begin with\n")
+}
+
+fn picture(png: Result<Option<Vec<u8>>, Error>, missing: &'static str) -> Response {
     match png {
         Ok(Some(png)) => file("image/png", png),
-        Ok(None) => (StatusCode::NOT_FOUND, "this frame has nothing to draw\n").into_response(),
+        Ok(None) => (StatusCode::NOT_FOUND, missing).into_response(),
         Err(error) => failed(&error),
     }
 }

@@ -10,6 +10,9 @@ use rayfold_tracer::{RenderError, RenderOptions, pixel_ray};
 /// Rays that an outline is made of, at most: a tenth of a second on one core for scenes of a few hundred objects.
 const RAYS: f64 = 60_000.0;
 
+/// The same, for one that need not be exact.
+const FEW_RAYS: f64 = 15_000.0;
+
 /// What a pixel of a picture shows, column and row from the upper left.
 ///
 /// # Errors
@@ -25,8 +28,20 @@ pub(crate) fn pick(scene: &Scene, column: f64, row: f64) -> Result<Option<Found>
 /// # Errors
 /// Those of the tracer.
 pub(crate) fn outline(scene: &Scene, is_in: impl Fn(usize) -> bool) -> Result<String, RenderError> {
+    traced(scene, RAYS, is_in)
+}
+
+/// The same, in coarse steps.
+///
+/// # Errors
+/// Those of the tracer.
+pub(crate) fn ghost(scene: &Scene, is_in: impl Fn(usize) -> bool) -> Result<String, RenderError> {
+    traced(scene, FEW_RAYS, is_in)
+}
+
+fn traced(scene: &Scene, rays: f64, is_in: impl Fn(usize) -> bool) -> Result<String, RenderError> {
     let (width, height) = (scene.screen.width(), scene.screen.height());
-    let stride = (f64::from(width) * f64::from(height) / RAYS).sqrt().ceil().max(1.0);
+    let stride = (f64::from(width) * f64::from(height) / rays).sqrt().ceil().max(1.0);
     let columns = (f64::from(width) / stride).ceil() as usize;
     let rows = (f64::from(height) / stride).ceil() as usize;
     let last = f64::from(height) - 1.0;

@@ -1,16 +1,27 @@
 //! Which lines of a script a frame is made of: the line of each object that the tracer numbers, of the lights, and of
 //! what is set.
+//!
+//! A group that is used is as many objects of the tracer as it draws, and one line: that of its `Use`.
+
+use std::collections::HashMap;
+use std::ops::RangeInclusive;
 
 use rayfold_scene::Command;
 
 use crate::line::Line;
 use crate::tables::{Role, role};
+use crate::values::Values;
+
+/// The number of a `Use` that scales; 0 hides what it draws.
+const SCALE: usize = 6;
 
 /// The lines of a frame, from 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Stage {
-    /// Those of its objects, in the tracer's order.
+    /// Those of its objects and of the groups that it uses, in the tracer's order.
     pub(crate) objects: Vec<usize>,
+    /// How many objects of the tracer there are up to each of these lines, and with it.
+    drawn: Vec<usize>,
     /// Those of its lights.
     pub(crate) lights: Vec<usize>,
     /// That of its camera; none where there is only the camera that holds until one is set.
@@ -19,50 +30,128 @@ pub(crate) struct Stage {
     pub(crate) screen: Option<usize>,
     /// That of its background.
     pub(crate) background: Option<usize>,
+    /// That of the `Clear` that it begins with.
+    cleared: Option<usize>,
+    /// That of its numbers of frames.
+    pub(crate) frames: Option<usize>,
     /// That of its `Trace`; where it is missing new lines go to the end.
     pub(crate) trace: Option<usize>,
+    /// From `Group` to `End`, up to its `Trace`.
+    groups: Vec<RangeInclusive<usize>>,
+}
+
+/// Groups as they are read.
+#[derive(Default)]
+struct Groups {
+    /// How many objects each draws.
+    drawn: HashMap<String, usize>,
+    open: Option<(usize, String, usize)>,
 }
 
 impl Stage {
-    /// The lines of frame `frame` of a script, counted from 0. Beyond the last `Trace`: what stands at the end.
-    pub(crate) fn of(lines: &[Line], frame: usize) -> Self {
+    /// The lines of frame `frame` of a script, counted from 0, as it is at a time. Beyond the last `Trace`: what stands at the
+    /// end.
+    pub(crate) fn of(lines: &[Line], frame: usize, time: f64) -> Self {
         let mut stage = Self::default();
-        let mut traces = 0;
+        let mut groups = Groups::default();
+        let (mut before, mut count) = (0usize, 1usize);
         for (number, line) in lines.iter().enumerate() {
             let Some(command) = line.command() else { continue };
             match (command, role(command)) {
                 (Command::Clear, _) => {
                     stage.objects.clear();
+                    stage.drawn.clear();
                     stage.lights.clear();
                     stage.background = None;
+                    stage.cleared = Some(number);
                 }
                 (Command::Trace, _) => {
-                    if traces == frame {
+                    if frame < before.saturating_add(count) {
                         stage.trace = Some(number);
                         break;
                     }
-                    traces += 1;
+                    before += count;
+                }
+                (Command::Frames, _) => {
+                    stage.frames = Some(number);
+                    count = frames(line).unwrap_or(1);
+                }
+                (Command::Group, _) => {
+                    groups.open = Some((number, line.subject().unwrap_or_default().to_owned(), 0));
+                }
+                (Command::End, _) => {
+                    if let Some((start, name, drawn)) = groups.open.take() {
+                        groups.drawn.insert(name, drawn);
+                        stage.groups.push(start..=number);
+                    }
+                }
+                (Command::Use, _) => {
+                    let hides = Values::of(line, time).and_then(|values| values.number(SCALE)) == Some(0.0);
+                    let drawn = line.subject().and_then(|name| groups.drawn.get(name)).copied().unwrap_or(0);
+                    stage.draw(&mut groups, number, if hides { 0 } else { drawn });
                 }
                 (Command::Screen, _) => stage.screen = Some(number),
                 (Command::Background, _) => stage.background = Some(number),
-                (_, Role::Object) => stage.objects.push(number),
+                (_, Role::Object) => stage.draw(&mut groups, number, 1),
                 (_, Role::Light) => stage.lights.push(number),
                 (_, Role::Camera) => stage.camera = Some(number),
-                (_, Role::Setting) => {}
+                (_, Role::Use | Role::Material | Role::Group | Role::Setting) => {}
             }
         }
         stage
     }
 
+    /// An object, or what a group draws, in the group that is open or in the picture.
+    fn draw(&mut self, groups: &mut Groups, line: usize, count: usize) {
+        match &mut groups.open {
+            Some((_, _, drawn)) => *drawn = drawn.saturating_add(count),
+            None => {
+                self.objects.push(line);
+                self.drawn.push(self.object_count().saturating_add(count));
+            }
+        }
+    }
+
+    /// How many objects the tracer has.
+    pub(crate) fn object_count(&self) -> usize {
+        self.drawn.last().copied().unwrap_or(0)
+    }
+
+    /// The line of an object of the tracer.
+    pub(crate) fn line_of(&self, object: usize) -> Option<usize> {
+        self.objects.get(self.drawn.partition_point(|&end| end <= object)).copied()
+    }
+
+    /// Whether a line stands in the definition of a group.
+    pub(crate) fn is_in_group(&self, line: usize) -> bool {
+        let at = self.groups.partition_point(|group| *group.end() < line);
+        self.groups.get(at).is_some_and(|group| group.contains(&line))
+    }
+
     /// Where a new object or light of this frame goes: behind what it has, in front of its `Trace`.
     pub(crate) fn end(&self, lines: &[Line]) -> usize {
-        let last = self.objects.iter().chain(&self.lights).chain(&self.camera).chain(&self.screen).max();
+        let groups = self.groups.last().map(|group| group.end());
+        let set = self.camera.iter().chain(&self.screen).chain(&self.background).chain(&self.cleared);
+        let last = self.objects.iter().chain(&self.lights).chain(set).chain(groups).max();
         match (last, self.trace) {
             (Some(last), _) => last + 1,
             (None, Some(trace)) => trace,
             (None, None) => lines.len(),
         }
     }
+}
+
+/// How many frames a `Trace` is behind a `Frames`.
+fn frames(line: &Line) -> Option<usize> {
+    let values = Values::of(line, 1.0)?;
+    let whole =
+        |at: usize| values.written().get(at).copied().flatten().filter(|n| n.fract() == 0.0 && *n >= 1.0);
+    let (first, last) = match (whole(0), whole(1)) {
+        (Some(first), Some(last)) => (first, last),
+        (Some(last), None) => (1.0, last),
+        (None, _) => return None,
+    };
+    (first <= last).then_some((last - first) as usize + 1)
 }
 
 #[cfg(test)]
@@ -77,15 +166,40 @@ mod tests {
         let script = rayfold_scene::parse("a", text.as_bytes(), &Default::default()).script.unwrap();
         let expected: [&[usize]; 4] = [&[1], &[1, 5], &[9], &[9]];
         for (frame, objects) in expected.into_iter().enumerate() {
-            let stage = Stage::of(&lines, frame);
+            let stage = Stage::of(&lines, frame, 1.0);
             assert_eq!(stage.objects, objects);
             assert_eq!(script.frame(frame).unwrap().objects.len(), objects.len());
         }
-        let last = Stage::of(&lines, 3);
+        let last = Stage::of(&lines, 3, 1.0);
         assert_eq!(
             (last.camera, last.screen, last.lights.len(), last.trace),
             (Some(8), Some(0), 0, Some(11))
         );
         assert_eq!(last.end(&lines), 10);
+        let lines = Line::split(b"Screen 2 2\nTrace\nClear\nTrace");
+        assert_eq!(Stage::of(&lines, 1, 1.0).end(&lines), 3, "what stands before a `Clear` is gone");
+    }
+
+    #[test]
+    fn frames_and_groups_are_counted_as_the_parser_counts_them() {
+        let text = "Screen 2 2\nGroup a\nSphere 1 0 0 0 1 1 1 0 0 0\nBox 0 0 0 1 1 1 1 1 1 0 0 0\nEnd\n\
+                    Group b\nUse a\nUse a 1 0 0  0 0 0 (1:0 3:2)\nDisc 1 0 0 0 0 1 0 1 1 1 0 0 0\nEnd\n\
+                    Sphere 1 0 0 0 1 1 1 0 0 0\nUse b\nUse a 1 2 3\nFrames 3\nTrace\nFrames 2 5\nUse a\nTrace";
+        let lines = Line::split(text.as_bytes());
+        let script = rayfold_scene::parse("a", text.as_bytes(), &Default::default()).script.unwrap();
+        assert_eq!(script.frame_count(), 7);
+        for frame in 0..7 {
+            let time = script.frame_number(frame).unwrap();
+            let stage = Stage::of(&lines, frame, time);
+            assert_eq!(stage.object_count(), script.frame(frame).unwrap().objects.len(), "{frame}");
+            assert_eq!(stage.trace, Some(if frame < 3 { 14 } else { 17 }));
+            assert_eq!(stage.frames, Some(if frame < 3 { 13 } else { 15 }));
+        }
+        let stage = Stage::of(&lines, 0, 1.0);
+        let seen: Vec<_> = (0..stage.object_count()).map(|object| stage.line_of(object).unwrap()).collect();
+        assert_eq!(seen, [10, 11, 11, 11, 12, 12]);
+        assert_eq!(stage.line_of(6), None);
+        let inside: Vec<_> = (0..lines.len()).filter(|&line| stage.is_in_group(line)).collect();
+        assert_eq!(inside, (1..10).collect::<Vec<_>>());
     }
 }

@@ -12,6 +12,12 @@ pub(crate) enum Role {
     Object,
     /// It lights what can be seen.
     Light,
+    /// It draws a group.
+    Use,
+    /// It begins a group.
+    Group,
+    /// It says how surfaces answer light.
+    Material,
     /// It is what is looked through.
     Camera,
     /// All else.
@@ -30,7 +36,7 @@ pub(crate) struct CommandTable {
 }
 
 /// A parameter of a command.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(crate) struct FieldTable {
     /// What it is, such as `radius`.
     pub(crate) label: String,
@@ -63,7 +69,13 @@ pub(crate) fn commands() -> Vec<CommandTable> {
 /// What a command is to the page; its parameters tell.
 pub(crate) fn role(command: Command) -> Role {
     let has = |parameter| command.form().fields.iter().any(|field| field.parameter == parameter);
-    if has(Parameter::Diffuse) {
+    if command == Command::Use {
+        Role::Use
+    } else if command == Command::Group {
+        Role::Group
+    } else if command == Command::Material {
+        Role::Material
+    } else if has(Parameter::Diffuse) {
         Role::Object
     } else if has(Parameter::LightColor) {
         Role::Light
@@ -89,7 +101,8 @@ pub(crate) fn of_kind(command: Command, kind: Kind) -> impl Iterator<Item = usiz
 }
 
 impl FieldTable {
-    fn new(first: usize, field: &Field) -> Self {
+    /// Of a parameter whose first number is `first`.
+    pub(crate) fn new(first: usize, field: &Field) -> Self {
         let label = field.parameter.to_string();
         Self {
             label: label.strip_prefix("the ").or(label.strip_prefix("a ")).unwrap_or(&label).to_owned(),
@@ -112,6 +125,7 @@ mod tests {
         let named = |name: &str| role(Command::from_name(name).unwrap());
         assert_eq!(["Sphere", "Box", "Triangle"].map(named), [Role::Object; 3]);
         assert_eq!(named("Ilight"), Role::Light);
+        assert_eq!(["Use", "Group", "Material"].map(named), [Role::Use, Role::Group, Role::Material]);
         assert_eq!(["Camera", "Orthocamera"].map(named), [Role::Camera; 2]);
         assert_eq!(["Screen", "Background", "Clear", "Trace"].map(named), [Role::Setting; 4]);
         for table in commands() {

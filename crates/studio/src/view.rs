@@ -41,10 +41,12 @@ pub(crate) struct Bounds {
 impl Bounds {
     /// Of points with a radius around each; `None` where there is none.
     pub(crate) fn of(points: impl IntoIterator<Item = (DVec3, f64)>) -> Option<Self> {
-        points
-            .into_iter()
-            .map(|(p, r)| Self { low: p - r, high: p + r })
-            .reduce(|a, b| Self { low: a.low.min(b.low), high: a.high.max(b.high) })
+        points.into_iter().map(|(p, r)| Self { low: p - r, high: p + r }).reduce(Self::with)
+    }
+
+    /// Around both.
+    pub(crate) fn with(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
     /// Its middle.

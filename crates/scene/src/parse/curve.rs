@@ -32,11 +32,25 @@ pub(super) enum CurveFault {
     Overflow(f64, f64),
 }
 
+/// The curve that a word of a line is, from its opening bracket to the closing one; also one of a single key, which a scene
+/// takes as a number that is still. `None` for what is none.
+pub fn parse_curve(word: &str) -> Option<Curve> {
+    let is_one = word.starts_with('(') && word.find(')').is_some_and(|end| end + 1 == word.len());
+    if is_one { read(word, 0..word.len()).ok() } else { None }
+}
+
 /// The curve that `text` holds at `span`, from its opening bracket on; a curve of one key is a number that is still.
 ///
 /// # Errors
 /// The first fault, and where.
 pub(super) fn parse(text: &str, span: Range<usize>) -> Result<Number, (Range<usize>, CurveFault)> {
+    read(text, span).map(|curve| match *curve.keys() {
+        [key] => Number::Still(key.value),
+        _ => Number::Moving(curve),
+    })
+}
+
+fn read(text: &str, span: Range<usize>) -> Result<Curve, (Range<usize>, CurveFault)> {
     let bytes = &text.as_bytes()[..span.end];
     if !text[span.clone()].ends_with(')') {
         return Err((span.start..span.start + 1, CurveFault::Unclosed));
@@ -92,9 +106,8 @@ pub(super) fn parse(text: &str, span: Range<usize>) -> Result<Number, (Range<usi
     match keys[..] {
         [] => Err((span, CurveFault::NoKey)),
         [_] if cycle => Err((span, CurveFault::ShortCycle)),
-        [key] => Ok(Number::Still(key.value)),
         _ => match Curve::new(mode.unwrap_or_default(), cycle, keys.clone()) {
-            Ok(curve) => Ok(Number::Moving(curve)),
+            Ok(curve) => Ok(curve),
             Err(Overflow(i)) => {
                 let place = places[i].start..places[i + 1].end;
                 Err((place, CurveFault::Overflow(keys[i].frame, keys[i + 1].frame)))
@@ -123,6 +136,15 @@ mod tests {
         check("(step Cycle 1:0 2:3 4:-0)", "(step cycle 1:0 2:3 4:-0)");
         check("(5:3)", "3");
         check("(smooth 5:3)", "3");
+    }
+
+    #[test]
+    fn a_word_alone_is_read_to_its_end() {
+        assert_eq!(parse_curve("(smooth 5:3)").unwrap().to_string(), "(smooth 5:3)");
+        assert_eq!(parse_curve("(CYCLE 1:0 2:3)").unwrap().to_string(), "(cycle 1:0 2:3)");
+        for none in ["", "3", "(", "()", "(cycle 1:0)", "(1:0 2:3", "(1:0) 2", "(1:0)(2:0)", "x(1:0)"] {
+            assert_eq!(parse_curve(none), None, "{none}");
+        }
     }
 
     #[test]

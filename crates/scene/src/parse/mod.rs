@@ -28,6 +28,7 @@ use crate::model::{
 };
 use crate::report::{Line, Report};
 use crate::script::{Drawn, Recorder, Script, Template, Value};
+pub use curve::parse_curve;
 use definitions::{GroupInfo, MaterialInfo, OpenGroup, Pending};
 use line::Statement;
 use names::Names;

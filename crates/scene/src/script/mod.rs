@@ -32,6 +32,7 @@ pub(crate) use recorder::{GroupRecorder, Recorder};
 /// let text = b"Screen 4 3\nSphere (1:1 25:3) 0 0 -5 1 0 0 0 0 0\nFrames 50\nTrace\nClear\nFrames 1\nTrace";
 /// let script = rayfold_scene::parse("a.txt", text, &Default::default()).script.unwrap();
 /// assert_eq!(script.frame_count(), 51);
+/// assert_eq!((script.frame_numbers(49), script.frame_numbers(50)), (Some((1, 50)), Some((1, 1))));
 /// let rayfold_scene::Object::Sphere(sphere) = &script.frame(12).unwrap().objects[0] else { unreachable!() };
 /// assert_eq!(sphere.radius(), 2.0);
 /// ```
@@ -175,6 +176,11 @@ impl Script {
     /// The number of frame `k`, counted from 0, which is the time at which its curves are read.
     pub fn frame_number(&self, k: usize) -> Option<f64> {
         self.shot_of(k).map(|(_, number)| number)
+    }
+
+    /// The numbers of the frames that frame `k`, counted from 0, has its `Trace` in common with: the first and the last.
+    pub fn frame_numbers(&self, k: usize) -> Option<(u32, u32)> {
+        self.shot_of(k).map(|(shot, _)| (shot.numbers.first, shot.numbers.last))
     }
 
     /// The scene of frame `k`, counted from 0, as it is at another moment of its exposure: `time` lies within half of the

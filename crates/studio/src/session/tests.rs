@@ -3,19 +3,21 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::sight::PIXELS;
 use super::*;
-use crate::handles::Handle;
-use crate::protocol::Source;
+use crate::handles::{Grip, Handle, Manner};
+use crate::protocol::{Source, State};
 
-struct Desk {
+/// A page and the script that it has open.
+pub(super) struct Desk {
     _folder: tempfile::TempDir,
     path: PathBuf,
-    project: Project,
-    session: Session,
+    pub(super) project: Project,
+    pub(super) session: Session,
 }
 
 impl Desk {
-    fn new(text: &str) -> Self {
+    pub(super) fn new(text: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.txt");
         fs::write(&path, text).unwrap();
@@ -25,20 +27,20 @@ impl Desk {
         Self { _folder: folder, path, project, session }
     }
 
-    fn ask(&mut self, ask: Ask) -> Answer {
+    pub(super) fn ask(&mut self, ask: Ask) -> Answer {
         self.session.ask(&mut self.project, ask)
     }
 
-    fn text(&self) -> String {
+    pub(super) fn text(&self) -> String {
         String::from_utf8(self.project.files[0].document.bytes()).unwrap()
     }
 
-    fn state(&mut self) -> State {
+    pub(super) fn state(&mut self) -> State {
         self.ask(Ask::Hover { x: -1.0, y: -1.0 }).tell.state.unwrap()
     }
 
     /// Where the object of a line is seen.
-    fn seen(&mut self, line: usize) -> DVec2 {
+    pub(super) fn seen(&mut self, line: usize) -> DVec2 {
         let scene = self.session.scene(&self.project).unwrap();
         for y in (0..scene.screen.height()).step_by(4) {
             for x in (0..scene.screen.width()).step_by(4) {
@@ -51,7 +53,7 @@ impl Desk {
         panic!("line {line} is not seen");
     }
 
-    fn drag(&mut self, from: DVec2, to: DVec2) {
+    pub(super) fn drag(&mut self, from: DVec2, to: DVec2) {
         self.ask(Ask::Press { x: from.x, y: from.y, extend: false, grip: None, line: None });
         for share in [0.25, 0.5, 0.75, 1.0] {
             let at = from.lerp(to, share);
@@ -189,7 +191,7 @@ fn handles_lead_to_the_numbers_of_the_line() {
     let Handle { at, .. } = handles[4];
     let (grip, line) = (Some(Grip::Point { first: 3 }), Some(5));
     desk.ask(Ask::Press { x: at[0], y: at[1], extend: false, grip, line });
-    desk.ask(Ask::Drag { x: at[0], y: at[1] - 12.0, manner: Manner { upright: true, snap: false } });
+    desk.ask(Ask::Drag { x: at[0], y: at[1] - 12.0, manner: Manner { upright: true, ..Manner::default() } });
     let text = desk.text();
     assert!(text.contains("\nBox -3 -1 -3 3 0.") && text.contains(" 3 0 0 0 .5 .5 .5\n"), "{text}");
 }

@@ -1,6 +1,7 @@
 // What can be done by a key or a button, once: the key, the words for people, and what is asked for.
 
-import { ask, help, playing, selection, state } from "./store";
+import { animate, chosenKeys, copyKeys, hasKeys, pasteKeys, removeKeys, wish } from "./keys";
+import { ask, help, lines, playing, selection, state } from "./store";
 
 export interface Action {
   readonly title: string;
@@ -33,8 +34,18 @@ export const actions = {
     run: () => ask({ ask: "duplicate", lines: selection.value }),
     enabled: any,
   },
+  removeKeys: { title: "Delete the chosen keys of the timeline", keys: ["Delete", "Backspace"], run: removeKeys, enabled: hasKeys },
   remove: { title: "Delete", keys: ["Delete", "Backspace"], run: () => ask({ ask: "remove", lines: selection.value }), enabled: any },
   hide: { title: "Hide or show", keys: ["h"], run: () => ask({ ask: "hide", lines: selection.value }), enabled: any },
+  group: { title: "Make a group", keys: ["Ctrl+g"], run: () => ask({ ask: "group", lines: selection.value }), enabled: any },
+  ungroup: {
+    title: "Take a group apart",
+    keys: ["Ctrl+Shift+G"],
+    run: () => ask({ ask: "ungroup", line: selection.value.at(-1) ?? -1 }),
+    enabled: () => selection.value.length === 1 && lines.value[selection.value[0] ?? -1]?.role === "use",
+  },
+  lock: { title: "Lock or unlock, in the picture", keys: ["l"], run: () => ask({ ask: "lock", lines: selection.value }), enabled: any },
+  ground: { title: "Stand on the ground", keys: ["g"], run: () => ask({ ask: "ground", lines: selection.value }), enabled: any },
   drop: { title: "Drop onto what is below", keys: ["d"], run: () => ask({ ask: "drop", lines: selection.value }), enabled: any },
   left: { title: "Move left", keys: ["ArrowLeft"], run: nudge(-1, 0, 0), enabled: any },
   right: { title: "Move right", keys: ["ArrowRight"], run: nudge(1, 0, 0), enabled: any },
@@ -42,8 +53,40 @@ export const actions = {
   front: { title: "Move to the front", keys: ["ArrowDown"], run: nudge(0, 0, 1), enabled: any },
   up: { title: "Move up", keys: ["Shift+ArrowUp"], run: nudge(0, 1, 0), enabled: any },
   down: { title: "Move down", keys: ["Shift+ArrowDown"], run: nudge(0, -1, 0), enabled: any },
-  none: { title: "Select nothing", keys: ["Escape"], run: () => ask({ ask: "select", lines: [] }), enabled: any },
+  none: {
+    title: "Select nothing",
+    keys: ["Escape"],
+    run: () => {
+      chosenKeys.value = [];
+      ask({ ask: "select", lines: [] });
+    },
+    enabled: () => any() || hasKeys(),
+  },
   play: { title: "Play or stop", keys: [" "], run: () => (playing.value = !playing.value), enabled: () => (state.value?.frames ?? 1) > 1 },
+  key: {
+    title: "Set keys here, or take them away",
+    keys: ["k"],
+    run: () => wish({ do: "key", lines: selection.value }),
+    enabled: any,
+  },
+  autoKey: {
+    title: "Set keys of all that is changed, or not",
+    keys: ["Shift+K"],
+    run: () => wish({ do: "switch", what: "auto-key", on: !state.value?.time.autoKey }),
+  },
+  animate: { title: "Make it an animation of 50 frames", keys: ["Shift+F"], run: animate, enabled: () => (state.value?.frames ?? 1) < 2 },
+  copyKeys: { title: "Copy the chosen keys", keys: ["Ctrl+c"], run: copyKeys, enabled: hasKeys },
+  pasteKeys: { title: "Paste keys at this frame", keys: ["Ctrl+v"], run: pasteKeys, enabled: () => (state.value?.time.copied ?? 0) > 0 },
+  path: {
+    title: "Show the way of what is selected",
+    keys: ["p"],
+    run: () => wish({ do: "switch", what: "path", on: !state.value?.time.path }),
+  },
+  onion: {
+    title: "Outline what is selected at other frames",
+    keys: ["o"],
+    run: () => wish({ do: "switch", what: "onion", on: !state.value?.time.onion }),
+  },
   previous: { title: "Previous frame", keys: [","], run: () => step(-1) },
   next: { title: "Next frame", keys: ["."], run: () => step(1) },
   script: { title: "Look through the script's camera", keys: ["0"], run: () => ask({ ask: "look", at: "script" }) },
@@ -67,8 +110,8 @@ export function listen(): void {
     if (event.key === " " && target.closest("button, a")) return;
     const control = event.ctrlKey || event.metaKey ? "Ctrl+" : "";
     const name = `${control}${event.shiftKey && event.key !== "?" ? "Shift+" : ""}${event.key}`;
-    const found: Action | undefined = Object.values<Action>(actions).find((action) => action.keys.includes(name));
-    if (found && (found.enabled?.() ?? true)) {
+    const found = Object.values<Action>(actions).find((action) => action.keys.includes(name) && (action.enabled?.() ?? true));
+    if (found) {
       event.preventDefault();
       found.run();
     }

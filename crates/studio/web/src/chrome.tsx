@@ -1,12 +1,11 @@
-// What stands around the panels: the bar, what can be added, the frames, what comes out, and what must be told.
+// What stands around the panels: the bar, what can be added, what comes out, and what must be told.
 
 import type { JSX } from "preact";
-import { useEffect } from "preact/hooks";
 
-import { actions, step, type Action } from "./actions";
+import { actions, type Action } from "./actions";
 import { Button, keyName } from "./button";
 import { filing } from "./file";
-import { ask, connected, files, help, notice, output, playing, state, tables } from "./store";
+import { ask, connected, files, help, notice, output, state, tables } from "./store";
 
 const SAVED = { yes: "saved", soon: "saving", conflict: "not saved", failed: "cannot be saved" } as const;
 
@@ -118,57 +117,6 @@ export function Palette(): JSX.Element {
   );
 }
 
-export function Frames(): JSX.Element | null {
-  const now = state.value;
-  const frames = now?.frames ?? 1;
-  const isPlaying = playing.value;
-  const fps = now?.fps ?? 10;
-  useEffect(() => {
-    if (!isPlaying) return;
-    const begin = performance.now();
-    const from = state.value?.frame ?? 0;
-    let shown = from;
-    let timer = 0;
-    const tick = (): void => {
-      const frame = (from + Math.floor(((performance.now() - begin) / 1000) * fps)) % (state.value?.frames ?? 1);
-      if (frame !== shown) {
-        shown = frame;
-        ask({ ask: "frame", frame, moving: true });
-      }
-      timer = requestAnimationFrame(tick);
-    };
-    timer = requestAnimationFrame(tick);
-    return () => {
-      cancelAnimationFrame(timer);
-      ask({ ask: "frame", frame: state.value?.frame ?? 0, moving: false });
-    };
-  }, [isPlaying, fps]);
-  if (!now || frames < 2) return null;
-  return (
-    <footer class="frames" aria-label="Frames">
-      <button type="button" onClick={() => step(-1)} title="Previous frame (,)">
-        Previous
-      </button>
-      <Button action={actions.play} label={isPlaying ? "Stop" : "Play"} />
-      <button type="button" onClick={() => step(1)} title="Next frame (.)">
-        Next
-      </button>
-      <input
-        type="range"
-        aria-label="Frame"
-        min={1}
-        max={frames}
-        value={now.frame + 1}
-        onInput={(event) => ask({ ask: "frame", frame: event.currentTarget.valueAsNumber - 1, moving: true })}
-        onChange={(event) => ask({ ask: "frame", frame: event.currentTarget.valueAsNumber - 1, moving: false })}
-      />
-      <output>
-        frame {now.frame + 1} of {frames}, {now.fps} a second
-      </output>
-    </footer>
-  );
-}
-
 export function Notices(): JSX.Element {
   const now = state.value;
   const file = now ? files.value[now.file]?.name : "";
@@ -245,10 +193,14 @@ const POINTER = [
   ["Move along the ground", "drag an object"],
   ["Move up and down", "Shift and drag"],
   ["Move in steps", "Ctrl and drag"],
+  ["Move all keys of what changes", "Alt and drag"],
   ["Look around", "drag beside all objects"],
   ["Move the view", "drag with the right button"],
   ["Go nearer or farther", "wheel"],
   ["Select several", "Shift and click"],
   ["Rename, in the list", "F2 or double click"],
   ["Change the order, in the list", "Alt with ↑ or ↓"],
+  ["Go to another key, in the timeline", "arrow keys"],
+  ["Move keys, in the timeline", "drag, or Alt with ← or →"],
+  ["Select several keys, in the timeline", "Shift and click, or Ctrl+A"],
 ] as const;

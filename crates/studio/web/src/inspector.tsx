@@ -5,7 +5,8 @@ import type { JSX } from "preact";
 import { actions } from "./actions";
 import { Button } from "./button";
 import type { Field, Inspected } from "./protocol";
-import { ask, commands, gesture, lines, selection, state } from "./store";
+import { wish } from "./keys";
+import { ask, commands, gesture, lines, select, selection, state } from "./store";
 
 /** The gesture of the slider that is being moved. */
 let sliding: number | null = null;
@@ -22,20 +23,67 @@ export function Inspector(): JSX.Element {
   const count = selection.value.length;
   const table = inspected ? commands.value.get(inspected.command) : undefined;
   const line = inspected ? lines.value[inspected.line] : undefined;
+  const all = inspected && inspected.fields.length > 0 ? inspected.fields : (table?.fields ?? []);
+  // Behind the name of a material there are no numbers.
+  const fields = inspected?.material ? all.filter((field) => field.first < inspected.values.length - 1) : all;
   return (
     <section class="panel inspector" aria-labelledby="inspector-title">
-      <h2 id="inspector-title">{table ? `${table.name}${line?.name ? `: ${line.name}` : ""}` : "Nothing selected"}</h2>
+      <h2 id="inspector-title">{table ? [table.name, inspected?.subject, line?.name && `(${line.name})`].filter(Boolean).join(" ") : "Nothing selected"}</h2>
       {count > 0 && (
         <div class="buttons">
-          {[actions.duplicate, actions.hide, actions.drop, actions.remove].map((action) => (
-            <Button key={action.title} action={action} />
-          ))}
+          <Button action={actions.duplicate} />
+          {actions.ungroup.enabled() ? <Button action={actions.ungroup} label="Ungroup" /> : <Button action={actions.group} label="Group" />}
+          <Button action={actions.hide} label="Hide" />
+          <Button action={actions.lock} label={selection.value.every((at) => state.value?.locked.includes(at)) ? "Unlock" : "Lock"} />
+          <Button action={actions.ground} label="To the ground" />
+          <Button action={actions.drop} label="Drop" />
+          <Button action={actions.key} label="Key" />
+          <Button action={actions.remove} />
         </div>
       )}
       {count > 1 && <p class="note">{count} lines are selected; moving, dropping and hiding concern all of them.</p>}
-      {inspected && table?.fields.map((field) => <FieldRow key={`${inspected.line}:${field.first}`} field={field} inspected={inspected} />)}
+      {inspected && fields.map((field) => <FieldRow key={`${inspected.line}:${field.first}`} field={field} inspected={inspected} />)}
+      {inspected?.material && <MaterialRow name={inspected.material} />}
       {!inspected && <p class="note">Click something in the picture or in the list.</p>}
     </section>
+  );
+}
+
+function MaterialRow({ name }: { readonly name: string }): JSX.Element {
+  const at = lines.value.findIndex((line) => line.role === "material" && line.subject === name);
+  return (
+    <p class="note">
+      Its surface is the material{" "}
+      <button type="button" disabled={at < 0} onClick={() => select([at])}>
+        {name}
+      </button>
+    </p>
+  );
+}
+
+interface KeyProps {
+  readonly inspected: Inspected;
+  readonly numbers: readonly number[];
+  readonly label: string;
+}
+
+/** Sets keys of some numbers at the frame that is shown, or takes them away. */
+function KeyButton({ inspected, numbers, label }: KeyProps): JSX.Element | null {
+  const time = state.value?.time;
+  if (!time || !inspected.canKey || (time.first === time.last && !numbers.some((at) => inspected.curves.includes(at)))) return null;
+  const is = numbers.every((at) => inspected.keyed.includes(at));
+  const changes = numbers.some((at) => inspected.curves.includes(at));
+  return (
+    <button
+      type="button"
+      class={changes ? "key changes" : "key"}
+      aria-pressed={is}
+      aria-label={`Key of ${label}, frame ${time.number}`}
+      title={is ? "Take the key away" : "Set a key here"}
+      onClick={() => wish({ do: "toggle", line: inspected.line, numbers })}
+    >
+      <span class="diamond" />
+    </button>
   );
 }
 
@@ -52,7 +100,8 @@ function FieldRow({ field, inspected }: FieldProps): JSX.Element {
     <fieldset class="field">
       <legend title={`${field.kind} in ${field.unit}; ${field.values}`}>
         {field.label}
-        {field.optional && missing ? " (left out)" : ""}
+        {field.optional && missing ? " (left out)" : ""}{" "}
+        {field.names.length > 1 && <KeyButton inspected={inspected} numbers={field.names.map((_, i) => field.first + i)} label={field.label} />}
       </legend>
       {isColor && <Swatch field={field} inspected={inspected} values={values} />}
       {field.names.map((name, i) => (
@@ -104,7 +153,7 @@ function NumberRow({ field, inspected, name, index, value, slider }: NumberProps
   if (value === null) {
     return (
       <p class="number">
-        <span>{name}</span> <em>changes over time, or has a name; see the script</em>
+        <span>{name}</span> <em>is no number; see the script</em>
       </p>
     );
   }
@@ -113,11 +162,12 @@ function NumberRow({ field, inspected, name, index, value, slider }: NumberProps
   return (
     <p class="number">
       <span aria-hidden="true">{name}</span>
+      <KeyButton inspected={inspected} numbers={[at]} label={label} />
       <input
         type="number"
         step="any"
         aria-label={label}
-        value={value ?? ""}
+        value={value === undefined ? "" : round(value)}
         placeholder="0"
         onChange={(event) => {
           if (event.currentTarget.value !== "") set(inspected.line, at, [event.currentTarget.valueAsNumber], null);

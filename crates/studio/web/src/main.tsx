@@ -3,15 +3,17 @@
 import { render } from "preact";
 
 import { listen } from "./actions";
-import { Bar, Frames, Keys, Notices, Palette } from "./chrome";
+import { Bar, Keys, Notices, Palette } from "./chrome";
 import { FileDialog } from "./file";
 import { Inspector } from "./inspector";
+import { Materials } from "./materials";
 import { Outliner } from "./outliner";
 import { follow } from "./runs";
 import { Runs } from "./runs-panel";
 import { Script } from "./script";
 import { connect } from "./store";
 import "./studio.css";
+import { Timeline } from "./timeline";
 import { Viewport } from "./viewport";
 
 function Studio() {
@@ -23,10 +25,11 @@ function Studio() {
         <div class="side">
           <Palette />
           <Outliner />
+          <Materials />
         </div>
         <div class="middle">
           <Viewport />
-          <Frames />
+          <Timeline />
         </div>
         <div class="side">
           <Inspector />

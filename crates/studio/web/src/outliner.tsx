@@ -1,4 +1,4 @@
-// What there is to see: objects, lights and cameras of the script, by name.
+// What there is to see: objects, groups, lights, cameras and materials of the script, by name.
 
 import { computed, signal } from "@preact/signals";
 import type { JSX } from "preact";
@@ -6,7 +6,7 @@ import type { JSX } from "preact";
 import { actions } from "./actions";
 import { List } from "./list";
 import type { Line } from "./protocol";
-import { ask, lines, select, selected, selection } from "./store";
+import { ask, lines, select, selected, selection, state } from "./store";
 
 const ROW = 28;
 
@@ -14,6 +14,18 @@ const ROW = 28;
 const listed = computed(() =>
   lines.value.flatMap((line, at) => (line.role && line.role !== "setting" ? [at] : [])),
 );
+
+/** The lines that stand in the definition of a group. */
+const grouped = computed(() => {
+  const inside = new Set<number>();
+  let open = false;
+  lines.value.forEach((line, at) => {
+    if (line.command === "End") open = false;
+    if (open) inside.add(at);
+    if (line.command === "Group") open = true;
+  });
+  return inside;
+});
 
 /** The line whose name is being written. */
 const renaming = signal<number | null>(null);
@@ -44,7 +56,13 @@ export function Outliner(): JSX.Element {
     else if (event.key === "F2" || event.key === "Enter") renaming.value = main;
     else if (event.key === "Delete") actions.remove.run();
     else if (event.key === "h") actions.hide.run();
+    else if (event.key === "l") actions.lock.run();
     else if (event.ctrlKey && event.key === "d") actions.duplicate.run();
+    else if (event.ctrlKey && event.key === "g") actions.group.run();
+    else if (event.key === "k") actions.key.run();
+    else if (event.key === "K") actions.autoKey.run();
+    else if (event.key === "g") actions.ground.run();
+    else if (event.key === "d") actions.drop.run();
     else if (event.key === "Escape") actions.none.run();
     else return;
     event.preventDefault();
@@ -59,7 +77,7 @@ export function Outliner(): JSX.Element {
         height={ROW}
         reveal={active < 0 ? null : active}
         role="listbox"
-        aria-label="Objects, lights and cameras"
+        aria-label="Objects, groups, lights, cameras and materials"
         aria-multiselectable="true"
         aria-activedescendant={active < 0 ? undefined : `line-${main}`}
         tabIndex={0}
@@ -121,14 +139,15 @@ function Row({ at, row, line, rows }: RowProps): JSX.Element {
   return (
     <div
       id={`line-${at}`}
-      class={`item ${line.role ?? ""}${line.hidden ? " hidden" : ""}`}
+      class={`item ${line.role ?? ""}${line.hidden ? " hidden" : ""}${grouped.value.has(at) ? " inside" : ""}`}
       role="option"
       aria-selected={isSelected}
       onClick={click}
       onDblClick={() => (renaming.value = at)}
     >
       <span class="kind">{line.command}</span>
-      <span class={line.name ? "name" : "name none"}>{line.name ?? `line ${at + 1}`}</span>
+      <span class={line.name || line.subject ? "name" : "name none"}>{line.name ?? line.subject ?? `line ${at + 1}`}</span>
+      {state.value?.locked.includes(at) && <span class="state">locked</span>}
       {line.hidden && <span class="state">hidden</span>}
     </div>
   );

@@ -1,7 +1,7 @@
 // What page and server say to each other: the types of `protocol.rs`. Points are in pixels of the picture, lines count
 // from 0.
 
-export type Role = "object" | "light" | "camera" | "setting";
+export type Role = "object" | "light" | "use" | "group" | "material" | "camera" | "setting";
 
 export interface Field {
   readonly label: string;
@@ -30,13 +30,16 @@ export interface Line {
   readonly command?: string;
   readonly role?: Role;
   readonly name?: string;
+  /** The name of a group or material that stands before the numbers. */
+  readonly subject?: string;
   readonly hidden?: boolean;
 }
 
 export type Grip =
   | { readonly what: "body" }
   | { readonly what: "axis"; readonly axis: number }
-  | { readonly what: "point" | "length" | "direction"; readonly first: number };
+  | { readonly what: "point" | "length" | "direction" | "scale"; readonly first: number }
+  | { readonly what: "turn"; readonly first: number; readonly axis: number };
 
 export type Point = readonly [number, number];
 
@@ -46,6 +49,8 @@ export interface Handle {
   readonly label: string;
   readonly at: Point;
   readonly from: Point;
+  /** The way along which it goes, as the path of an SVG. */
+  readonly way?: string;
 }
 
 export interface Fault {
@@ -61,7 +66,67 @@ export interface Inspected {
   readonly line: number;
   readonly command: string;
   readonly values: readonly (number | null)[];
+  /** Those that change, and those of them with a key just here. */
+  readonly curves: readonly number[];
+  readonly keyed: readonly number[];
+  readonly canKey: boolean;
+  /** The name that stands in the place of coefficients. */
+  readonly material: string | null;
+  readonly subject: string;
+  /** The parameters of a material, which each has others of. */
+  readonly fields: readonly Field[];
 }
+
+export interface TimeState {
+  /** The number of the frame that is shown; the first and the last of its `Trace`. */
+  readonly number: number;
+  readonly first: number;
+  readonly last: number;
+  /** Which of all frames has the first number, from 0. */
+  readonly start: number;
+  readonly autoKey: boolean;
+  readonly path: boolean;
+  readonly onion: boolean;
+  readonly copied: number;
+}
+
+export type Mode = "linear" | "smooth" | "step";
+
+/** A number that changes: keys are frames and values. */
+export interface Track {
+  readonly line: number;
+  readonly number: number;
+  readonly label: string;
+  readonly mode: Mode;
+  readonly cycle: boolean;
+  readonly keys: readonly (readonly [number, number])[];
+}
+
+export interface Tracks {
+  readonly tracks: readonly Track[];
+  readonly more: boolean;
+}
+
+export interface KeyPlace {
+  readonly line: number;
+  readonly number: number;
+  readonly frame: number;
+}
+
+export interface Ghost {
+  readonly path: string;
+  readonly after: number;
+}
+
+export type TimeWish =
+  | { readonly do: "switch"; readonly what: "auto-key" | "path" | "onion"; readonly on: boolean }
+  | { readonly do: "key"; readonly lines: readonly number[] }
+  | { readonly do: "toggle"; readonly line: number; readonly numbers: readonly number[] }
+  | { readonly do: "grab" | "remove" | "copy"; readonly keys: readonly KeyPlace[] }
+  | { readonly do: "move"; readonly by: number }
+  | { readonly do: "paste" }
+  | { readonly do: "ease"; readonly keys: readonly KeyPlace[]; readonly mode: Mode; readonly cycle: boolean }
+  | { readonly do: "frames"; readonly count: number };
 
 export interface State {
   /** How many wishes were heard when it stood so. */
@@ -79,6 +144,12 @@ export interface State {
   readonly faults: readonly Fault[];
   readonly handles: readonly Handle[];
   readonly grid: string;
+  /** The way of what is selected, and where its keys are. */
+  readonly way: string;
+  readonly marks: string;
+  /** Lines that cannot be taken hold of in the picture. */
+  readonly locked: readonly number[];
+  readonly time: TimeState;
   readonly free: boolean;
   /** Number, width and height of the picture that was ordered last. */
   readonly picture: readonly [number, number, number] | null;
@@ -100,12 +171,16 @@ export interface Tell {
   readonly examples?: readonly string[];
   readonly canCreate?: boolean;
   readonly tables?: readonly Command[];
+  readonly presets?: readonly string[];
   readonly files?: readonly FileState[];
   readonly lines?: readonly Line[];
   readonly splices?: readonly { readonly at: number; readonly removed: number; readonly lines: readonly Line[] }[];
   readonly state?: State;
   readonly hovered?: number | null;
   readonly outline?: string;
+  readonly hoverOutline?: string;
+  readonly ghosts?: readonly Ghost[];
+  readonly tracks?: Tracks;
   readonly output?: Output;
   readonly notice?: string;
 }
@@ -116,7 +191,7 @@ export type Ask =
   | { readonly ask: "size"; readonly width: number; readonly height: number }
   | { readonly ask: "shown" | "release" | "keep-camera" | "undo" | "redo" | "render" | "cancel" }
   | { readonly ask: "frame"; readonly frame: number; readonly moving: boolean }
-  | { readonly ask: "select" | "remove" | "duplicate" | "hide" | "drop"; readonly lines: readonly number[] }
+  | { readonly ask: "select" | "remove" | "duplicate" | "hide" | "drop" | "ground" | "lock" | "group"; readonly lines: readonly number[] }
   | { readonly ask: "hover"; readonly x: number; readonly y: number }
   | {
       readonly ask: "press";
@@ -126,7 +201,7 @@ export type Ask =
       readonly grip: Grip | null;
       readonly line: number | null;
     }
-  | { readonly ask: "drag"; readonly x: number; readonly y: number; readonly upright: boolean; readonly snap: boolean }
+  | { readonly ask: "drag"; readonly x: number; readonly y: number; readonly upright: boolean; readonly snap: boolean; readonly whole: boolean }
   | { readonly ask: "navigate"; readonly how: "turn" | "pan" | "zoom"; readonly x: number; readonly y: number }
   | { readonly ask: "look"; readonly at: Standpoint }
   | {
@@ -143,6 +218,10 @@ export type Ask =
   | { readonly ask: "nudge"; readonly lines: readonly number[]; readonly by: readonly [number, number, number] }
   | { readonly ask: "add"; readonly command: string; readonly at: Point | null }
   | { readonly ask: "load"; readonly from: Source; readonly new: string | null }
+  | { readonly ask: "ungroup"; readonly line: number }
+  | { readonly ask: "surface"; readonly lines: readonly number[]; readonly material: string }
+  | { readonly ask: "preset"; readonly lines: readonly number[]; readonly preset: string }
+  | { readonly ask: "time"; readonly wish: TimeWish }
   | { readonly ask: "resolve"; readonly "keep-mine": boolean };
 
 /** Bytes before the pixels of a picture: number, width, height, microseconds; little-endian. */

@@ -3,7 +3,7 @@
 
 import { batch, computed, signal } from "@preact/signals";
 
-import type { Ask, Command, FileState, Line, Output, State, Tell } from "./protocol";
+import type { Ask, Command, FileState, Ghost, Line, Output, State, Tell, Tracks } from "./protocol";
 
 export const connected = signal(true);
 export const tables = signal<readonly Command[]>([]);
@@ -11,11 +11,16 @@ export const tables = signal<readonly Command[]>([]);
 export const examples = signal<readonly string[]>([]);
 /** Whether scripts can be added. */
 export const canCreate = signal(false);
+/** The names of materials to begin with. */
+export const presets = signal<readonly string[]>([]);
 export const files = signal<readonly FileState[]>([]);
 export const lines = signal<readonly Line[]>([]);
 export const state = signal<State | null>(null);
 export const hovered = signal<number | null>(null);
 export const outline = signal("");
+export const hoverOutline = signal("");
+export const ghosts = signal<readonly Ghost[]>([]);
+export const tracks = signal<Tracks>({ tracks: [], more: false });
 export const output = signal<Output | null>(null);
 export const notice = signal("");
 export const playing = signal(false);
@@ -100,6 +105,7 @@ function hear(tell: Tell): void {
     if (tell.tables) tables.value = tell.tables;
     if (tell.examples) examples.value = tell.examples;
     if (tell.canCreate !== undefined) canCreate.value = tell.canCreate;
+    if (tell.presets) presets.value = tell.presets;
     if (tell.files) files.value = tell.files;
     if (tell.lines) lines.value = tell.lines;
     if (tell.splices) {
@@ -123,6 +129,9 @@ function hear(tell: Tell): void {
       }
     }
     if (tell.outline !== undefined) outline.value = tell.outline;
+    if (tell.hoverOutline !== undefined) hoverOutline.value = tell.hoverOutline;
+    if (tell.ghosts) ghosts.value = tell.ghosts;
+    if (tell.tracks) tracks.value = tell.tracks;
     if (tell.output) output.value = tell.output;
     if (tell.notice) notice.value = tell.notice;
   });

@@ -7,7 +7,7 @@ import { useEffect, useRef } from "preact/hooks";
 
 import type { Handle, Point } from "./protocol";
 import { PICTURE_HEADER } from "./protocol";
-import { ask, hover, hovered, lines, onPicture, outline, selected, state } from "./store";
+import { ask, ghosts, hover, hovered, hoverOutline, lines, onPicture, outline, selected, state } from "./store";
 
 /** How far an arrow key moves a handle, in pixels of the picture. */
 const KEY_STEP = 8;
@@ -95,7 +95,7 @@ export function Viewport(): JSX.Element {
     if (!holding) {
       hover(x, y);
     } else if (holding.what === "drag") {
-      ask({ ask: "drag", x, y, upright: event.shiftKey, snap: event.ctrlKey || event.metaKey });
+      ask({ ask: "drag", x, y, upright: event.shiftKey, snap: event.ctrlKey || event.metaKey, whole: event.altKey });
     } else {
       const [left, top] = holding.last;
       holding.last = [x, y];
@@ -105,6 +105,8 @@ export function Viewport(): JSX.Element {
   const release = (): void => {
     if (held.current) ask({ ask: "release" });
     held.current = null;
+    // It was that of what stood there before.
+    hoverOutline.value = "";
   };
   const keyed = (event: KeyboardEvent, handle: Handle): void => {
     const ways: Record<string, Point> = {
@@ -119,7 +121,7 @@ export function Viewport(): JSX.Element {
     event.stopPropagation();
     const [x, y] = handle.at;
     ask({ ask: "press", x, y, extend: false, grip: handle.grip, line: handle.line });
-    ask({ ask: "drag", x: x + way[0], y: y + way[1], upright: event.shiftKey, snap: event.ctrlKey });
+    ask({ ask: "drag", x: x + way[0], y: y + way[1], upright: event.shiftKey, snap: event.ctrlKey, whole: event.altKey });
     ask({ ask: "release" });
   };
 
@@ -156,13 +158,19 @@ export function Viewport(): JSX.Element {
         <canvas ref={canvas} style={shown} />
         <svg viewBox={`0 0 ${width} ${height}`} style={shown} aria-hidden={picture ? "false" : "true"}>
           {now?.grid && <path class="grid" d={now.grid} />}
+          {ghosts.value.map((ghost) => (
+            <path key={ghost.after} class={`ghost ${ghost.after < 0 ? "before" : "after"} far${Math.abs(ghost.after)}`} d={ghost.path} />
+          ))}
+          {under && !held.current && <path class="outline under-pointer" d={hoverOutline.value} />}
           <path class="outline" d={outline.value} />
+          {now?.way && <path class="way" d={now.way} />}
+          {now?.marks && <path class="marks" d={now.marks} />}
           {picture && now?.handles.map((handle) => <HandleShape key={key(handle)} handle={handle} unit={1 / scale} press={press} keyed={keyed} />)}
         </svg>
       </div>
       {now && !picture && <p class="hint">Nothing to see yet: drag a shape in from the left, or click one.</p>}
       {under && !held.current && !selected.value.has(hovered.value ?? -1) && (
-        <p class="under">{under.name ?? under.command}</p>
+        <p class="under">{under.name ?? under.subject ?? under.command}</p>
       )}
     </div>
   );
@@ -181,8 +189,8 @@ interface HandleProps {
 }
 
 function HandleShape({ handle, unit, press, keyed }: HandleProps): JSX.Element {
-  const { grip, at, from, label } = handle;
-  const which = grip.what === "axis" ? `axis-${"xyz"[grip.axis] ?? ""}` : grip.what;
+  const { grip, at, from, label, way } = handle;
+  const which = grip.what === "axis" || grip.what === "turn" ? `${grip.what}-${"xyz"[grip.axis] ?? ""}` : grip.what;
   return (
     <g
       class={`handle ${which}`}
@@ -194,6 +202,7 @@ function HandleShape({ handle, unit, press, keyed }: HandleProps): JSX.Element {
       onKeyDown={(event) => keyed(event, handle)}
     >
       <title>{label}</title>
+      {way && <path class="ring" d={way} />}
       <line x1={from[0]} y1={from[1]} x2={at[0]} y2={at[1]} />
       <circle class="reach" cx={at[0]} cy={at[1]} r={14 * unit} />
       <circle class="dot" cx={at[0]} cy={at[1]} r={6 * unit} />

@@ -1,0 +1,133 @@
+//! Changes of the file that is shown.
+
+use glam::{DVec2, DVec3};
+use rayfold_scene::Command;
+
+use super::Session;
+use crate::document::Splice;
+use crate::edits;
+use crate::groups;
+use crate::project::Project;
+use crate::protocol::Tell;
+use crate::tables::{Role, role};
+use crate::view::Projection;
+
+impl Session {
+    /// Makes changes of the file that is shown, as one step.
+    pub(super) fn edit(
+        &mut self,
+        project: &mut Project,
+        splices: Vec<Splice>,
+        gesture: Option<u64>,
+        tell: &mut Tell,
+    ) {
+        let file = self.place(project).file;
+        let lines = project.files[file].document.lines();
+        let is_new =
+            |splice: &Splice| lines.get(splice.at..splice.at + splice.removed) != Some(&splice.inserted[..]);
+        let splices: Vec<_> = splices.into_iter().filter(is_new).collect();
+        if splices.is_empty() {
+            return;
+        }
+        // Several splices are one step also where there is no gesture.
+        let gesture = gesture.unwrap_or_else(|| self.next_gesture());
+        let done = project.files[file].apply(splices, Some(gesture));
+        self.told(done, tell);
+    }
+
+    /// The pointer's gestures are even.
+    pub(super) fn next_gesture(&mut self) -> u64 {
+        self.gestures += 1;
+        self.gestures << 1
+    }
+
+    pub(super) fn add(&mut self, project: &mut Project, name: &str, at: Option<DVec2>, tell: &mut Tell) {
+        let Some(command) = Command::from_name(name) else { return };
+        if !matches!(role(command), Role::Object | Role::Light) {
+            return;
+        }
+        let stage = self.stage(project);
+        let (mut ground, mut size) = (DVec3::ZERO, 1.0);
+        if let Some(scene) = self.scene(project) {
+            let projection = Projection::new(&scene);
+            let (width, height) = (f64::from(scene.screen.width()), f64::from(scene.screen.height()));
+            let at = at.unwrap_or(DVec2::new(0.5 * width, 0.6 * height));
+            let bounds = self.bounds(project);
+            let (origin, direction) = projection.ray(at);
+            let below = bounds.low.y.min(0.0);
+            let distance = (below - origin.y) / direction.y;
+            let hit = self.pick(project, at.x, at.y).map(|(_, point)| point);
+            let on_ground = || {
+                let near =
+                    distance > 0.0 && distance < 20.0 * bounds.radius() + origin.distance(bounds.center());
+                near.then_some(origin + distance * direction)
+            };
+            ground = hit.or_else(on_ground).unwrap_or(bounds.center());
+            size = projection.pixel_at(ground) * height * 0.07;
+            let step = 10f64.powi(size.log10().floor() as i32);
+            size = (size / step).round() * step;
+        }
+        if !(size.is_normal() && ground.is_finite()) {
+            (ground, size) = (DVec3::ZERO, 1.0);
+        }
+        let count = stage.objects.len() + stage.lights.len();
+        let line = edits::new_line(command, ground, size, count);
+        let (splices, place) = edits::add(self.file_lines(project), &stage, line);
+        self.edit(project, splices, None, tell);
+        self.select(project, vec![place]);
+        self.outline(project, tell);
+    }
+
+    /// Lines become a group, which is selected then.
+    pub(super) fn group(&mut self, project: &mut Project, lines: &[usize], tell: &mut Tell) {
+        let stage = self.stage(project);
+        let Some(scene) = self.sound_scene(project, &stage) else { return };
+        match groups::group(self.file_lines(project), &stage, &scene, lines) {
+            Ok((splices, place)) => {
+                self.edit(project, splices, None, tell);
+                self.select(project, vec![place]);
+                self.outline(project, tell);
+            }
+            Err(refusal) => tell.notice = Some(refusal.told().into()),
+        }
+    }
+
+    /// A group is taken apart; its lines are selected then.
+    pub(super) fn ungroup(&mut self, project: &mut Project, line: usize, tell: &mut Tell) {
+        match groups::ungroup(self.file_lines(project), line) {
+            Ok((splices, place)) => {
+                self.edit(project, splices, None, tell);
+                self.select(project, place.collect());
+                self.outline(project, tell);
+            }
+            Err(refusal) => tell.notice = Some(refusal.told().into()),
+        }
+    }
+
+    /// Whether a line cannot be taken hold of in the picture.
+    pub(super) fn is_locked(&self, project: &Project, line: usize) -> bool {
+        self.locked.contains(&(self.place(project).file, line))
+    }
+
+    /// The lines of the file that is shown which cannot be taken hold of.
+    pub(super) fn locked_lines(&self, project: &Project) -> Vec<usize> {
+        let file = self.place(project).file;
+        self.locked.iter().filter(|(of, _)| *of == file).map(|(_, line)| *line).collect()
+    }
+
+    /// Locks lines, or unlocks them if all of them are locked.
+    pub(super) fn lock(&mut self, project: &Project, lines: &[usize]) {
+        let file = self.place(project).file;
+        let is_locked = |session: &Self, line: usize| session.locked.contains(&(file, line));
+        if lines.iter().all(|&line| is_locked(self, line)) {
+            self.locked.retain(|(of, line)| *of != file || !lines.contains(line));
+            return;
+        }
+        let count = self.file_lines(project).len();
+        for &line in lines.iter().filter(|&&line| line < count) {
+            if !is_locked(self, line) {
+                self.locked.push((file, line));
+            }
+        }
+    }
+}

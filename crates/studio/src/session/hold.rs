@@ -1,0 +1,100 @@
+//! What the pointer holds, from its press to its release.
+
+use glam::DVec2;
+
+use super::time::HeldKeys;
+use super::{Change, Session};
+use crate::edits;
+use crate::handles::{Drag, Grip, Manner};
+use crate::project::Project;
+use crate::protocol::{Navigation, Tell};
+use crate::view::Projection;
+
+/// What the pointer holds.
+#[derive(Debug)]
+pub(super) enum Held {
+    /// Lines.
+    Drag(Drag, DVec2),
+    /// The free camera; where the pointer was last.
+    Turn(DVec2),
+    /// Keys of the timeline.
+    Keys(HeldKeys),
+}
+
+impl Session {
+    pub(super) fn press(
+        &mut self,
+        project: &Project,
+        at: DVec2,
+        extend: bool,
+        handle: Option<(Grip, usize)>,
+    ) {
+        self.gestures += 1;
+        let around = self.around(project);
+        let (grip, grabbed) = match handle {
+            Some((grip, line)) => {
+                if !self.selection.contains(&line) {
+                    self.select(project, vec![line]);
+                }
+                (grip, None)
+            }
+            None => {
+                let Some((line, point)) = self.pick(project, at.x, at.y) else {
+                    if !extend {
+                        self.selection.clear();
+                    }
+                    self.held = Some(Held::Turn(at));
+                    return;
+                };
+                let mut selection = if extend || self.selection.contains(&line) {
+                    self.selection.clone()
+                } else {
+                    Vec::new()
+                };
+                selection.push(line);
+                self.select(project, selection);
+                (Grip::Body, Some(point))
+            }
+        };
+        let all = matches!(grip, Grip::Body | Grip::Axis { .. });
+        let main = self.selection.last().copied();
+        let lines = self.selection.iter().rev().copied().filter(|&line| all || Some(line) == main);
+        let stage = self.stage(project);
+        let lines = lines.filter(|&line| !stage.is_in_group(line) && !self.is_locked(project, line));
+        let lines = lines.filter_map(|line| Some((line, self.line(project, line)?.clone()))).collect();
+        let keying = self.keying(project);
+        self.held = Drag::new(grip, lines, grabbed, around, keying).map(|drag| Held::Drag(drag, at));
+    }
+
+    pub(super) fn drag(
+        &mut self,
+        project: &mut Project,
+        at: DVec2,
+        manner: Manner,
+        tell: &mut Tell,
+    ) -> Change {
+        let Some(scene) = self.scene(project) else { return Change::Nothing };
+        match &mut self.held {
+            None | Some(Held::Keys(_)) => Change::Nothing,
+            Some(Held::Turn(last)) => {
+                let moved = (at - *last) / f64::from(scene.screen.height());
+                *last = at;
+                self.navigate(project, Navigation::Turn, moved);
+                tell.outline = Some(String::new());
+                Change::Moving
+            }
+            Some(Held::Drag(drag, start)) => {
+                let changed = drag.to(&Projection::new(&scene), *start, at, manner);
+                let gesture = self.gestures << 1;
+                let splices = changed
+                    .into_iter()
+                    .filter(|(line, text)| self.line(project, *line).is_some_and(|old| old != text))
+                    .map(|(line, text)| edits::set(line, text))
+                    .collect();
+                self.edit(project, splices, Some(gesture), tell);
+                tell.outline = Some(String::new());
+                Change::Moving
+            }
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! What is seen: the scene of the viewport, what lies under a point of it, and from where it is looked at.
+
+use glam::{DVec2, DVec3};
+use rayfold_scene::{Camera, Command, Pinhole, Scene, Screen};
+
+use super::{Change, Session};
+use crate::document::Splice;
+use crate::edits;
+use crate::extent;
+use crate::line::Line;
+use crate::project::Project;
+use crate::protocol::{Navigation, Standpoint, Tell};
+use crate::silhouette;
+use crate::stage::Stage;
+use crate::view::{Bounds, Orbit, Projection};
+
+/// Pixels of a picture, at most.
+pub(super) const PIXELS: u64 = 8 << 20;
+
+/// Lines of the grid in each direction from the middle.
+const GRID: i32 = 10;
+
+impl Session {
+    /// What the viewport shows.
+    pub(super) fn scene(&self, project: &Project) -> Option<Scene> {
+        let place = self.place(project);
+        let mut scene = project.files[place.file].script.as_ref()?.frame(place.frame)?;
+        let (width, height) = (f64::from(self.size.0), f64::from(self.size.1));
+        match (&self.free, &scene.camera) {
+            (Some(orbit), _) => {
+                scene.screen = fitted(width, height)?;
+                scene.camera = Camera::Pinhole(orbit.camera(width / height).ok()?);
+            }
+            // Its pixels are world units.
+            (None, Camera::Orthographic) => {}
+            (None, _) => {
+                let (columns, rows) = (f64::from(scene.screen.width()), f64::from(scene.screen.height()));
+                let scale = (width / columns).min(height / rows);
+                scene.screen = fitted(columns * scale, rows * scale)?;
+            }
+        }
+        Some(scene)
+    }
+
+    /// The same, if its objects are those of the lines.
+    pub(super) fn sound_scene(&self, project: &Project, stage: &Stage) -> Option<Scene> {
+        let is_sound = project.files[self.place(project).file].is_sound();
+        self.scene(project).filter(|scene| is_sound && scene.objects.len() == stage.object_count())
+    }
+
+    pub(super) fn bounds(&self, project: &Project) -> Bounds {
+        let place = self.place(project);
+        let script = project.files[place.file].script.as_ref();
+        let scene = script.and_then(|script| script.frame(place.frame));
+        let lamps = || {
+            let (lines, time) = (self.file_lines(project), self.time(project));
+            let lights = self.stage(project).lights.into_iter().filter_map(|line| lines.get(line));
+            edits::places(lights.collect::<Vec<_>>(), time)
+        };
+        scene
+            .and_then(|scene| extent::bounds(scene.objects.iter()))
+            .or_else(lamps)
+            .unwrap_or(Bounds { low: DVec3::splat(-1.0), high: DVec3::splat(1.0) })
+    }
+
+    /// Where what is selected is.
+    fn selected_bounds(&self, project: &Project) -> Option<Bounds> {
+        let stage = self.stage(project);
+        let objects = self.sound_scene(project, &stage).and_then(|scene| {
+            let own = scene
+                .objects
+                .iter()
+                .enumerate()
+                .filter(|(at, _)| stage.line_of(*at).is_some_and(|line| self.selection.contains(&line)));
+            extent::bounds(own.map(|(_, object)| object))
+        });
+        let lights = self.selection.iter().filter(|line| stage.lights.contains(line));
+        let lights = lights.filter_map(|&line| self.line(project, line));
+        objects.or_else(|| edits::places(lights.collect::<Vec<_>>(), self.time(project)))
+    }
+
+    /// Where lights without a place are shown.
+    pub(super) fn around(&self, project: &Project) -> DVec3 {
+        self.free.map_or_else(|| self.bounds(project).center(), |orbit| orbit.target)
+    }
+
+    /// What a pixel spans in the middle of the scene, as a power of ten.
+    pub(super) fn step(&self, project: &Project) -> f64 {
+        let pixel = self.scene(project).map(|scene| Projection::new(&scene).pixel_at(self.around(project)));
+        let pixel = pixel.filter(|pixel| pixel.is_normal()).unwrap_or(0.01);
+        10f64.powi(pixel.log10().floor().clamp(-12.0, 12.0) as i32)
+    }
+
+    /// The line of the object under a point of the picture, and where it was hit.
+    pub(super) fn pick(&self, project: &Project, x: f64, y: f64) -> Option<(usize, DVec3)> {
+        let stage = self.stage(project);
+        let scene = self.sound_scene(project, &stage)?;
+        let (column, row) = (x.floor(), y.floor());
+        let inside = (0.0..f64::from(scene.screen.width())).contains(&column)
+            && (0.0..f64::from(scene.screen.height())).contains(&row);
+        let found = if inside { silhouette::pick(&scene, column, row).ok().flatten()? } else { return None };
+        let (origin, direction) = Projection::new(&scene).ray(DVec2::new(column + 0.5, row + 0.5));
+        let line = stage.line_of(found.object)?;
+        (!self.is_locked(project, line)).then(|| (line, origin + found.distance * direction))
+    }
+
+    /// The outline of some lines' objects.
+    fn outline_of(&self, project: &Project, stage: &Stage, is_in: impl Fn(usize) -> bool) -> Option<String> {
+        let scene = self.sound_scene(project, stage)?;
+        let is_any = stage.objects.iter().any(|&line| is_in(line));
+        let is_in = |object: usize| stage.line_of(object).is_some_and(&is_in);
+        if is_any { silhouette::outline(&scene, is_in).ok() } else { None }
+    }
+
+    /// What is under the pointer now, and its outline, if that is something else than before.
+    pub(super) fn hover(&mut self, project: &Project, x: f64, y: f64, tell: &mut Tell) {
+        let line = self.pick(project, x, y).map(|(line, _)| line);
+        tell.hovered = Some(line);
+        if line != self.hovered {
+            self.hovered = line;
+            let stage = self.stage(project);
+            let path = line.filter(|line| !self.selection.contains(line));
+            let path = path.and_then(|line| self.outline_of(project, &stage, |other| other == line));
+            tell.hover_outline = Some(path.unwrap_or_default());
+        }
+    }
+
+    pub(super) fn outline(&self, project: &Project, tell: &mut Tell) {
+        let stage = self.stage(project);
+        let path = self.outline_of(project, &stage, |line| self.selection.contains(&line));
+        tell.outline = Some(path.unwrap_or_default());
+        tell.ghosts = Some(self.ghosts(project));
+    }
+
+    pub(super) fn navigate(&mut self, project: &Project, how: Navigation, moved: DVec2) {
+        if !moved.is_finite() {
+            return;
+        }
+        let bounds = self.bounds(project);
+        let Some(mut orbit) = self.free.or_else(|| self.orbit(project)) else { return };
+        match how {
+            Navigation::Turn => orbit.turn(moved),
+            Navigation::Pan => orbit.pan(moved),
+            Navigation::Zoom => orbit.zoom(moved.y.clamp(-2.0, 2.0).exp(), bounds.radius()),
+        }
+        self.free = Some(orbit);
+    }
+
+    /// A free camera where one looks from now.
+    pub(super) fn orbit(&self, project: &Project) -> Option<Orbit> {
+        let scene = self.scene(project)?;
+        Some(self.free.unwrap_or_else(|| Orbit::from_camera(&scene.camera, self.bounds(project))))
+    }
+
+    pub(super) fn look(&mut self, project: &Project, at: Standpoint) {
+        let bounds = self.bounds(project);
+        let quarter = std::f64::consts::FRAC_PI_2;
+        self.free = match at {
+            Standpoint::Script => None,
+            Standpoint::Free => self.orbit(project),
+            Standpoint::Front => Some(Orbit::at(bounds, 0.0, 0.0)),
+            Standpoint::Side => Some(Orbit::at(bounds, quarter, 0.0)),
+            Standpoint::Top => Some(Orbit::at(bounds, 0.0, quarter)),
+            Standpoint::Selection => {
+                let what = self.selected_bounds(project).unwrap_or(bounds);
+                let from = self.orbit(project);
+                from.map(|from| Orbit { half_fov: from.half_fov, ..Orbit::at(what, from.yaw, from.pitch) })
+            }
+        };
+    }
+
+    pub(super) fn keep_camera(&mut self, project: &mut Project, tell: &mut Tell) -> Change {
+        let place = self.place(project);
+        let Some(screen) =
+            project.files[place.file].script.as_ref().and_then(|script| script.frame(place.frame))
+        else {
+            return Change::Nothing;
+        };
+        let aspect = f64::from(screen.screen.width()) / f64::from(screen.screen.height());
+        let Some(Ok(camera)) = self.free.map(|orbit| orbit.camera(aspect)) else { return Change::Nothing };
+        let stage = self.stage(project);
+        let lines = self.file_lines(project);
+        let numbers = camera_numbers(&camera, self.step(project));
+        let old = stage.camera.filter(|&at| lines[at].command() == Some(Command::Camera));
+        let splice = match old {
+            Some(at) => lines[at].with_numbers(0, &numbers).map(|line| edits::set(at, line)),
+            None => {
+                let line = Line::new(Command::Camera.name()).with_numbers(0, &numbers);
+                let at = stage.camera.or(stage.screen).map_or(0, |at| at + 1);
+                line.map(|line| Splice { at, removed: 0, inserted: vec![line] })
+            }
+        };
+        self.edit(project, splice.into_iter().collect(), None, tell);
+        self.free = None;
+        Change::Still
+    }
+}
+
+/// A scene of another frame as it is seen now.
+pub(super) fn picture_of(scene: Scene, now: &Scene) -> Scene {
+    Scene { screen: now.screen, camera: now.camera, ..scene }
+}
+
+/// A size of a picture, smaller than asked for where that is too large.
+fn fitted(width: f64, height: f64) -> Option<Screen> {
+    let scale = (PIXELS as f64 / (width * height)).sqrt().min(1.0);
+    let side = |side: f64| (side * scale).round().max(1.0) as u32;
+    Screen::new(side(width), side(height)).ok()
+}
+
+/// The numbers of `Camera`, rounded to what can be seen.
+fn camera_numbers(camera: &Pinhole, step: f64) -> Vec<f64> {
+    let decimals = |step: f64| (-step.log10()).ceil().clamp(0.0, 12.0) as usize;
+    let round = |x: f64, decimals: usize| format!("{x:.decimals$}").parse().unwrap_or(x);
+    let places = decimals(step);
+    let mut numbers: Vec<f64> = camera.eye().to_array().map(|x| round(x, places)).into();
+    for direction in [camera.gaze(), camera.up()] {
+        numbers.extend(direction.to_array().map(|x| round(x, 5)));
+    }
+    numbers.push(camera.distance());
+    for corner in [camera.lower_left(), camera.upper_right()] {
+        numbers.extend(corner.to_array().map(|x| round(x, 5)));
+    }
+    numbers
+}
+
+/// Lines on the height 0 around a scene.
+pub(super) fn grid_path(projection: &Projection, bounds: Bounds) -> String {
+    let step = 10f64.powf((bounds.radius() / 4.0).log10().round());
+    let reach = step * f64::from(GRID);
+    let middle = (bounds.center() / step).round() * step;
+    let at = |x: f64, z: f64| projection.point(DVec3::new(middle.x + x, 0.0, middle.z + z));
+    let mut path = String::new();
+    for line in -GRID..=GRID {
+        let off = step * f64::from(line);
+        for flip in [false, true] {
+            // In pieces: one that goes behind the eye is left out.
+            for piece in -GRID..GRID {
+                let (from, to) = (step * f64::from(piece), step * f64::from(piece + 1));
+                let ends = if flip { (at(off, from), at(off, to)) } else { (at(from, off), at(to, off)) };
+                if let ((Some(a), Some(b)), true) = (ends, reach.is_finite()) {
+                    path.push_str(&format!("M{:.1} {:.1}L{:.1} {:.1}", a.x, a.y, b.x, b.y));
+                }
+            }
+        }
+    }
+    path
+}

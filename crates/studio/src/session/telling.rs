@@ -1,0 +1,171 @@
+//! What the page is told: how everything stands, and which lines have changed.
+
+use rayfold_scene::{Command, Scene};
+
+use super::hold::Held;
+use super::sight::grid_path;
+use super::{Answer, Change, Session};
+use crate::document::Splice;
+use crate::edits;
+use crate::handles::handles;
+use crate::line::Line;
+use crate::pictures::Wanted;
+use crate::project::Project;
+use crate::protocol::{FaultState, FileState, LineState, LinesChanged, State, Tell};
+use crate::tables::role;
+use crate::values::Values;
+use crate::view::Projection;
+
+impl Session {
+    pub(super) fn answer(&mut self, project: &Project, mut tell: Tell, change: Change) -> Answer {
+        let files: Vec<_> = project
+            .files
+            .iter()
+            .map(|file| FileState {
+                name: file.name.clone(),
+                frames: file.frame_count(),
+                faulty: !file.is_sound(),
+            })
+            .collect();
+        if files != self.files {
+            tell.files = Some(files.clone());
+            self.files = files;
+        }
+        let scene = self.scene(project);
+        let picture = match (change, &scene) {
+            (Change::Nothing, _) | (_, None) => None,
+            (change, Some(scene)) => {
+                self.pictures = self.pictures.wrapping_add(1);
+                let moving = change == Change::Moving;
+                Some(Wanted { scene: scene.clone(), moving, number: self.pictures })
+            }
+        };
+        if change != Change::Nothing {
+            // What was outlined may look otherwise now.
+            self.hovered = None;
+        }
+        tell.tracks = self.new_tracks(project);
+        tell.state = Some(self.state(project, scene.as_ref()));
+        Answer { tell, picture, shown: false, output: None }
+    }
+
+    pub(super) fn state(&self, project: &Project, scene: Option<&Scene>) -> State {
+        let place = self.place(project);
+        let file = &project.files[place.file];
+        let lines = file.document.lines();
+        let mut shown = Vec::new();
+        let mut grid = String::new();
+        let (mut way, mut marks) = (String::new(), String::new());
+        let (stage, time) = (self.stage(project), self.time(project));
+        if let Some(scene) = scene {
+            let projection = Projection::new(scene);
+            let around = self.around(project);
+            if !matches!(self.held, Some(Held::Turn(_)))
+                && let Some(&line) = self.selection.last()
+                && let Some(values) = lines.get(line).and_then(|text| Values::of(text, time))
+                && !stage.is_in_group(line)
+                && !self.is_locked(project, line)
+            {
+                shown = handles(line, &values, &projection, around);
+            }
+            (way, marks) = self.motion_path(project, &projection, &stage);
+            if self.free.is_some() {
+                grid = grid_path(&projection, self.bounds(project));
+            }
+        }
+        let inspected = self.selection.last().and_then(|&line| self.inspected(project, line));
+        let faults = file
+            .diagnostics
+            .iter()
+            .map(|fault| FaultState {
+                line: fault.line - 1,
+                column: fault.column - 1,
+                length: fault.excerpt.text.get(fault.excerpt.marked.clone()).map_or(0, |t| t.chars().count()),
+                error: fault.is_error(),
+                message: fault.message.clone(),
+                help: fault.help.clone().or_else(|| fault.expected.clone()).unwrap_or_default(),
+            })
+            .collect();
+        State {
+            asked: self.asked,
+            title: project.name.clone(),
+            fps: project.settings.fps(),
+            frame: self.frame.min(project.frame_count() - 1),
+            frames: project.frame_count(),
+            file: place.file,
+            saved: file.saved(),
+            can_undo: file.document.can_undo(),
+            can_redo: file.document.can_redo(),
+            selection: self.selection.clone(),
+            inspected,
+            faults,
+            handles: shown,
+            grid,
+            way,
+            marks,
+            locked: self.locked_lines(project),
+            time: self.time_state(project),
+            free: self.free.is_some(),
+            picture: scene.map(|scene| (self.pictures, scene.screen.width(), scene.screen.height())),
+        }
+    }
+
+    pub(super) fn lines(&self, project: &Project) -> Vec<LineState> {
+        self.file_lines(project).iter().map(line_state).collect()
+    }
+
+    /// What is selected, locked and copied stays with its lines.
+    pub(super) fn told(&mut self, splices: Vec<Splice>, tell: &mut Tell) {
+        let file = self.shown_file;
+        if splices.iter().any(|splice| splice.removed != splice.inserted.len())
+            && !matches!(self.held, Some(Held::Turn(_)))
+        {
+            // What is held stands elsewhere now.
+            self.held = None;
+        }
+        for splice in &splices {
+            self.selection = self.selection.iter().filter_map(|&line| after(splice, line)).collect();
+            let locked = self
+                .locked
+                .iter()
+                .filter_map(|&(of, line)| Some((of, if of == file { after(splice, line)? } else { line })));
+            self.locked = locked.collect();
+            self.copied.retain_mut(|copied| match after(splice, copied.place.line) {
+                Some(line) => {
+                    copied.place.line = line;
+                    true
+                }
+                None => false,
+            });
+        }
+        tell.splices.extend(splices.into_iter().map(|splice| LinesChanged {
+            at: splice.at,
+            removed: splice.removed,
+            lines: splice.inserted.iter().map(line_state).collect(),
+        }));
+    }
+}
+
+/// Where a line is after a change; `None` if it has gone.
+fn after(splice: &Splice, line: usize) -> Option<usize> {
+    let (end, inserted) = (splice.at + splice.removed, splice.inserted.len());
+    if line < splice.at || line < end && inserted == splice.removed {
+        return Some(line);
+    }
+    (line >= end).then(|| line + inserted - splice.removed)
+}
+
+fn line_state(line: &Line) -> LineState {
+    let text = line.text();
+    let hidden = if text.trim_start().starts_with('#') { edits::hidden(line) } else { None };
+    let of = hidden.as_ref().unwrap_or(line);
+    let command = of.command();
+    LineState {
+        text,
+        command: command.map(Command::name),
+        role: command.map(role),
+        name: of.name(),
+        subject: of.subject().map(str::to_owned),
+        hidden: hidden.is_some(),
+    }
+}

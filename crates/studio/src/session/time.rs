@@ -1,0 +1,290 @@
+//! Time: keys and what is done with them, the frame that is shown, and where things are at others.
+
+use std::fmt::Write;
+
+use rayfold_scene::{Command, Mode};
+
+use super::hold::Held;
+use super::sight::picture_of;
+use super::{Change, Session};
+use crate::document::Splice;
+use crate::edits;
+use crate::line::Line;
+use crate::project::Project;
+use crate::protocol::{Ghost, Inspected, Switch, Tell, TimeState, TimeWish};
+use crate::silhouette;
+use crate::stage::Stage;
+use crate::tables::FieldTable;
+use crate::tracks::{self, KeyPlace, Tracks};
+use crate::values::{Keying, Values, curve};
+use crate::view::Projection;
+
+/// Frames of a script, at most, that the page asks for.
+const FRAMES: u32 = 1_000_000;
+
+/// Places of a motion path, at most.
+const PLACES: usize = 400;
+
+/// How many ghosts before the frame that is shown, and behind it.
+const GHOSTS: i64 = 2;
+
+/// Parts that the frames are divided into by ghosts.
+const PARTS: i64 = 12;
+
+/// Keys that are being dragged: their lines as they were.
+#[derive(Debug)]
+pub(super) struct HeldKeys {
+    numbers: Vec<usize>,
+    lines: Vec<Line>,
+    /// Their lines are places in `lines`.
+    keys: Vec<KeyPlace>,
+    gesture: u64,
+}
+
+impl HeldKeys {
+    fn new(lines: &[Line], keys: &[KeyPlace], gesture: u64) -> Self {
+        let mut numbers: Vec<_> = keys.iter().map(|key| key.line).filter(|&at| at < lines.len()).collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        let place = |key: &KeyPlace| Some(KeyPlace { line: numbers.binary_search(&key.line).ok()?, ..*key });
+        let keys = keys.iter().filter_map(place).collect();
+        let lines = numbers.iter().map(|&at| lines[at].clone()).collect();
+        Self { numbers, lines, keys, gesture }
+    }
+
+    /// The lines, where the keys are so many frames later.
+    fn moved(&self, by: f64) -> Vec<Splice> {
+        let mut lines = self.lines.clone();
+        for (at, line) in tracks::moved(&self.lines, &self.keys, by) {
+            lines[at] = line;
+        }
+        self.numbers.iter().zip(lines).map(|(&at, line)| edits::set(at, line)).collect()
+    }
+}
+
+impl Session {
+    /// The time of the frame that is shown.
+    pub(super) fn time(&self, project: &Project) -> f64 {
+        let place = self.place(project);
+        let script = project.files[place.file].script.as_ref();
+        script.and_then(|script| script.frame_number(place.frame)).unwrap_or(1.0)
+    }
+
+    /// How a change is written that is made now.
+    pub(super) fn keying(&self, project: &Project) -> Keying {
+        let (first, _) = self.range(project);
+        Keying { time: self.time(project), first: first.into(), auto: self.auto_key, whole: false }
+    }
+
+    /// The frames of the `Trace` that is shown.
+    fn range(&self, project: &Project) -> (u32, u32) {
+        let place = self.place(project);
+        let script = project.files[place.file].script.as_ref();
+        script.and_then(|script| script.frame_numbers(place.frame)).unwrap_or((1, 1))
+    }
+
+    pub(super) fn time_wish(&mut self, project: &mut Project, wish: TimeWish, tell: &mut Tell) -> Change {
+        let time = self.time(project);
+        let lines = self.file_lines(project);
+        let set = |changed: Vec<(usize, Line)>| {
+            changed.into_iter().map(|(at, line)| edits::set(at, line)).collect::<Vec<_>>()
+        };
+        let splices = match wish {
+            TimeWish::Switch { what, on } => {
+                match what {
+                    Switch::AutoKey => self.auto_key = on,
+                    Switch::Path => self.path = on,
+                    Switch::Onion => self.onion = on,
+                }
+                self.outline(project, tell);
+                return Change::Nothing;
+            }
+            TimeWish::Key { lines: which } => set(which
+                .iter()
+                .filter_map(|&at| {
+                    let line = lines.get(at)?;
+                    Some((at, tracks::toggled(line, &tracks::main_numbers(line), time)?))
+                })
+                .collect()),
+            TimeWish::Toggle { line, numbers } => {
+                let changed = lines.get(line).and_then(|text| tracks::toggled(text, &numbers, time));
+                set(changed.map(|text| (line, text)).into_iter().collect())
+            }
+            TimeWish::Grab { keys } => {
+                let gesture = self.next_gesture();
+                self.held = Some(Held::Keys(HeldKeys::new(self.file_lines(project), &keys, gesture)));
+                return Change::Nothing;
+            }
+            TimeWish::Move { by } => {
+                let Some(Held::Keys(held)) = &self.held else { return Change::Nothing };
+                if !by.is_finite() {
+                    return Change::Nothing;
+                }
+                let (splices, gesture) = (held.moved(by.round()), held.gesture);
+                self.edit(project, splices, Some(gesture), tell);
+                tell.outline = Some(String::new());
+                return Change::Moving;
+            }
+            TimeWish::Remove { keys } => set(tracks::removed(lines, &keys)),
+            TimeWish::Copy { keys } => {
+                self.copied = tracks::copied(lines, &keys);
+                return Change::Nothing;
+            }
+            TimeWish::Paste => set(tracks::pasted(lines, &self.copied, time, self.selection.last().copied())),
+            TimeWish::Ease { keys, mode, cycle } => {
+                let mode = Mode::ALL.iter().copied().find(|known| known.name() == mode);
+                set(mode.map(|mode| tracks::eased(lines, &keys, mode, cycle)).unwrap_or_default())
+            }
+            TimeWish::Frames { count } => {
+                edits::set_frames(lines, &self.stage(project), count.clamp(1, FRAMES))
+            }
+        };
+        self.edit(project, splices, None, tell);
+        // There may be fewer now.
+        self.show(project, self.frame, tell);
+        self.outline(project, tell);
+        Change::Still
+    }
+
+    pub(super) fn time_state(&self, project: &Project) -> TimeState {
+        let (first, last) = self.range(project);
+        let number = self.time(project);
+        let before = (number - f64::from(first)).max(0.0) as usize;
+        TimeState {
+            number,
+            first,
+            last,
+            start: self.frame.saturating_sub(before),
+            auto_key: self.auto_key,
+            path: self.path,
+            onion: self.onion,
+            copied: self.copied.len(),
+        }
+    }
+
+    /// The tracks, if the page knows others.
+    pub(super) fn new_tracks(&mut self, project: &Project) -> Option<Tracks> {
+        let tracks = tracks::tracks(self.file_lines(project));
+        if self.tracks.as_ref() == Some(&tracks) {
+            return None;
+        }
+        self.tracks = Some(tracks.clone());
+        Some(tracks)
+    }
+
+    /// The parameters of a line, as they are now.
+    pub(super) fn inspected(&self, project: &Project, at: usize) -> Option<Inspected> {
+        let line = self.line(project, at)?;
+        let time = self.time(project);
+        let (values, words) = (Values::of(line, time)?, line.words()?);
+        let curves: Vec<_> = (0..words.parameters.len())
+            .filter_map(|number| Some((number, curve(line, &words, number)?)))
+            .collect();
+        let has_key = |curve: &rayfold_scene::Curve| curve.key_at(time).is_some();
+        let keyed = curves.iter().filter(|(_, curve)| has_key(curve)).map(|(number, _)| *number).collect();
+        let form = values.command.form();
+        let is_named = |at: usize| {
+            words.parameters.len() == at + 1 && values.written().get(at).copied().flatten().is_none()
+        };
+        let surface =
+            form.surface().filter(|&at| is_named(at) && !curves.iter().any(|(number, _)| *number == at));
+        Some(Inspected {
+            line: at,
+            command: values.command.name(),
+            values: values.written().to_vec(),
+            keyed,
+            curves: curves.into_iter().map(|(number, _)| number).collect(),
+            can_key: form.curves,
+            material: surface.map(|at| line.word(&words.parameters[at]).to_owned()),
+            subject: line.subject().unwrap_or_default().to_owned(),
+            fields: if values.command == Command::Material { clause_fields(line) } else { Vec::new() },
+        })
+    }
+
+    /// The way of what is selected, and where its keys are, as paths of an SVG.
+    pub(super) fn motion_path(
+        &self,
+        project: &Project,
+        projection: &Projection,
+        stage: &Stage,
+    ) -> (String, String) {
+        let nothing = (String::new(), String::new());
+        let Some(&at) = self.selection.last().filter(|line| self.path && !stage.is_in_group(**line)) else {
+            return nothing;
+        };
+        let Some(line) = self.line(project, at).filter(|line| line.bytes().contains(&b'(')) else {
+            return nothing;
+        };
+        let place = |time: f64| {
+            let values = Values::of(line, time)?;
+            let places: Vec<_> = values.positions().map(|(_, place)| place).collect();
+            (!places.is_empty()).then(|| places.iter().sum::<glam::DVec3>() / places.len() as f64)
+        };
+        let (first, last) = self.range(project);
+        let count = ((last - first) as usize + 1).clamp(2, PLACES);
+        let share = |i: usize| f64::from(first) + f64::from(last - first) * i as f64 / (count - 1) as f64;
+        let places: Vec<_> = (0..count).map(|i| place(share(i))).collect();
+        if places.windows(2).all(|pair| pair[0] == pair[1]) {
+            return nothing;
+        }
+        let (mut way, mut marks) = (String::new(), String::new());
+        let mut is_open = false;
+        for place in places {
+            let seen = place.and_then(|place| projection.point(place));
+            if let Some(at) = seen {
+                // Writing to a text cannot fail.
+                let _ = write!(way, "{}{:.1} {:.1}", if is_open { 'L' } else { 'M' }, at.x, at.y);
+            }
+            is_open = seen.is_some();
+        }
+        let of_line = tracks::tracks(std::slice::from_ref(line));
+        let mut frames: Vec<f64> =
+            of_line.tracks.iter().flat_map(|track| &track.keys).map(|key| key.0).collect();
+        frames.sort_by(f64::total_cmp);
+        frames.dedup();
+        for at in frames.into_iter().take(PLACES).filter_map(|frame| projection.point(place(frame)?)) {
+            let _ = write!(marks, "M{:.1} {:.1}h0", at.x, at.y);
+        }
+        (way, marks)
+    }
+
+    /// Outlines of what is selected at other frames, seen from where one looks now.
+    pub(super) fn ghosts(&self, project: &Project) -> Vec<Ghost> {
+        let place = self.place(project);
+        let file = &project.files[place.file];
+        let (Some(script), Some(now), true) =
+            (&file.script, self.scene(project), self.onion && file.is_sound())
+        else {
+            return Vec::new();
+        };
+        let (first, last) = self.range(project);
+        let step = (i64::from(last - first) / PARTS).max(1);
+        let number = self.time(project) as i64;
+        let lines = file.document.lines();
+        let one = |after: i64| {
+            let time = number + after * step;
+            if !(i64::from(first)..=i64::from(last)).contains(&time) {
+                return None;
+            }
+            let frame = usize::try_from(place.frame as i64 + after * step).ok()?;
+            let scene = picture_of(script.frame(frame)?, &now);
+            let stage = Stage::of(lines, frame, time as f64);
+            let is_in = |object| stage.line_of(object).is_some_and(|line| self.selection.contains(&line));
+            let is_drawn = stage.objects.iter().any(|line| self.selection.contains(line));
+            let path = if is_drawn { silhouette::ghost(&scene, is_in).ok()? } else { String::new() };
+            (!path.is_empty()).then_some(Ghost { path, after: after as i32 })
+        };
+        (-GHOSTS..=GHOSTS).filter(|after| *after != 0).filter_map(one).collect()
+    }
+}
+
+/// The parameters of a material's clauses, as they stand in its line.
+fn clause_fields(line: &Line) -> Vec<FieldTable> {
+    let mut fields: Vec<FieldTable> = Vec::new();
+    for slot in tracks::slots(line) {
+        if fields.last().is_none_or(|last| last.first != slot.first) {
+            fields.push(FieldTable::new(slot.first, slot.field));
+        }
+    }
+    fields
+}

@@ -1,0 +1,434 @@
+//! The numbers of a script that change, each a track of keys, and what is done with keys.
+//!
+//! Lines in, lines out: an edit of keys rewrites the words of the curves that it concerns. Evaluating and writing curves is
+//! `scene`'s. Invariant: a curve that is left with one key becomes a number; what is asked of keys that there are not
+//! changes nothing.
+
+use std::collections::BTreeMap;
+
+use rayfold_scene::{Clause, Command, Curve, Field, Key, Kind, Mode};
+use serde::{Deserialize, Serialize};
+
+use crate::line::{Line, written};
+use crate::tables::{Role, fields, role};
+use crate::values::curve;
+
+/// Tracks that the page is told of.
+const TRACKS: usize = 300;
+
+/// Keys of all of these tracks.
+const KEYS: usize = 20_000;
+
+/// A number that changes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Track {
+    /// Its line, from 0.
+    pub(crate) line: usize,
+    /// Its place among the line's parameters, from 0.
+    pub(crate) number: usize,
+    /// What it is, such as `centre: cx`.
+    pub(crate) label: String,
+    /// Linear, smooth or step.
+    pub(crate) mode: &'static str,
+    /// Whether it starts again at its last key.
+    pub(crate) cycle: bool,
+    /// Frames and values.
+    pub(crate) keys: Vec<(f64, f64)>,
+}
+
+/// All tracks of a script, up to what the page can show.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Tracks {
+    /// In the order of the text.
+    pub(crate) tracks: Vec<Track>,
+    /// Whether there are more.
+    pub(crate) more: bool,
+}
+
+/// A key of a line.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+pub(crate) struct KeyPlace {
+    /// Its line, from 0.
+    pub(crate) line: usize,
+    /// Its place among the line's parameters, from 0.
+    pub(crate) number: usize,
+    /// When it is.
+    pub(crate) frame: f64,
+}
+
+/// A key that was copied.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Copied {
+    /// From where.
+    pub(crate) place: KeyPlace,
+    /// Its value.
+    pub(crate) value: f64,
+    /// What its track does between keys.
+    mode: Mode,
+}
+
+/// A parameter of a line: its place, its name, and what it is.
+pub(crate) struct Slot {
+    /// Its place among the line's parameters.
+    pub(crate) number: usize,
+    /// Where its parameter begins.
+    pub(crate) first: usize,
+    /// What it is called.
+    pub(crate) name: &'static str,
+    /// Of what it is a part.
+    pub(crate) field: &'static Field,
+}
+
+/// The numbers of a line, those of a material's clauses too.
+pub(crate) fn slots(line: &Line) -> Vec<Slot> {
+    let (Some(command), Some(words)) = (line.command(), line.words()) else { return Vec::new() };
+    let of = |first: usize, field: &'static Field| {
+        let names = field.names.iter().enumerate();
+        names.map(move |(i, name)| Slot { number: first + i, first, name, field })
+    };
+    if command != Command::Material {
+        return fields(command).flat_map(|(first, field)| of(first, field)).collect();
+    }
+    let mut slots = Vec::new();
+    let mut at = 0;
+    while let Some(word) = words.parameters.get(at) {
+        at += 1;
+        let Some(clause) = Clause::from_name(line.word(word)) else { continue };
+        for field in clause.form().fields {
+            slots.extend(of(at, field));
+            at += field.names.len();
+        }
+        at += usize::from(clause.form().ends_with.is_some());
+    }
+    slots.retain(|slot| slot.number < words.parameters.len());
+    slots
+}
+
+/// All tracks of some lines.
+pub(crate) fn tracks(lines: &[Line]) -> Tracks {
+    let mut found = Tracks::default();
+    let mut keys = 0;
+    // Most lines have no curve, which is quickly seen.
+    for (at, line) in lines.iter().enumerate().filter(|(_, line)| line.bytes().contains(&b'(')) {
+        let Some(words) = line.words() else { continue };
+        for slot in slots(line) {
+            let Some(curve) = curve(line, &words, slot.number) else { continue };
+            keys += curve.keys().len();
+            if found.tracks.len() == TRACKS || keys > KEYS {
+                found.more = true;
+                return found;
+            }
+            found.tracks.push(Track {
+                line: at,
+                number: slot.number,
+                label: label(&slot),
+                mode: curve.mode().name(),
+                cycle: curve.is_cycle(),
+                keys: curve.keys().iter().map(|key| (key.frame, key.value)).collect(),
+            });
+        }
+    }
+    found
+}
+
+fn label(slot: &Slot) -> String {
+    let field = slot.field.parameter.to_string();
+    let field = field.strip_prefix("the ").or(field.strip_prefix("a ")).unwrap_or(&field);
+    if slot.field.names.len() > 1 { format!("{field}: {}", slot.name) } else { field.to_owned() }
+}
+
+/// The numbers of a line that a key is set for where nothing else is said: those that change already, else where it is and
+/// how it is turned, else its direction.
+pub(crate) fn main_numbers(line: &Line) -> Vec<usize> {
+    let (Some(command), Some(words)) = (line.command(), line.words()) else { return Vec::new() };
+    if !command.form().curves {
+        return Vec::new();
+    }
+    let all = slots(line);
+    let changing: Vec<_> =
+        all.iter().map(|slot| slot.number).filter(|&at| curve(line, &words, at).is_some()).collect();
+    if !changing.is_empty() {
+        return changing;
+    }
+    let of = |kinds: &[Kind]| -> Vec<usize> {
+        all.iter().filter(|slot| kinds.contains(&slot.field.kind)).map(|slot| slot.number).collect()
+    };
+    let places = of(&[Kind::Position, Kind::Rotation]);
+    match role(command) {
+        Role::Object | Role::Light | Role::Camera | Role::Use if places.is_empty() => of(&[Kind::Direction]),
+        Role::Object | Role::Light | Role::Camera | Role::Use => places,
+        Role::Group | Role::Material | Role::Setting => Vec::new(),
+    }
+}
+
+/// A line with keys at a frame, of the values that its numbers have there. Where all of them have one there, they go.
+pub(crate) fn toggled(line: &Line, numbers: &[usize], frame: f64) -> Option<Line> {
+    let (command, words) = (line.command()?, line.words()?);
+    let mut numbers = numbers.to_vec();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let curves_there = |at: usize| curve(line, &words, at);
+    if numbers.is_empty() || !(command.form().curves || command == Command::Material) {
+        return None;
+    }
+    let has_key = |&at: &usize| curves_there(at).is_some_and(|curve| curve.key_at(frame).is_some());
+    if numbers.iter().all(has_key) {
+        let keys =
+            numbers.iter().filter_map(|&at| curves_there(at)?.key_at(frame).map(|key| (at, key.frame)));
+        return without(line, &keys.collect::<Vec<_>>());
+    }
+    // What is left out has no place for a key: it comes with what holds then.
+    let values = crate::values::Values::of(line, frame)?;
+    let mut line = line.clone();
+    for at in numbers.iter().copied().filter(|&at| at >= words.parameters.len()) {
+        let value = values.number(at)?;
+        line = crate::values::changed(&line, at, &[value], crate::values::Keying::ALWAYS)?;
+    }
+    let words = line.words()?;
+    let mut changes = Vec::new();
+    for at in numbers {
+        let keyed = match (curve(&line, &words, at), words.parameters.get(at).and_then(|w| line.number(w))) {
+            (Some(curve), _) => curve.with_key(frame, curve.at(frame))?,
+            (None, Some(value)) => Curve::through(Mode::Smooth, false, vec![Key { frame, value }])?,
+            (None, None) => return None,
+        };
+        changes.push((at, keyed.to_string()));
+    }
+    line.with_words(&changes)
+}
+
+/// The lines that change where some keys go, a frame or more on; those that stand where they come to go.
+pub(crate) fn moved(lines: &[Line], keys: &[KeyPlace], by: f64) -> Vec<(usize, Line)> {
+    each(lines, keys, |curve, frames| {
+        if by == 0.0 {
+            return None;
+        }
+        let is_held = |key: &&Key| frames.contains(&key.frame);
+        let held: Vec<_> = curve.keys().iter().filter(is_held).collect();
+        let gone: Vec<_> = held.iter().map(|key| Key { frame: key.frame + by, ..**key }).collect();
+        let stay = curve.keys().iter().filter(|key| !is_held(key));
+        let stay = stay.filter(|key| gone.iter().all(|moved| moved.frame != key.frame));
+        let mut all: Vec<_> = stay.copied().chain(gone.iter().copied()).collect();
+        all.sort_by(|a, b| a.frame.total_cmp(&b.frame));
+        rewritten(curve, all)
+    })
+}
+
+/// The lines that change where some keys go.
+pub(crate) fn removed(lines: &[Line], keys: &[KeyPlace]) -> Vec<(usize, Line)> {
+    each(lines, keys, |curve, frames| {
+        let stay = curve.keys().iter().filter(|key| !frames.contains(&key.frame));
+        rewritten(curve, stay.copied().collect())
+    })
+}
+
+/// The lines that change where the tracks of some keys go on otherwise between them.
+pub(crate) fn eased(lines: &[Line], keys: &[KeyPlace], mode: Mode, cycle: bool) -> Vec<(usize, Line)> {
+    each(lines, keys, |curve, _| {
+        // A cycle takes two keys.
+        let cycle = cycle && curve.keys().len() > 1;
+        Curve::through(mode, cycle, curve.keys().to_vec()).map(|curve| curve.to_string())
+    })
+}
+
+/// What some keys are.
+pub(crate) fn copied(lines: &[Line], keys: &[KeyPlace]) -> Vec<Copied> {
+    let one = |place: &KeyPlace| {
+        let line = lines.get(place.line)?;
+        let curve = curve(line, &line.words()?, place.number)?;
+        let key = curve.keys().iter().find(|key| key.frame == place.frame)?;
+        Some(Copied { place: *place, value: key.value, mode: curve.mode() })
+    };
+    keys.iter().filter_map(one).collect()
+}
+
+/// The lines that change where copied keys are set, the first of them at a frame: in the tracks that they are from, or in
+/// those of another line of the same command, `onto`.
+pub(crate) fn pasted(
+    lines: &[Line],
+    copied: &[Copied],
+    frame: f64,
+    onto: Option<usize>,
+) -> Vec<(usize, Line)> {
+    let first = copied.iter().map(|copied| copied.place.frame).fold(f64::INFINITY, f64::min);
+    let source = copied.first().map(|copied| copied.place.line);
+    let is_one = copied.iter().all(|copied| Some(copied.place.line) == source);
+    let command = |at: usize| lines.get(at).and_then(Line::command);
+    let onto = onto.filter(|&onto| is_one && source.is_some_and(|from| command(from) == command(onto)));
+    let mut by_track: BTreeMap<(usize, usize), Vec<Copied>> = BTreeMap::new();
+    for copied in copied {
+        let line = onto.unwrap_or(copied.place.line);
+        by_track.entry((line, copied.place.number)).or_default().push(*copied);
+    }
+    let mut changed: BTreeMap<usize, Line> = BTreeMap::new();
+    for ((at, number), keys) in by_track {
+        let Some(line) = changed.get(&at).or(lines.get(at)).cloned() else { continue };
+        let Some(words) = line.words() else { continue };
+        let to =
+            keys.iter().map(|copied| Key { frame: copied.place.frame - first + frame, value: copied.value });
+        let curve = curve(&line, &words, number).map_or_else(
+            || {
+                let still = words.parameters.get(number).and_then(|word| line.number(word));
+                let mode = keys.first().map_or(Mode::Smooth, |copied| copied.mode);
+                still.and_then(|_| Curve::through(mode, false, to.clone().collect()))
+            },
+            |curve| to.clone().try_fold(curve, |curve, key| curve.with_key(key.frame, key.value)),
+        );
+        if let Some(line) = curve.and_then(|curve| line.with_words(&[(number, curve.to_string())])) {
+            changed.insert(at, line);
+        }
+    }
+    changed.into_iter().collect()
+}
+
+/// A line without some keys, each a parameter and a frame.
+fn without(line: &Line, keys: &[(usize, f64)]) -> Option<Line> {
+    let place = |&(number, frame): &(usize, f64)| KeyPlace { line: 0, number, frame };
+    let keys: Vec<_> = keys.iter().map(place).collect();
+    removed(std::slice::from_ref(line), &keys).into_iter().next().map(|(_, line)| line)
+}
+
+/// The lines with what `change` makes of the curves that some keys are of, given the frames of these; the keys' order is of no
+/// matter.
+fn each(
+    lines: &[Line],
+    keys: &[KeyPlace],
+    change: impl Fn(&Curve, &[f64]) -> Option<String>,
+) -> Vec<(usize, Line)> {
+    let mut by_line: BTreeMap<usize, BTreeMap<usize, Vec<f64>>> = BTreeMap::new();
+    for key in keys {
+        by_line.entry(key.line).or_default().entry(key.number).or_default().push(key.frame);
+    }
+    let one = |at: usize, tracks: &BTreeMap<usize, Vec<f64>>| {
+        let line = lines.get(at)?;
+        let words = line.words()?;
+        let changes: Vec<_> = tracks
+            .iter()
+            .filter_map(|(&number, frames)| {
+                let curve = curve(line, &words, number)?;
+                Some((number, change(&curve, frames)?))
+            })
+            .collect();
+        (!changes.is_empty()).then(|| line.with_words(&changes)).flatten()
+    };
+    by_line.iter().filter_map(|(&at, tracks)| Some((at, one(at, tracks)?))).collect()
+}
+
+/// A curve with other keys, as it is written: a number where one is left, or none. `None` where it stays as it is.
+fn rewritten(curve: &Curve, keys: Vec<Key>) -> Option<String> {
+    if keys == curve.keys() {
+        return None;
+    }
+    match keys[..] {
+        [] => Some(written(curve.keys()[0].value)),
+        [key] if curve.keys().len() > 1 => Some(written(key.value)),
+        [_] => Curve::through(curve.mode(), false, keys).map(|curve| curve.to_string()),
+        _ => Curve::through(curve.mode(), curve.is_cycle(), keys).map(|curve| curve.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(text: &str) -> Vec<Line> {
+        Line::split(text.as_bytes())
+    }
+
+    fn key(line: usize, number: usize, frame: f64) -> KeyPlace {
+        KeyPlace { line, number, frame }
+    }
+
+    fn one(changed: Vec<(usize, Line)>) -> String {
+        assert_eq!(changed.len(), 1);
+        changed[0].1.text()
+    }
+
+    const TEXT: &str = "Sphere 1  (1:0 9:2) 0 (smooth cycle 1:0 5:1 9:0)  red # ball\n\
+                        Material red  shine (1:1 3:2) 1 1 8  checker (step 1:1 2:3) blue diffuse 1 0 (1:0 9:1)\n\
+                        Sphere 1  0 0 0  red\nUse tie";
+
+    #[test]
+    fn tracks_are_told_by_what_they_are() {
+        let found = tracks(&lines(TEXT));
+        let told: Vec<_> =
+            found.tracks.iter().map(|t| (t.line, t.number, t.label.as_str(), t.mode, t.cycle)).collect();
+        assert_eq!(
+            told,
+            [
+                (0, 1, "centre: cx", "linear", false),
+                (0, 3, "centre: cz", "smooth", true),
+                (1, 1, "shine: r", "linear", false),
+                (1, 6, "size s", "step", false),
+                (1, 11, "diffuse coefficient: rb", "linear", false),
+            ]
+        );
+        assert_eq!(found.tracks[0].keys, [(1.0, 0.0), (9.0, 2.0)]);
+        let many = lines(&"Sphere (1:1 2:2) (1:1 2:2) (1:1 2:2) (1:1 2:2) red\n".repeat(100));
+        assert!(tracks(&many).more && tracks(&many).tracks.len() == TRACKS);
+    }
+
+    #[test]
+    fn keys_move_and_go_and_one_that_is_left_is_a_number() {
+        let lines = lines(TEXT);
+        let x = |keys: &[KeyPlace], by| one(moved(&lines, keys, by));
+        assert_eq!(x(&[key(0, 1, 9.0)], 3.0), TEXT.lines().next().unwrap().replace("9:2", "12:2"));
+        assert_eq!(
+            x(&[key(0, 1, 9.0), key(0, 3, 5.0)], -1.0),
+            "Sphere 1  (1:0 8:2) 0 (smooth cycle 1:0 4:1 9:0)  red # ball"
+        );
+        assert_eq!(x(&[key(0, 3, 5.0)], 4.0), "Sphere 1  (1:0 9:2) 0 (smooth cycle 1:0 9:1)  red # ball");
+        assert_eq!(x(&[key(0, 1, 9.0)], -8.0), "Sphere 1  2 0 (smooth cycle 1:0 5:1 9:0)  red # ball");
+        assert!(moved(&lines, &[key(0, 1, 9.0)], 0.0).is_empty());
+        assert!(moved(&lines, &[key(0, 2, 9.0), key(9, 1, 1.0), key(2, 9, 1.0)], 1.0).is_empty());
+        let gone = one(removed(&lines, &[key(0, 1, 1.0)]));
+        assert_eq!(gone, "Sphere 1  2 0 (smooth cycle 1:0 5:1 9:0)  red # ball");
+        let gone = one(removed(&lines, &[key(0, 1, 1.0), key(0, 1, 9.0)]));
+        assert_eq!(gone, "Sphere 1  0 0 (smooth cycle 1:0 5:1 9:0)  red # ball");
+    }
+
+    #[test]
+    fn easing_is_that_of_the_track() {
+        let lines = lines(TEXT);
+        let eased = one(eased(&lines, &[key(0, 1, 1.0), key(0, 1, 9.0)], Mode::Step, true));
+        assert_eq!(eased, "Sphere 1  (step cycle 1:0 9:2) 0 (smooth cycle 1:0 5:1 9:0)  red # ball");
+    }
+
+    #[test]
+    fn keys_are_copied_to_another_time_and_another_line() {
+        let lines = lines(TEXT);
+        let held = copied(&lines, &[key(0, 1, 9.0), key(0, 3, 5.0)]);
+        assert_eq!(held.len(), 2);
+        assert_eq!(
+            one(pasted(&lines, &held, 20.0, None)),
+            "Sphere 1  (1:0 9:2 24:2) 0 (smooth cycle 1:0 4:1 5:1 9:0)  red # ball",
+            "in a cycle 20 is 4"
+        );
+        assert_eq!(one(pasted(&lines, &held, 2.0, Some(2))), "Sphere 1  (6:2) 0 (smooth 2:1)  red");
+        let elsewhere = pasted(&lines, &held, 20.0, Some(1));
+        assert_eq!(elsewhere[0].0, 0, "another command has other numbers");
+    }
+
+    #[test]
+    fn a_key_by_button_comes_and_goes() {
+        let ball = Line::new("Sphere 1  0 0 0  red");
+        let numbers = main_numbers(&ball);
+        assert_eq!(numbers, [1, 2, 3]);
+        let keyed = toggled(&ball, &numbers, 1.0).unwrap();
+        assert_eq!(keyed.text(), "Sphere 1  (smooth 1:0) (smooth 1:0) (smooth 1:0)  red");
+        assert_eq!(toggled(&keyed, &numbers, 1.0).unwrap().text(), ball.text());
+        let again = toggled(&keyed, &[1], 9.0).unwrap();
+        assert_eq!(again.text(), "Sphere 1  (smooth 1:0 9:0) (smooth 1:0) (smooth 1:0)  red");
+        let used = Line::new("Use tie");
+        assert_eq!(main_numbers(&used), [0, 1, 2, 3, 4, 5]);
+        assert_eq!(
+            toggled(&ball, &[2, 1, 2], 1.0).unwrap().text(),
+            "Sphere 1  (smooth 1:0) (smooth 1:0) 0  red"
+        );
+        let keyed = toggled(&used, &[0], 3.0).unwrap();
+        assert_eq!(keyed.text(), "Use tie (smooth 3:0) 0 0");
+        assert!(main_numbers(&Line::new("Screen 4 3")).is_empty());
+        assert_eq!(main_numbers(&Line::new("Ilight 1 1 1 0 -1 0")), [3, 4, 5]);
+    }
+}

@@ -1,0 +1,219 @@
+//! The numbers of a line at a moment, and how a number that is changed is written: as a number, or as a key of a curve.
+//!
+//! Knows commands only by the forms of their parameters. Invariant: a number that stays, stays as it was written.
+
+use glam::DVec3;
+use rayfold_scene::{Command, Curve, Field, Key, Kind, Mode, parse_curve};
+
+use crate::line::{Line, Words, written};
+use crate::tables::{fields, of_kind};
+
+/// The decimals to which a curve is moved as a whole.
+const DECIMALS: f64 = 1e9;
+
+/// A line as numbers of its command, as they are at a moment.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Values {
+    /// Its command.
+    pub(crate) command: Command,
+    /// Those that are written; `None` for what is no number.
+    numbers: Vec<Option<f64>>,
+}
+
+/// When a change is made, and whether it is for that moment alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Keying {
+    /// The frame that is shown.
+    pub(crate) time: f64,
+    /// The first frame, at which a number that was still keeps its value.
+    pub(crate) first: f64,
+    /// Whether numbers that are still become curves.
+    pub(crate) auto: bool,
+    /// Whether curves move as a whole instead of getting a key.
+    pub(crate) whole: bool,
+}
+
+impl Keying {
+    /// For all moments.
+    pub(crate) const ALWAYS: Self = Self { time: 1.0, first: 1.0, auto: false, whole: true };
+}
+
+impl Values {
+    /// `None` for a line without a command.
+    pub(crate) fn of(line: &Line, time: f64) -> Option<Self> {
+        let (command, words) = (line.command()?, line.words()?);
+        let number = |at: usize| {
+            let word = &words.parameters[at];
+            line.number(word).or_else(|| Some(curve(line, &words, at)?.at(time)))
+        };
+        Some(Self { command, numbers: (0..words.parameters.len()).map(number).collect() })
+    }
+
+    /// A number of the line; for one that is left out what holds then, if that is a plain number.
+    pub(crate) fn number(&self, at: usize) -> Option<f64> {
+        match self.numbers.get(at) {
+            Some(number) => *number,
+            None => default(self.command, at),
+        }
+    }
+
+    /// The numbers that are written; `None` for what is none.
+    pub(crate) fn written(&self) -> &[Option<f64>] {
+        &self.numbers
+    }
+
+    /// Three numbers of the line.
+    pub(crate) fn vector(&self, first: usize) -> Option<DVec3> {
+        Some(DVec3::new(self.number(first)?, self.number(first + 1)?, self.number(first + 2)?))
+    }
+
+    /// Its positions, each with where its numbers begin.
+    pub(crate) fn positions(&self) -> impl Iterator<Item = (usize, DVec3)> {
+        of_kind(self.command, Kind::Position).filter_map(|first| Some((first, self.vector(first)?)))
+    }
+
+    /// The greatest of its lengths.
+    pub(crate) fn reach(&self) -> f64 {
+        of_kind(self.command, Kind::Length).filter_map(|first| self.number(first)).fold(0.0, f64::max)
+    }
+}
+
+/// The curve that stands for a parameter.
+pub(crate) fn curve(line: &Line, words: &Words, at: usize) -> Option<Curve> {
+    parse_curve(line.word(words.parameters.get(at)?))
+}
+
+/// What holds for a number that is left out.
+fn default(command: Command, at: usize) -> Option<f64> {
+    let (_, field) = field_of(command, at)?;
+    field.presence.default()?.parse().ok()
+}
+
+fn field_of(command: Command, at: usize) -> Option<(usize, &'static Field)> {
+    fields(command).find(|(first, field)| (*first..first + field.names.len()).contains(&at))
+}
+
+/// The line with other values for its numbers from `first` on. A parameter that was left out comes whole. `None` where a name
+/// stands in their place.
+pub(crate) fn changed(line: &Line, first: usize, to: &[f64], keying: Keying) -> Option<Line> {
+    let (command, words) = (line.command()?, line.words()?);
+    let count = words.parameters.len();
+    if to.is_empty() {
+        return Some(line.clone());
+    }
+    let mut end = first + to.len();
+    // Those before it, and the rest of its parameter.
+    let start = if count < end { count.min(first) } else { first };
+    if count < end
+        && let Some((first, field)) = field_of(command, end - 1)
+    {
+        end = end.max(first + field.names.len());
+    }
+    let mut changes = Vec::new();
+    for at in start..end {
+        let value = at.checked_sub(first).and_then(|i| to.get(i)).copied();
+        match words.parameters.get(at) {
+            Some(word) => {
+                let Some(value) = value else { continue };
+                if let Some(old) = line.number(word) {
+                    if old != value {
+                        changes.push((at, begun(command, old, value, keying)));
+                    }
+                } else {
+                    let curve = curve(line, &words, at)?;
+                    if curve.at(keying.time) != value {
+                        changes.push((at, moved(&curve, value, keying)?.to_string()));
+                    }
+                }
+            }
+            None => {
+                let old = default(command, at).unwrap_or(0.0);
+                changes.push((at, begun(command, old, value.unwrap_or(old), keying)));
+            }
+        }
+    }
+    line.with_words(&changes)
+}
+
+/// A number that was still, as it is written with another value.
+fn begun(command: Command, old: f64, to: f64, keying: Keying) -> String {
+    let key = |frame, value| Key { frame, value };
+    let is_kept = old == to || !keying.auto || keying.whole || keying.time == keying.first;
+    if is_kept || !command.form().curves {
+        return written(to);
+    }
+    let keys = vec![key(keying.first, old), key(keying.time, to)];
+    Curve::through(Mode::Smooth, false, keys).map_or_else(|| written(to), |curve| curve.to_string())
+}
+
+/// A curve with another value at the moment.
+fn moved(curve: &Curve, to: f64, keying: Keying) -> Option<Curve> {
+    if !keying.whole {
+        return curve.with_key(keying.time, to);
+    }
+    let by = to - curve.at(keying.time);
+    let keys = curve.keys().iter().map(|key| Key { value: tidy(key.value + by), ..*key });
+    Curve::through(curve.mode(), curve.is_cycle(), keys.collect())
+}
+
+/// Without the noise of the last bits.
+pub(crate) fn tidy(x: f64) -> f64 {
+    let rounded = (x * DECIMALS).round() / DECIMALS;
+    if rounded.is_finite() { rounded } else { x }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AUTO: Keying = Keying { time: 25.0, first: 1.0, auto: true, whole: false };
+
+    fn after(text: &str, first: usize, to: &[f64], keying: Keying) -> String {
+        changed(&Line::new(text), first, to, keying).unwrap().text()
+    }
+
+    #[test]
+    fn a_changed_number_becomes_a_curve_and_all_else_stays() {
+        let ball = "\tSphere  1.50, 0 1e0 0  red # ball";
+        assert_eq!(
+            after(ball, 1, &[2.0, 1.0, 0.0], AUTO),
+            "\tSphere  1.50, (smooth 1:0 25:2) 1e0 0  red # ball"
+        );
+        let still = Keying { auto: false, ..AUTO };
+        assert_eq!(after(ball, 1, &[2.0, 1.0, 0.0], still), "\tSphere  1.50, 2 1e0 0  red # ball");
+        let at_the_first = Keying { time: 1.0, ..AUTO };
+        assert_eq!(after(ball, 0, &[2.0], at_the_first), "\tSphere  2, 0 1e0 0  red # ball");
+    }
+
+    #[test]
+    fn a_curve_gets_a_key_or_moves_as_a_whole() {
+        let ball = "Sphere 1 (1:0.0 25:1 49:.5) 0 0 red";
+        let set = |to, keying| after(ball, 1, &[to], keying);
+        assert_eq!(set(2.0, AUTO), "Sphere 1 (1:0 25:2 49:0.5) 0 0 red");
+        assert_eq!(set(0.5, Keying { time: 13.0, ..AUTO }), ball, "that is its value there");
+        assert_eq!(set(3.0, Keying { time: 13.0, ..AUTO }), "Sphere 1 (1:0 13:3 25:1 49:0.5) 0 0 red");
+        assert_eq!(set(1.3, Keying { whole: true, ..AUTO }), "Sphere 1 (1:0.3 25:1.3 49:0.8) 0 0 red");
+    }
+
+    #[test]
+    fn what_was_left_out_comes_with_what_held() {
+        let plain = Keying { auto: false, ..AUTO };
+        assert_eq!(after("Use tie # a", 6, &[2.0], plain), "Use tie 0 0 0 0 0 0 2 # a");
+        assert_eq!(after("Use tie 1 2 3", 4, &[90.0], plain), "Use tie 1 2 3 0 90 0");
+        assert_eq!(after("Use tie", 6, &[2.0], AUTO), "Use tie 0 0 0 0 0 0 (smooth 1:1 25:2)");
+        assert_eq!(changed(&Line::new("Sphere 1 0 0 0 red"), 4, &[1.0], plain), None, "a name is no number");
+        assert_eq!(after("Screen 4 3", 0, &[8.0], AUTO), "Screen 8 3", "it takes no curves");
+    }
+
+    #[test]
+    fn values_are_those_of_the_moment() {
+        let line = Line::new("Sphere (1:1 3:2) 0 (smooth 5:4) x red");
+        let values = Values::of(&line, 2.0).unwrap();
+        assert_eq!(values.written(), [Some(1.5), Some(0.0), Some(4.0), None, None]);
+        let used = Values::of(&Line::new("Use tie"), 1.0).unwrap();
+        assert_eq!(
+            (used.number(5), used.number(6), used.vector(0)),
+            (Some(0.0), Some(1.0), Some(DVec3::ZERO))
+        );
+    }
+}

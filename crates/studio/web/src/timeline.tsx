@@ -1,0 +1,351 @@
+// Frames and keys: the player, and a track for each number that changes. What a key does is decided by the server; here it
+// is only which are chosen and where the pointer is.
+
+import type { JSX } from "preact";
+import { useEffect, useRef } from "preact/hooks";
+
+import { actions, step } from "./actions";
+import { Button } from "./button";
+import { chosenKeys, chosenNames, chosenTracks, dragKeys, ease, grabKeys, keysOf, looping, nameOf, releaseKeys, removeKeys, wish } from "./keys";
+import { List } from "./list";
+import type { KeyPlace, Line, Mode, TimeState, Track } from "./protocol";
+import { ask, files, lines, playing, select, selected, selection, state, tracks } from "./store";
+
+const ROW = 26;
+/** Rows that are seen at once. */
+const SEEN = 6;
+const MODES: readonly Mode[] = ["linear", "smooth", "step"];
+
+export function Timeline(): JSX.Element | null {
+  const now = state.value;
+  usePlayer(now?.fps ?? 10);
+  if (!now) return null;
+  return (
+    <section class="panel timeline" aria-label="Timeline">
+      {now.frames > 1 && <Player frame={now.frame} frames={now.frames} fps={now.fps} />}
+      <Tools time={now.time} frames={now.frames} />
+      {tracks.value.tracks.length > 0 && <Tracks time={now.time} />}
+      {tracks.value.more && <p class="note">There are more numbers that change; see the script.</p>}
+    </section>
+  );
+}
+
+/** Shows frames at their pace while it plays. */
+function usePlayer(fps: number): void {
+  const isPlaying = playing.value;
+  useEffect(() => {
+    if (!isPlaying) return;
+    const begin = performance.now();
+    const now = state.value;
+    const count = now?.frames ?? 1;
+    // At the end it begins anew.
+    const from = now && now.frame + 1 < count ? now.frame : 0;
+    let shown = from;
+    let timer = 0;
+    const tick = (): void => {
+      const passed = from + Math.floor(((performance.now() - begin) / 1000) * fps);
+      const isOver = !looping.peek() && passed >= count;
+      const frame = isOver ? count - 1 : passed % count;
+      if (frame !== shown) {
+        shown = frame;
+        ask({ ask: "frame", frame, moving: true });
+      }
+      if (isOver) playing.value = false;
+      else timer = requestAnimationFrame(tick);
+    };
+    timer = requestAnimationFrame(tick);
+    return () => {
+      cancelAnimationFrame(timer);
+      ask({ ask: "frame", frame: shown, moving: false });
+    };
+  }, [isPlaying, fps]);
+}
+
+function Player({ frame, frames, fps }: { readonly frame: number; readonly frames: number; readonly fps: number }): JSX.Element {
+  return (
+    <div class="player" role="group" aria-label="Frames">
+      <button type="button" onClick={() => step(-1)} title="Previous frame (,)">
+        Previous
+      </button>
+      <Button action={actions.play} label={playing.value ? "Stop" : "Play"} />
+      <button type="button" onClick={() => step(1)} title="Next frame (.)">
+        Next
+      </button>
+      <button type="button" aria-pressed={looping.value} onClick={() => (looping.value = !looping.value)} title="Start again at the end">
+        Loop
+      </button>
+      <input
+        type="range"
+        aria-label="Frame"
+        min={1}
+        max={frames}
+        value={frame + 1}
+        onInput={(event) => ask({ ask: "frame", frame: event.currentTarget.valueAsNumber - 1, moving: true })}
+        onChange={(event) => ask({ ask: "frame", frame: event.currentTarget.valueAsNumber - 1, moving: false })}
+      />
+      <output>
+        frame {frame + 1} of {frames}, {fps} a second
+      </output>
+    </div>
+  );
+}
+
+function Tools({ time, frames }: { readonly time: TimeState; readonly frames: number }): JSX.Element {
+  const isOne = files.value.length < 2;
+  const count = time.last - time.first + 1;
+  if (frames < 2) {
+    return (
+      <div class="tools">
+        <Button action={actions.animate} label="Animate" />
+        <span class="note">One picture. As an animation, what you drag at a later frame moves there.</span>
+      </div>
+    );
+  }
+  return (
+    <div class="tools" role="group" aria-label="Keys">
+      {isOne && (
+        <label>
+          Frames{" "}
+          <input
+            type="number"
+            min={1}
+            max={1_000_000}
+            value={count}
+            onChange={(event) => {
+              const asked = event.currentTarget.valueAsNumber;
+              if (asked >= 1) wish({ do: "frames", count: Math.round(asked) });
+            }}
+          />
+        </label>
+      )}
+      {isOne ? (
+        <>
+          <Toggle action={actions.autoKey} label="Auto-key" is={time.autoKey} />
+          <Button action={actions.key} label="Key" />
+          <Toggle action={actions.path} label="Path" is={time.path} />
+          <Toggle action={actions.onion} label="Onion skin" is={time.onion} />
+        </>
+      ) : (
+        <span class="note">Each script here is a frame of its own; keys are for one script of many frames.</span>
+      )}
+      {tracks.value.tracks.length > 0 && <Chosen chosen={chosenTracks.value} />}
+      {tracks.value.tracks.length > 0 && <Button action={actions.pasteKeys} label={time.copied > 0 ? `Paste ${time.copied}` : "Paste"} />}
+    </div>
+  );
+}
+
+interface ToggleProps {
+  readonly action: { readonly title: string; readonly keys: readonly string[]; readonly run: () => void };
+  readonly label: string;
+  readonly is: boolean;
+}
+
+function Toggle({ action, label, is }: ToggleProps): JSX.Element {
+  return (
+    <button type="button" aria-pressed={is} title={`${action.title} (${action.keys.join(" or ")})`} onClick={action.run}>
+      {label}
+    </button>
+  );
+}
+
+/** What can be done with the keys that are chosen. */
+function Chosen({ chosen }: { readonly chosen: readonly Track[] }): JSX.Element {
+  const [first] = chosen;
+  const mode = first && chosen.every((track) => track.mode === first.mode) ? first.mode : "";
+  const cycle = chosen.length > 0 && chosen.every((track) => track.cycle);
+  const none = chosen.length === 0;
+  return (
+    <>
+      <label>
+        Easing{" "}
+        <select value={mode} disabled={none} onChange={(event) => ease(event.currentTarget.value as Mode, cycle)}>
+          {mode === "" && <option value="">{none ? "" : "several"}</option>}
+          {MODES.map((name) => (
+            <option key={name} value={name}>
+              {name}
+            </option>
+          ))}
+        </select>
+      </label>
+      <button type="button" aria-pressed={cycle} disabled={none} title="Start again at the last key" onClick={() => ease(mode || "linear", !cycle)}>
+        Repeat
+      </button>
+      <Button action={actions.copyKeys} label="Copy keys" />
+      <Button action={actions.removeKeys} label="Delete keys" />
+    </>
+  );
+}
+
+/** Shares of a lane's width. */
+const place = (time: TimeState, frame: number): number => ((frame - time.first + 0.5) / (time.last - time.first + 1)) * 100;
+
+function Tracks({ time }: { readonly time: TimeState }): JSX.Element {
+  const all = tracks.value.tracks;
+  const held = useRef<{ readonly x: number; readonly width: number } | null>(null);
+  const main = selection.value.at(-1) ?? null;
+  const revealed = main === null ? -1 : all.findIndex((track) => track.line === main);
+
+  const press = (event: PointerEvent, key: KeyPlace): void => {
+    const lane = (event.currentTarget as HTMLElement).parentElement;
+    const panel = lane?.closest<HTMLElement>(".tracks");
+    if (event.button > 0 || !lane || !panel) return;
+    event.stopPropagation();
+    choose(key, event.shiftKey || event.ctrlKey);
+    panel.setPointerCapture(event.pointerId);
+    held.current = { x: event.clientX, width: lane.clientWidth / (time.last - time.first + 1) };
+    grabKeys();
+  };
+  const move = (event: PointerEvent): void => {
+    if (held.current) dragKeys(Math.round((event.clientX - held.current.x) / held.current.width));
+  };
+  const release = (): void => {
+    if (held.current) releaseKeys();
+    held.current = null;
+  };
+  const scrub = (event: PointerEvent, moving: boolean): void => {
+    const lane = event.currentTarget as HTMLElement;
+    if (event.buttons !== 1 && moving) return;
+    const box = lane.getBoundingClientRect();
+    const share = Math.max(0, Math.min(1 - 1e-9, (event.clientX - box.left) / box.width));
+    ask({ ask: "frame", frame: time.start + Math.floor(share * (time.last - time.first + 1)), moving });
+  };
+  return (
+    <div class="tracks" style={{ height: `${(Math.min(SEEN, all.length) + 1) * ROW + 2}px` }} onPointerMove={move} onPointerUp={release} onPointerCancel={release}>
+      <div class="track ruler" aria-hidden="true">
+        <span class="label" />
+        <div
+          class="lane"
+          onPointerDown={(event) => {
+            event.currentTarget.setPointerCapture(event.pointerId);
+            chosenKeys.value = [];
+            scrub(event, true);
+          }}
+          onPointerMove={(event) => scrub(event, true)}
+          onPointerUp={(event) => scrub(event, false)}
+        >
+          {ticks(time).map((frame) => (
+            <span key={frame} class="tick" style={{ left: `${place(time, frame)}%` }}>
+              {frame}
+            </span>
+          ))}
+          <Head time={time} />
+        </div>
+      </div>
+      <List class="list" count={all.length} height={ROW} reveal={revealed < 0 ? null : revealed} role="group" aria-label="Tracks">
+        {(row) => {
+          const track = all[row];
+          return track ? <Row row={row} track={track} line={lines.value[track.line]} time={time} press={press} /> : null;
+        }}
+      </List>
+    </div>
+  );
+}
+
+function Head({ time }: { readonly time: TimeState }): JSX.Element {
+  return <span class="head" style={{ left: `${place(time, time.number)}%` }} />;
+}
+
+/** Frames that the ruler names: at most about ten. */
+function ticks(time: TimeState): readonly number[] {
+  const count = time.last - time.first + 1;
+  const steps = [1, 2, 5, 10, 20, 25, 50, 100, 200, 500, 1000, 10_000, 100_000];
+  const every = steps.find((size) => count / size <= 10) ?? 1_000_000;
+  const frames = [time.first];
+  for (let frame = Math.ceil((time.first + 0.6 * every) / every) * every; frame <= time.last; frame += every) frames.push(frame);
+  return frames;
+}
+
+function choose(key: KeyPlace, extend: boolean): void {
+  const name = nameOf(key);
+  const isChosen = chosenNames.value.has(name);
+  if (extend) chosenKeys.value = isChosen ? chosenKeys.value.filter((other) => nameOf(other) !== name) : [...chosenKeys.value, key];
+  else if (!isChosen) chosenKeys.value = [key];
+}
+
+interface RowProps {
+  readonly row: number;
+  readonly track: Track;
+  readonly line: Line | undefined;
+  readonly time: TimeState;
+  readonly press: (event: PointerEvent, key: KeyPlace) => void;
+}
+
+function Row({ row, track, line, time, press }: RowProps): JSX.Element {
+  const name = line?.name ?? line?.subject ?? `${line?.command ?? ""} in line ${track.line + 1}`;
+  const keys = keysOf(track);
+  const names = chosenNames.value;
+  // One key of a track is reached by Tab, the others from there by the arrow keys.
+  const reached = Math.max(0, keys.findIndex((key) => names.has(nameOf(key))));
+  return (
+    <div class={selected.value.has(track.line) ? "track selected" : "track"}>
+      <button
+        type="button"
+        class="label"
+        title={`${name}, ${track.label}: select it, and all its keys`}
+        onClick={(event) => {
+          select([track.line]);
+          chosenKeys.value = event.shiftKey ? [...chosenKeys.value, ...keys] : keys;
+        }}
+      >
+        <b>{name}</b> {track.label}
+      </button>
+      <div class="lane">
+        {keys.map((key, at) =>
+          key.frame < time.first || key.frame > time.last ? null : (
+            <button
+              type="button"
+              key={at}
+              class="key"
+              data-row={row}
+              style={{ left: `${place(time, key.frame)}%` }}
+              tabIndex={at === reached ? 0 : -1}
+              aria-pressed={names.has(nameOf(key))}
+              aria-label={`Key of ${name}, ${track.label}, at frame ${key.frame}: ${track.keys[at]?.[1] ?? 0}`}
+              onPointerDown={(event) => press(event, key)}
+              onClick={(event) => {
+                // By the keyboard; the pointer has chosen already.
+                if (event.detail === 0) chosenKeys.value = [key];
+              }}
+              onKeyDown={(event) => keyed(event, keys, at)}
+            >
+              <span class="diamond" />
+            </button>
+          ),
+        )}
+        <Head time={time} />
+      </div>
+    </div>
+  );
+}
+
+/** Goes to other keys, moves those that are chosen, and does with them what keys of the keyboard say. */
+function keyed(event: KeyboardEvent & { readonly currentTarget: HTMLElement }, keys: readonly KeyPlace[], at: number): void {
+  const control = event.ctrlKey || event.metaKey;
+  const element = event.currentTarget;
+  const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+  const over = { ArrowUp: -1, ArrowDown: 1 }[event.key];
+  const key = keys[at];
+  if (!key) return;
+  if (way && event.altKey) {
+    if (!chosenNames.value.has(nameOf(key))) chosenKeys.value = [key];
+    grabKeys();
+    dragKeys(way * (event.shiftKey ? 10 : 1));
+    releaseKeys();
+  } else if (way) {
+    const next = keys[at + way];
+    const sibling = way < 0 ? element.previousElementSibling : element.nextElementSibling;
+    if (next) chosenKeys.value = event.shiftKey ? [...chosenKeys.value, next] : [next];
+    if (sibling instanceof HTMLButtonElement) sibling.focus();
+  } else if (over) {
+    const row = Number(element.dataset["row"]) + over;
+    const other = element.closest(".tracks")?.querySelector<HTMLElement>(`.key[data-row="${row}"][tabindex="0"]`);
+    other?.focus();
+  } else if (control && event.key === "a") {
+    chosenKeys.value = tracks.value.tracks.flatMap(keysOf);
+  } else if (event.key === "Delete" || event.key === "Backspace") {
+    if (!chosenNames.value.has(nameOf(key))) chosenKeys.value = [key];
+    removeKeys();
+  } else return;
+  event.preventDefault();
+  event.stopPropagation();
+}
