@@ -21,6 +21,7 @@ mod finish;
 mod geometry;
 mod glass;
 mod kind;
+mod left_out;
 mod lens;
 mod light;
 mod lights;
@@ -114,7 +115,7 @@ impl<'a> Drawing<'a> {
     /// # Errors
     /// When this build leaves out what the scene needs.
     pub fn exposed(exposure: Exposure<'a>, options: &'a RenderOptions) -> Result<Self, RenderError> {
-        parts::check(&exposure)?;
+        left_out::check(&exposure)?;
         let scene = exposure.scene();
         if parts::BUILT.samples && scene.samples.most() > 1 {
             return Ok(Self(

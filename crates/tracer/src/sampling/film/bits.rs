@@ -3,6 +3,12 @@
 /// Pixels in a word.
 pub(super) const WORD: usize = 64;
 
+/// Zeros, which take no memory before they are written to; `None` where there is none for them.
+pub(super) fn zeroed<T: Clone + Default>(count: usize) -> Option<Vec<T>> {
+    Vec::<T>::new().try_reserve_exact(count).ok()?;
+    Some(vec![T::default(); count])
+}
+
 /// A set of pixels; bits beyond a row's last column are never set.
 #[derive(Clone, Debug)]
 pub(crate) struct Bits {
@@ -16,13 +22,13 @@ impl Bits {
     /// No pixel of so many columns and rows; `None` where there is no memory for it.
     pub(super) fn none((columns, rows): (usize, usize)) -> Option<Self> {
         let stride = columns.div_ceil(WORD);
-        let words = super::zeroed(stride.checked_mul(rows)?)?;
+        let words = zeroed(stride.checked_mul(rows)?)?;
         Some(Self { words, stride, columns })
     }
 
     /// No pixel of as many columns and rows.
     pub(super) fn empty(&self) -> Option<Self> {
-        Some(Self { words: super::zeroed(self.words.len())?, ..*self })
+        Some(Self { words: zeroed(self.words.len())?, ..*self })
     }
 
     pub(super) fn rows(&self) -> usize {

@@ -3,8 +3,8 @@
 use core::ops::Range;
 use std::sync::LazyLock;
 
-use super::bits::WORD;
-use super::{ONE, quantised, zeroed};
+use super::bits::{WORD, zeroed};
+use super::pixel::{ONE, quantised};
 use crate::parallel::CHANNELS;
 use crate::reference::encoded;
 use rayfold_scene::Tone;

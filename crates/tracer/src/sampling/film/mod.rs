@@ -8,105 +8,19 @@
 
 mod bits;
 mod first;
+mod pixel;
 mod plan;
 
 use glam::DVec3;
 use rayfold_scene::{Samples, Tone};
 
-pub(crate) use self::bits::Bits;
-pub(crate) use self::first::{First, FirstRows};
+use self::first::First;
+pub(crate) use self::first::FirstRows;
+use self::pixel::{ONE, Sums};
+pub(crate) use self::pixel::{Pixel, quantised};
 use self::plan::Plan;
+pub(crate) use self::plan::Wanted;
 use crate::parallel::CHANNELS;
-use crate::reference::encoded;
-
-/// A channel's sums count in parts of this, so that no order of adding makes a difference.
-const ONE: f64 = 65535.0;
-
-/// So many times the error that is asked for, two neighbours with a sample each may differ by.
-const CONTRAST: f64 = 1.5;
-
-/// The error of a mean of n samples is taken for their deviation times n to this power: steeper than the -1/2 of independent
-/// samples, and less steep than what edges and penumbrae have (docs/reports/sampling.md).
-const SLOPE: f64 = -0.65;
-
-/// So many times the error that is asked for a pixel may have: most others have less.
-const SPARED: f64 = 3.0;
-
-/// What a pixel has got so far.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Pixel {
-    sum: [u64; CHANNELS],
-    squares: [u64; CHANNELS],
-    count: u32,
-}
-
-/// 2^52: what is added to it is rounded to a whole number, which its lowest bits are.
-const WHOLE: f64 = 4_503_599_627_370_496.0;
-
-/// A channel of a colour as a part of [`ONE`]; what is not a number is black.
-#[inline(always)]
-pub(crate) fn quantised(channel: f64) -> u32 {
-    let channel = if channel > 0.0 { channel } else { 0.0 };
-    (channel.min(1.0) * ONE + WHOLE).to_bits() as u32
-}
-
-impl Pixel {
-    /// Adds samples: their [`quantised`] channels.
-    #[inline(always)]
-    pub(crate) fn add(&mut self, channels: [&[u32]; CHANNELS]) {
-        for ((sum, squares), levels) in self.sum.iter_mut().zip(&mut self.squares).zip(channels) {
-            for &level in levels {
-                *sum += u64::from(level);
-                // At most 32 bits.
-                *squares += u64::from(level.wrapping_mul(level));
-            }
-        }
-        self.count += channels[0].len() as u32;
-    }
-
-    /// Adds as many of the same [`quantised`] colour.
-    pub(crate) fn add_equal(&mut self, color: [u32; CHANNELS], count: u32) {
-        for ((sum, squares), level) in self.sum.iter_mut().zip(&mut self.squares).zip(color) {
-            let level = u64::from(level);
-            *sum += level * u64::from(count);
-            *squares += level * level * u64::from(count);
-        }
-        self.count += count;
-    }
-
-    #[inline(always)]
-    pub(crate) fn count(&self) -> u32 {
-        self.count
-    }
-
-    /// Of all samples.
-    pub(crate) fn mean(&self) -> DVec3 {
-        DVec3::from_array(self.sum.map(|sum| sum as f64)) / (ONE * f64::from(self.count.max(1)))
-    }
-
-    /// The variance of its samples in squares of levels: the mean over the channels.
-    fn variance(&self, tone: Tone) -> f64 {
-        let of_count = 1.0 / f64::from(self.count);
-        let mut sum = 0.0;
-        for channel in 0..CHANNELS {
-            let mean = self.sum[channel] as f64 * of_count;
-            let spread = (self.squares[channel] as f64 - self.sum[channel] as f64 * mean).max(0.0);
-            let spread = spread / (f64::from(self.count) - 1.0);
-            let slope = match tone {
-                Tone::Plain => 1.0,
-                Tone::Srgb => slope(mean / ONE, spread.sqrt() / ONE),
-            };
-            sum += spread * slope * slope;
-        }
-        (255.0 * 255.0) / (ONE * ONE) * sum / CHANNELS as f64
-    }
-}
-
-/// By how much the sRGB curve stretches differences of about `apart` there.
-fn slope(light: f64, apart: f64) -> f64 {
-    let (low, high) = ((light - 0.5 * apart).max(0.0), (light + 0.5 * apart).min(1.0));
-    if high - low < 1e-9 { 12.92 } else { (encoded(high) - encoded(low)) / (high - low) }
-}
 
 /// An image of samples, its first row at the top.
 #[derive(Debug)]
@@ -128,31 +42,6 @@ pub(crate) struct Band<'a> {
     pub(crate) tiles: &'a mut [Vec<Pixel>],
     /// Row by row.
     pub(crate) first: Option<FirstRows<'a>>,
-}
-
-/// What a pass gives to whom.
-#[derive(Clone, Copy)]
-pub(crate) struct Wanted<'a> {
-    plan: &'a Plan,
-    /// Who gets something.
-    pub(crate) pixels: &'a Bits,
-    /// Whether it is the first sample of pixels that may get no other.
-    pub(crate) is_first_look: bool,
-}
-
-impl Wanted<'_> {
-    /// How many samples a pixel that has so many, and gets something in this pass, shall have after it.
-    #[inline(always)]
-    pub(crate) fn goal(&self, count: u32) -> u32 {
-        self.plan.goal(count)
-    }
-
-    /// How many of so many moments, a power of two, a sample is one of: the first samples are of few, so that those of a tile
-    /// that are of one moment are many.
-    #[inline(always)]
-    pub(crate) fn moments(&self, sample: u32, all: u32) -> u32 {
-        self.plan.moments(sample, all)
-    }
 }
 
 impl Film {
@@ -235,7 +124,8 @@ impl Film {
         (0..height).flat_map(move |row| {
             let mut of_row = Vec::with_capacity(width);
             self.each_of_row(row, |color| {
-                let count = if let Color::Mean(_) = color { sums.pixel(of_row.len(), row).count } else { 1 };
+                let count =
+                    if let Color::Mean(_) = color { sums.pixel(of_row.len(), row).count() } else { 1 };
                 of_row.push((color.unit(), count));
             });
             of_row
@@ -271,32 +161,11 @@ impl Color {
     }
 }
 
-/// Sums by column and row of the image.
-#[derive(Clone, Copy)]
-struct Sums<'a> {
-    tiles: &'a [Vec<Pixel>],
-    columns: usize,
-    side: (usize, usize),
-}
-
-impl Sums<'_> {
-    #[inline(always)]
-    fn pixel(&self, column: usize, row: usize) -> &Pixel {
-        let (across, down) = self.side;
-        let tile = row / down * self.columns.div_ceil(across) + column / across;
-        &self.tiles[tile][row % down * across + column % across]
-    }
-}
-
-/// Zeros, which take no memory before they are written to; `None` where there is none for them.
-fn zeroed<T: Clone + Default>(count: usize) -> Option<Vec<T>> {
-    Vec::<T>::new().try_reserve_exact(count).ok()?;
-    Some(vec![T::default(); count])
-}
-
 #[cfg(test)]
 mod tests {
+    use super::plan::{CONTRAST, SLOPE, SPARED};
     use super::*;
+    use crate::reference::encoded;
 
     fn film(most: u32, error: f64, step: u32) -> Film {
         Film::new((8, 4), (3, 2), Samples::new(most, error).unwrap(), Tone::Plain, step).unwrap()
@@ -332,10 +201,10 @@ mod tests {
                         }
                         pixels.resize(side.0 * side.1, Pixel::default());
                         let pixel = &mut pixels[place];
-                        if let (0, Some(first)) = (pixel.count, first) {
+                        if let (0, Some(first)) = (pixel.count(), first) {
                             pixel.add_equal(first.color(at.1 * columns + at.0), 1);
                         }
-                        for sample in pixel.count..wanted.goal(pixel.count) {
+                        for sample in pixel.count()..wanted.goal(pixel.count()) {
                             let level = [draw(sample)];
                             pixel.add([&level; 3]);
                         }

@@ -8,18 +8,54 @@
 use rayfold_scene::{Samples, Tone};
 use rayon::prelude::*;
 
-use super::bits::{columns, widened};
-use super::{Bits, CONTRAST, First, ONE, SLOPE, SPARED, Sums, Wanted};
+use super::bits::{Bits, columns, widened};
+use super::first::First;
+use super::pixel::{ONE, Sums};
 
 /// Samples a pixel that are looked at before any decision, and where variances begin to say something.
 const FIRST: u32 = 1;
 const SECOND: u32 = 4;
+
+/// So many times the error that is asked for, two neighbours with a sample each may differ by.
+pub(super) const CONTRAST: f64 = 1.5;
+
+/// The error of a mean of n samples is taken for their deviation times n to this power: steeper than the -1/2 of independent
+/// samples, and less steep than what edges and penumbrae have (docs/reports/sampling.md).
+pub(super) const SLOPE: f64 = -0.65;
+
+/// So many times the error that is asked for a pixel may have: most others have less.
+pub(super) const SPARED: f64 = 3.0;
 
 /// Moments of the first samples.
 const FEW_MOMENTS: u32 = 16;
 
 /// Rows that are looked at together.
 const BAND: usize = 16;
+
+/// What a pass gives to whom.
+#[derive(Clone, Copy)]
+pub(crate) struct Wanted<'a> {
+    plan: &'a Plan,
+    /// Who gets something.
+    pub(crate) pixels: &'a Bits,
+    /// Whether it is the first sample of pixels that may get no other.
+    pub(crate) is_first_look: bool,
+}
+
+impl Wanted<'_> {
+    /// How many samples a pixel that has so many, and gets something in this pass, shall have after it.
+    #[inline(always)]
+    pub(crate) fn goal(&self, count: u32) -> u32 {
+        self.plan.goal(count)
+    }
+
+    /// How many of so many moments, a power of two, a sample is one of: the first samples are of few, so that those of a tile
+    /// that are of one moment are many.
+    #[inline(always)]
+    pub(crate) fn moments(&self, sample: u32, all: u32) -> u32 {
+        self.plan.moments(sample, all)
+    }
+}
 
 #[derive(Debug)]
 pub(super) struct Plan {
@@ -196,7 +232,7 @@ impl Plan {
                     *unsettled &= !gone;
                     for column in columns(word, gone) {
                         let pixel = sums.pixel(column, row);
-                        let is_unsettled = pixel.count < most && pixel.variance(tone) > limits[at + 1];
+                        let is_unsettled = pixel.count() < most && pixel.variance(tone) > limits[at + 1];
                         *unsettled |= u64::from(is_unsettled) << (column % u64::BITS as usize);
                     }
                 }

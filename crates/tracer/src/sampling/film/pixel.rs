@@ -1,0 +1,103 @@
+//! The sums of a pixel's samples.
+
+use glam::DVec3;
+use rayfold_scene::Tone;
+
+use crate::parallel::CHANNELS;
+use crate::reference::encoded;
+
+/// A channel's sums count in parts of this, so that no order of adding makes a difference.
+pub(super) const ONE: f64 = 65535.0;
+
+/// What a pixel has got so far.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pixel {
+    sum: [u64; CHANNELS],
+    squares: [u64; CHANNELS],
+    count: u32,
+}
+
+/// 2^52: what is added to it is rounded to a whole number, which its lowest bits are.
+const WHOLE: f64 = 4_503_599_627_370_496.0;
+
+/// A channel of a colour as a part of [`ONE`]; what is not a number is black.
+#[inline(always)]
+pub(crate) fn quantised(channel: f64) -> u32 {
+    let channel = if channel > 0.0 { channel } else { 0.0 };
+    (channel.min(1.0) * ONE + WHOLE).to_bits() as u32
+}
+
+impl Pixel {
+    /// Adds samples: their [`quantised`] channels.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, channels: [&[u32]; CHANNELS]) {
+        for ((sum, squares), levels) in self.sum.iter_mut().zip(&mut self.squares).zip(channels) {
+            for &level in levels {
+                *sum += u64::from(level);
+                // At most 32 bits.
+                *squares += u64::from(level.wrapping_mul(level));
+            }
+        }
+        self.count += channels[0].len() as u32;
+    }
+
+    /// Adds as many of the same [`quantised`] colour.
+    pub(crate) fn add_equal(&mut self, color: [u32; CHANNELS], count: u32) {
+        for ((sum, squares), level) in self.sum.iter_mut().zip(&mut self.squares).zip(color) {
+            let level = u64::from(level);
+            *sum += level * u64::from(count);
+            *squares += level * level * u64::from(count);
+        }
+        self.count += count;
+    }
+
+    #[inline(always)]
+    pub(crate) fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// Of all samples.
+    pub(crate) fn mean(&self) -> DVec3 {
+        DVec3::from_array(self.sum.map(|sum| sum as f64)) / (ONE * f64::from(self.count.max(1)))
+    }
+
+    /// The variance of its samples in squares of levels: the mean over the channels.
+    pub(super) fn variance(&self, tone: Tone) -> f64 {
+        let of_count = 1.0 / f64::from(self.count);
+        let mut sum = 0.0;
+        for channel in 0..CHANNELS {
+            let mean = self.sum[channel] as f64 * of_count;
+            let spread = (self.squares[channel] as f64 - self.sum[channel] as f64 * mean).max(0.0);
+            let spread = spread / (f64::from(self.count) - 1.0);
+            let slope = match tone {
+                Tone::Plain => 1.0,
+                Tone::Srgb => slope(mean / ONE, spread.sqrt() / ONE),
+            };
+            sum += spread * slope * slope;
+        }
+        (255.0 * 255.0) / (ONE * ONE) * sum / CHANNELS as f64
+    }
+}
+
+/// By how much the sRGB curve stretches differences of about `apart` there.
+fn slope(light: f64, apart: f64) -> f64 {
+    let (low, high) = ((light - 0.5 * apart).max(0.0), (light + 0.5 * apart).min(1.0));
+    if high - low < 1e-9 { 12.92 } else { (encoded(high) - encoded(low)) / (high - low) }
+}
+
+/// Sums by column and row of the image.
+#[derive(Clone, Copy)]
+pub(super) struct Sums<'a> {
+    pub(super) tiles: &'a [Vec<Pixel>],
+    pub(super) columns: usize,
+    pub(super) side: (usize, usize),
+}
+
+impl Sums<'_> {
+    #[inline(always)]
+    pub(super) fn pixel(&self, column: usize, row: usize) -> &Pixel {
+        let (across, down) = self.side;
+        let tile = row / down * self.columns.div_ceil(across) + column / across;
+        &self.tiles[tile][row % down * across + column % across]
+    }
+}
