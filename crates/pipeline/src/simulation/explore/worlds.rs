@@ -11,6 +11,10 @@ pub struct World {
     pub(super) acts: Vec<(String, Option<&'static str>)>,
     /// How many of the acts are past: all has come to rest after each.
     pub(super) past: usize,
+    /// Whether the event of the past's last claim comes once more.
+    pub(super) is_claimed_again: bool,
+    /// From how many pending frames on whoever has drawn one may leave it to another.
+    pub(super) many: u64,
     /// What may go wrong.
     pub budget: Budget,
 }
@@ -29,7 +33,17 @@ const GONE: Option<&str> = None;
 
 fn world(name: &'static str, past: usize, budget: Budget, acts: &[(&str, Option<&'static str>)]) -> World {
     let acts = acts.iter().map(|(file, text)| (format!("scripts/a/{file}"), *text)).collect();
-    World { name, acts, past, budget }
+    World { name, acts, past, is_claimed_again: false, many: u64::MAX, budget }
+}
+
+/// Whoever has drawn a frame leaves it to another one that is still to come.
+fn left(world: World) -> World {
+    World { many: 1, ..world }
+}
+
+/// Between the past and what follows an assembler is woken that has nothing to do: events may come late, and again.
+fn claimed_again(world: World) -> World {
+    World { is_claimed_again: true, ..world }
 }
 
 /// All of them.
@@ -51,6 +65,7 @@ pub fn worlds() -> Vec<World> {
     let split = [("1.txt", Some("split 2 0"))];
     let thrice = [("1.txt", A), ("1.txt", B), ("1.txt", C)];
     let again = [("1.txt", A), ("1.txt", B), ("1.txt", C), ("1.txt", B)];
+    let to_and_fro = [("1.txt", A), ("1.txt", B), ("1.txt", A), ("1.txt", B)];
     let waiting = [("animation.json", Some("{\"frames\": 2}")), ("1.txt", A), ("1.txt", B), ("1.txt", A)];
     let returning = [
         ("animation.json", Some("{\"frames\": 2}")),
@@ -59,6 +74,10 @@ pub fn worlds() -> Vec<World> {
         ("2.txt", GONE),
         ("2.txt", A),
     ];
+    let settings = ("animation.json", Some("{\"frames\": 2}"));
+    let then_settings = [("1.txt", A), ("2.txt", A), settings];
+    let then_changed = [("1.txt", A), ("2.txt", A), settings, ("2.txt", B)];
+    let both = [("1.txt", A), ("2.txt", A), ("1.txt", B), ("2.txt", B), ("2.txt", A)];
     let announced = [("animation.json", Some("{\"frames\": 2}")), ("1.txt", A), ("2.txt", A)];
     vec![
         world("one frame, a kill", 0, kill, &one),
@@ -85,8 +104,24 @@ pub fn worlds() -> Vec<World> {
         world("two frames, one changed and changed back when done", 2, CALM, &flicker),
         world("one frame, overwritten twice when done, a late write", 1, late, &thrice),
         world("one frame, changed thrice when done", 1, CALM, &again),
+        world("one frame, changed, changed back and changed again when done", 1, CALM, &to_and_fro),
+        claimed_again(world(
+            "one frame, changed and changed back while an assembler looks",
+            1,
+            CALM,
+            &revert,
+        )),
         world("one of two frames, changed and changed back", 2, CALM, &waiting),
         world("the second of two frames comes, goes and comes back", 2, CALM, &returning),
+        left(world("two frames, then settings, one left to the other", 0, CALM, &then_settings)),
+        left(world("two frames, then settings, one left to the other, a kill", 0, kill, &then_settings)),
+        left(world("two frames and settings, one left to the other, which changes", 0, CALM, &then_changed)),
+        left(world(
+            "two frames changed when done, one left to the other, which changes back",
+            2,
+            CALM,
+            &both,
+        )),
         world("three frames, the last one new", 2, kill, &three),
         world("three frames", 1, CALM, &three),
     ]
@@ -94,14 +129,17 @@ pub fn worlds() -> Vec<World> {
 
 /// Those in which few schedules show much: what [`super::provoke`] is best given.
 pub fn provoking() -> Vec<World> {
-    const NAMES: [&str; 8] = [
+    const NAMES: [&str; 11] = [
         "one frame, a kill",
         "one frame, an event twice",
         "one frame, deleted when done, a lost answer",
         "one frame, changed and changed back when done, a kill",
         "one frame, overwritten twice when done, a late write",
         "one frame, changed thrice when done",
+        "one frame, changed, changed back and changed again when done",
+        "one frame, changed and changed back while an assembler looks",
         "one of two frames, changed and changed back",
+        "two frames, then settings, one left to the other",
         "the second of two frames comes, goes and comes back",
     ];
     worlds().into_iter().filter(|world| NAMES.contains(&world.name)).collect()
