@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use rayfold_bench::{accuracy, fingerprints, gif, measure, needs, parsing, sampling, speed};
 #[cfg(feature = "bucket")]
-use rayfold_bench::{cold_start, explore, pipeline, simulate};
+use rayfold_bench::{cold_start, explore, pipeline, scale, simulate};
 
 #[derive(Debug, Parser)]
 #[command(name = "rayfold-bench", about = "Measures rayfold and writes the reports in docs/reports")]
@@ -39,6 +39,9 @@ enum Measurement {
     Measure(measure::Args),
     /// Instructions that scenes execute for parts of the tracer that they do not use (needs valgrind)
     Needs(needs::Args),
+    /// Animations of 10 to 100,000 frames, and many at once, in a simulated world with the limits of AWS
+    #[cfg(feature = "bucket")]
+    Scale(scale::Args),
     /// Error against time of pictures of several samples a pixel
     Sampling(sampling::Args),
     /// Processor time against the work asked for, and beside POV-Ray and Embree where they are
@@ -61,6 +64,8 @@ fn main() -> anyhow::Result<()> {
         Measurement::Fingerprints(args) => fingerprints::run(&args),
         Measurement::Measure(args) => measure::run(&args),
         Measurement::Needs(args) => needs::run(&args),
+        #[cfg(feature = "bucket")]
+        Measurement::Scale(args) => scale::run(&args),
         Measurement::Sampling(args) => sampling::run(&args),
         Measurement::Speed(args) => speed::run(&args),
     }
