@@ -229,7 +229,7 @@ fn generation(frames: &[Frame], settings: &Settings) -> Generation {
     Generation::of_hash(digits)
 }
 
-/// Every so manieth pending frame.
+/// Pending frames at equal distances.
 fn awaited(frames: &[Frame]) -> Vec<Awaited> {
     let pending: Vec<&Frame> = frames.iter().filter(|frame| frame.state == FrameState::Pending).collect();
     let stride = pending.len().div_ceil(MOST_AWAITED).max(1);

@@ -88,8 +88,13 @@ const SCHEDULES: usize = 2;
 pub fn provoke(worlds: &[World], seed: u64, mutation: Option<Mutation>) -> Result<(), Box<Counterexample>> {
     let random = Randomness::seeded(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x70_6374);
     worlds.iter().try_for_each(|world| {
+        let mut memo = Memo::new(world, mutation);
+        let begin = State::begin(world, &mut memo);
+        let begin = begin.map_err(|what| counterexample_of_schedule(world, what, &[]))?;
         let kinds = Kind::ALL.repeat(SCHEDULES);
-        kinds.into_iter().try_for_each(|kind| schedule(world, &random, Order::new(&random, kind), mutation))
+        kinds.into_iter().try_for_each(|kind| {
+            schedule(world, begin.clone(), &mut memo, Order::new(&random, kind), &random)
+        })
     })
 }
 
@@ -118,18 +123,19 @@ impl Aim {
     }
 }
 
+fn counterexample_of_schedule(world: &World, what: String, steps: &[String]) -> Box<Counterexample> {
+    Box::new(Counterexample { world: world.name, what, steps: steps.to_vec(), states: 0, price: 0 })
+}
+
 fn schedule(
     world: &World,
-    random: &Randomness,
+    mut state: State,
+    memo: &mut Memo,
     mut order: Order,
-    mutation: Option<Mutation>,
+    random: &Randomness,
 ) -> Result<(), Box<Counterexample>> {
-    let mut memo = Memo::new(world, mutation);
     let mut steps = Vec::new();
-    let failed = |what: String, steps: &[String]| {
-        Box::new(Counterexample { world: world.name, what, steps: steps.to_vec(), states: 0, price: 0 })
-    };
-    let mut state = State::begin(world, &mut memo).map_err(|what| failed(what, &steps))?;
+    let failed = |what: String, steps: &[String]| counterexample_of_schedule(world, what, steps);
     let (aim, mut writes) = (Aim::new(random), 0);
     let lands_last = random.one_in(2);
     loop {
@@ -149,9 +155,9 @@ fn schedule(
         let Some(choice) = choice.copied() else { break };
         order.done(&state, choice);
         steps.push(state.describe(world, choice));
-        state = state.after(world, &mut memo, choice).map_err(|what| failed(what, &steps))?;
+        state = state.after(world, memo, choice).map_err(|what| failed(what, &steps))?;
     }
-    state.judge(world, &mut memo).map_err(|what| failed(what, &steps))
+    state.judge(world, memo).map_err(|what| failed(what, &steps))
 }
 
 /// Whether nothing goes wrong in it.
