@@ -82,7 +82,7 @@ impl Order {
             }
             Order::Few { current, preempted, writes } => {
                 let goes_on = current.filter(|current| actors.contains(current));
-                let Some(first) = goes_on.or_else(|| pick(&actors, random).copied()) else { return None };
+                let first = goes_on.or_else(|| pick(&actors, random).copied())?;
                 let is_preempted = is_writing(first) && preempted.contains(writes);
                 *writes += u64::from(is_writing(first));
                 let others: Vec<u64> = actors.iter().copied().filter(|actor| *actor != first).collect();
