@@ -4,7 +4,7 @@
 //! the invocations and `infra/prices.json`. Writes `docs/reports/scale.md`, its figures and its plots.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
@@ -20,25 +20,22 @@ const ASSEMBLE_GB: f64 = 3_008.0 / 1_024.0;
 /// What the assembler takes for a frame of 512 x 512 (`docs/decisions/gif-in-one-piece.md`).
 const PUSH: Duration = Duration::from_millis(6);
 
-/// Frames, animations, places, and whether a frame may be left to another one.
-const SIZES: [(u64, u64, usize, bool); 11] = [
-    (10, 1, 1_000, true),
-    (100, 1, 1_000, true),
-    (1_000, 1, 1_000, true),
-    (10_000, 1, 1_000, true),
-    (30_000, 1, 1_000, true),
-    (100_000, 1, 1_000, true),
-    (10, 1_000, 1_000, true),
-    (100, 100, 1_000, true),
-    (100, 1, 1_000, false),
-    (1_000, 1, 1_000, false),
-    (10_000, 1, 1_000, false),
+/// Frames, animations and places.
+const SIZES: [(u64, u64, usize); 8] = [
+    (10, 1, 1_000),
+    (100, 1, 1_000),
+    (1_000, 1, 1_000),
+    (10_000, 1, 1_000),
+    (30_000, 1, 1_000),
+    (100_000, 1, 1_000),
+    (10, 1_000, 1_000),
+    (100, 100, 1_000),
 ];
 
 /// Options of `rayfold-bench scale`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Sizes with more frames are left out, and no report is written
+    /// Sizes with more frames are left out, which the report then says
     #[arg(long)]
     most: Option<u64>,
     /// Prices
@@ -72,10 +69,12 @@ struct Row {
     frames: u64,
     animations: u64,
     places: usize,
-    leaves: bool,
     report: ScaleReport,
     dollars_a_frame: f64,
 }
+
+/// What of a row a plot shows.
+type Value = fn(&Row) -> f64;
 
 /// Measures.
 ///
@@ -88,22 +87,18 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         .with_context(|| format!("cannot read {}", args.prices.display()))?;
     let prices: Prices = serde_json::from_str(&text)?;
     let mut rows = Vec::new();
-    for (frames, animations, places, leaves) in SIZES {
+    for (frames, animations, places) in SIZES {
         if args.most.is_some_and(|most| frames * animations > most) {
             continue;
         }
         let start = Instant::now();
-        let scale = Scale { leaves, ..Scale::on_aws(frames, animations, places, PUSH) };
-        let report = measure(scale).map_err(anyhow::Error::msg)?;
+        let report = measure(Scale::on_aws(frames, animations, places, PUSH)).map_err(anyhow::Error::msg)?;
         let dollars_a_frame = dollars(&report, frames * animations, &prices);
-        let row = Row { frames, animations, places, leaves, report, dollars_a_frame };
+        let row = Row { frames, animations, places, report, dollars_a_frame };
         println!("{} {:.0} s", line(&row), start.elapsed().as_secs_f64());
         rows.push(row);
     }
-    if args.most.is_some() {
-        return Ok(());
-    }
-    write_report(&args.output, &rows)
+    write_report(args, &rows)
 }
 
 /// What a frame costs, in USD: requests and functions; the upload, the download and keeping it are not in it.
@@ -156,21 +151,20 @@ fn line(row: &Row) -> String {
     )
 }
 
-fn write_report(output: &Path, rows: &[Row]) -> anyhow::Result<()> {
+fn write_report(args: &Args, rows: &[Row]) -> anyhow::Result<()> {
     let mut page = HEADER.to_owned();
-    for (title, leaves) in [("", true), ("\n## Before a frame was left to another one\n", false)] {
-        page.push_str(title);
-        page.push_str(TABLE);
-        for row in rows.iter().filter(|row| row.leaves == leaves) {
-            writeln!(page, "{}", line(row))?;
-        }
+    page.push_str(TABLE);
+    for row in rows {
+        writeln!(page, "{}", line(row))?;
+    }
+    if let Some(most) = args.most {
+        writeln!(page, "\nSizes with more than {most} frames in all were not run.")?;
     }
     let mut figures = csv::Writer::from_writer(Vec::new());
     figures.write_record([
         "frames",
         "animations",
         "places",
-        "leaves",
         "requests_a_frame",
         "get",
         "put",
@@ -190,14 +184,13 @@ fn write_report(output: &Path, rows: &[Row]) -> anyhow::Result<()> {
         "at_once",
         "dollars_a_frame",
     ])?;
-    for Row { frames, animations, places, leaves, report, dollars_a_frame } in rows {
+    for Row { frames, animations, places, report, dollars_a_frame } in rows {
         let [get, put, _, list] = report.kinds_a_frame;
         let seconds = |time: Duration| time.as_secs_f64().to_string();
         figures.write_record([
             frames.to_string(),
             animations.to_string(),
             places.to_string(),
-            leaves.to_string(),
             report.requests_a_frame.to_string(),
             get.to_string(),
             put.to_string(),
@@ -219,26 +212,23 @@ fn write_report(output: &Path, rows: &[Row]) -> anyhow::Result<()> {
         ])?;
     }
     for (name, bytes) in [("scale.md", page.into_bytes()), ("scale.csv", figures.into_inner()?)] {
-        let path = output.join(name);
+        let path = args.output.join(name);
         std::fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
     }
-    let plots: [(&str, &str, fn(&Row) -> f64); 3] = [
+    let plots: [(&str, &str, Value); 3] = [
         ("requests", "requests a frame", |row| row.report.requests_a_frame),
         ("time", "seconds to the GIF", |row| row.report.whole.as_secs_f64()),
         ("cost", "USD for 1,000 frames", |row| row.dollars_a_frame * 1000.0),
     ];
     for (name, y, value) in plots {
-        let series = [("left to another", true), ("each folded", false)].map(|(name, leaves)| Series {
-            name: name.to_owned(),
-            points: rows
-                .iter()
-                .filter(|row| row.leaves == leaves && row.animations == 1)
-                .map(|row| (row.frames as f64, value(row)))
-                .collect(),
+        let alone = rows.iter().filter(|row| row.animations == 1);
+        let series = [Series {
+            name: "one animation".to_owned(),
+            points: alone.map(|row| (row.frames as f64, value(row))).collect(),
             joined: true,
-        });
+        }];
         let labels = Labels { title: y, x: "frames of the animation", y };
-        log_log(&output.join(format!("scale-{name}.svg")), &labels, &series)?;
+        log_log(&args.output.join(format!("scale-{name}.svg")), &labels, &series)?;
     }
     Ok(())
 }

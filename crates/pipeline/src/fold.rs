@@ -14,16 +14,11 @@
 //! after the predecessor was read. So the listing of the second one started after the first was put, hence after the
 //! fact; it has seen the fact, or what came later.
 //!
-//! While many frames are to come, whoever has just put one may leave at once, **to one that is still to come**: another frame
-//! that the manifest shows pending, that has no result, and whose script is still of that version, all looked at after the
-//! own result was put. Whatever comes of that frame is committed later, and whoever commits lists again, and sees both. Of
-//! the frames the one that is put last finds none to leave to, and folds.
-//!
 //! Invariant: whoever finds its own commit, as after a crash or a lost answer, still owes the claim and does not leave.
 
 use crate::invocation::{Glimpse, Invocation, Known, Mutation};
 use crate::keys::{Animation, Key};
-use crate::manifest::{Awaited, Fact, Manifest};
+use crate::manifest::{Fact, Manifest};
 use crate::store::{PutOptions, Store};
 use crate::{Clock, Error, Result, invariants};
 
@@ -32,8 +27,6 @@ use crate::{Clock, Error, Result, invariants};
 pub enum Folded {
     /// The manifest, someone else's, showed the fact: nothing was listed.
     Covered,
-    /// A frame that is still to come is left to see to it: nothing was listed.
-    Left,
     /// The manifest agreed with the listing.
     Agreed,
     /// This invocation's revision is the manifest, and frames are still to come.
@@ -67,9 +60,6 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         mut glimpse: Glimpse,
     ) -> Result<Folded> {
         let first = glimpse.revision();
-        if age == Age::New && self.leaves_to_another(animation, &glimpse, fact).await? {
-            return Ok(Folded::Left);
-        }
         // Of a large manifest that would be one more request, mostly in vain.
         let is_worth_it = age == Age::Old || !matches!(glimpse, Glimpse::Start { .. });
         if is_worth_it && self.may_leave(&glimpse) && self.shows(animation, &glimpse, fact).await? {
@@ -96,27 +86,6 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             }
             glimpse = known.into();
         }
-    }
-
-    /// Whether another frame is still to come, whose result will be committed after the fact.
-    async fn leaves_to_another(&self, animation: &Animation, glimpse: &Glimpse, fact: &Fact) -> Result<bool> {
-        let (Fact::Drawn(name, _, part, _), Some(head)) = (fact, glimpse.head()) else { return Ok(false) };
-        if head.pending < self.policy.many || head.is_terminal() || !self.may_leave(glimpse) {
-            return Ok(false);
-        }
-        let others =
-            || head.awaited.iter().filter(|awaited| (&awaited.script, &awaited.part) != (name, part));
-        let lot = usize::try_from(self.random.below(others().count() as u64)).unwrap_or(0);
-        let Some(Awaited { script, version, part }) = others().nth(lot) else { return Ok(false) };
-        if self.breaks(Mutation::LeaveToAnyone) {
-            return Ok(true);
-        }
-        if self.standing(animation, script, version, *part).await?.is_some() {
-            return Ok(false);
-        }
-        // After the look at its results: a result that has come since is folded later, too.
-        let now = self.head(&animation.script(script)).await?;
-        Ok(now.is_some_and(|now| now.etag == *version))
     }
 
     /// Whether whoever wrote the manifest will see to its claim: this invocation and earlier attempts at its event have

@@ -28,9 +28,6 @@ pub struct Policy {
     pub pause_per_frame: Duration,
     /// The longest such pause; with it the last finisher still claims within a second.
     pub pause_cap: Duration,
-    /// From how many pending frames on whoever has drawn one may leave it to another. 64: of fewer the manifest shows each as
-    /// soon as it is there.
-    pub many: u64,
     /// How many bytes of a manifest are read to see whether it covers a result. 32 KiB: all of it up to some 300 frames.
     pub glimpse: u64,
     /// The most frames that an animation may have; with `None` any number. With more it is failed, and no more of them
@@ -69,7 +66,6 @@ impl Policy {
             quiet: Duration::from_secs(5),
             pause_per_frame: Duration::from_millis(3),
             pause_cap: Duration::from_millis(500),
-            many: 64,
             glimpse: 32 * 1024,
             most_frames: None,
             stuck_after: Duration::from_secs(15 * 60),
@@ -118,13 +114,11 @@ pub enum Mutation {
     AssemblerDoesNotLookAgain,
     /// The GIF is put without its condition.
     DropGifCondition,
-    /// An invocation leaves its result to a frame that the manifest shows pending, without looking whether it still is.
-    LeaveToAnyone,
 }
 
 impl Mutation {
     /// All of them.
-    pub const ALL: [Mutation; 9] = [
+    pub const ALL: [Mutation; 8] = [
         Mutation::SkipSecondListing,
         Mutation::ClaimBeforeCommit,
         Mutation::DropIfMatch,
@@ -133,7 +127,6 @@ impl Mutation {
         Mutation::AssemblerLeavesEarly,
         Mutation::AssemblerDoesNotLookAgain,
         Mutation::DropGifCondition,
-        Mutation::LeaveToAnyone,
     ];
 }
 

@@ -80,21 +80,6 @@ pub struct Head {
     /// Every 1,000th script's name: where listings in ranges start.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub marks: Vec<ScriptName>,
-    /// Of many pending frames a few, from all over the animation: whoever has drawn another one may leave it to them.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub awaited: Vec<Awaited>,
-}
-
-/// A frame that is pending.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Awaited {
-    /// The script that draws it.
-    pub script: ScriptName,
-    /// The script's version.
-    pub version: ETag,
-    /// Which of the script's frames it is; `None` when the script is one frame, or has not been read yet.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub part: Part,
 }
 
 /// Where an animation stands.

@@ -10,9 +10,7 @@ use sha2::{Digest, Sha256};
 
 use crate::Timestamp;
 use crate::keys::{Animation, Generation, Part, Receipt, ScriptName};
-use crate::manifest::{
-    Awaited, Fault, Frame, FrameState, Head, Manifest, Rejected, SCHEMA, Settings, Status,
-};
+use crate::manifest::{Fault, Frame, FrameState, Head, Manifest, Rejected, SCHEMA, Settings, Status};
 use crate::store::ETag;
 
 /// How many scripts lie between two of a manifest's marks: as many as a page of a listing shows.
@@ -58,11 +56,6 @@ pub struct ReceiptFound {
     /// When it was written.
     pub modified: Timestamp,
 }
-
-/// The most frames that a manifest names as awaited, and the most bytes of their scripts' names: few of what a reader begins
-/// with.
-const MOST_AWAITED: usize = 16;
-const MOST_AWAITED_BYTES: usize = 2_048;
 
 /// What a script or a part of one has come to.
 #[derive(Debug, Clone, Default)]
@@ -153,7 +146,6 @@ pub fn reconcile(
         excess: None,
         removed_at: None,
         marks: marks(scripts),
-        awaited: awaited(&frames),
     };
     Manifest { head, frames }
 }
@@ -227,23 +219,6 @@ fn generation(frames: &[Frame], settings: &Settings) -> Generation {
     }
     let digits: String = hash.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect();
     Generation::of_hash(digits)
-}
-
-/// Pending frames at equal distances.
-fn awaited(frames: &[Frame]) -> Vec<Awaited> {
-    let pending: Vec<&Frame> = frames.iter().filter(|frame| frame.state == FrameState::Pending).collect();
-    let stride = pending.len().div_ceil(MOST_AWAITED).max(1);
-    let mut bytes = 0;
-    let few = pending.into_iter().step_by(stride).take_while(|frame| {
-        bytes += frame.script.as_str().len();
-        bytes <= MOST_AWAITED_BYTES
-    });
-    few.map(|Frame { script, version, part, .. }| Awaited {
-        script: script.clone(),
-        version: version.clone(),
-        part: *part,
-    })
-    .collect()
 }
 
 /// Every so many scripts a name, in byte order.

@@ -8,7 +8,6 @@ use std::time::Duration;
 use bytes::Bytes;
 
 use crate::failure::{End, Failure, Recorded};
-use crate::fold::Folded;
 use crate::keys::{Animation, Key, Part, ScriptName};
 use crate::manifest::{FrameState, Manifest, Reason, Status};
 use crate::render::{Drawing, Outcome, Renderer};
@@ -183,22 +182,6 @@ impl World {
 
     async fn render(&self, key: &str) -> Outcome {
         self.with(async |invocation| render_frame(invocation, &Drawer, key).await.unwrap().outcome).await
-    }
-
-    /// How the fold of the first script's frame ends, two frames being pending in the manifest, after `change`.
-    async fn first_of_two(mut self, many: u64, change: impl FnOnce(&World, &ETag)) -> (Folded, Manifest) {
-        self.policy.many = many;
-        self.put("scripts/film/1.txt", "frame 1");
-        let second = self.put("scripts/film/2.txt", "frame 2");
-        self.put("scripts/film/animation.json", "{\"frames\": 2}");
-        assert_eq!(self.render("scripts/film/animation.json").await, Outcome::Settings);
-        assert_eq!(self.manifest().head.pending, 2);
-        change(&self, &second);
-        let rendered = self
-            .with(async |invocation| render_frame(invocation, &Drawer, "scripts/film/1.txt").await.unwrap())
-            .await;
-        assert_eq!(rendered.outcome, Outcome::Drawn);
-        (rendered.folded, self.manifest())
     }
 
     async fn upload(&self, file: &str, text: &str) -> Outcome {
@@ -388,35 +371,4 @@ async fn ranges_of_a_listing_share_no_name() {
     assert_eq!((world.manifest().head.total, world.manifest().frames.len()), (2_301, 2_301));
     let claims = world.keys("assemblies/");
     assert!(claims.iter().all(|key| matches!(key.parse(), Ok(Key::Claim { .. }))));
-}
-
-#[tokio::test]
-async fn a_frame_is_left_to_one_that_is_still_to_come() {
-    let (folded, manifest) = World::new().first_of_two(1, |_, _| {}).await;
-    assert_eq!((folded, manifest.head.revision, manifest.head.pending), (Folded::Left, 1, 2));
-    // Of few frames the manifest shows each as soon as it is there.
-    let (folded, manifest) = World::new().first_of_two(3, |_, _| {}).await;
-    assert_eq!((folded, manifest.head.revision, manifest.head.pending), (Folded::Committed, 2, 1));
-}
-
-#[tokio::test]
-async fn a_frame_is_left_to_none_that_has_come_has_changed_or_has_gone() {
-    let has_come = |world: &World, version: &ETag| {
-        world.put(&format!("frames/film/2@{version}-p1.png"), "a picture");
-    };
-    let (folded, manifest) = World::new().first_of_two(1, has_come).await;
-    assert_eq!((folded, manifest.head.done), (Folded::Claimed, 2));
-    let has_failed = |world: &World, version: &ETag| {
-        world.put(&format!("frames/film/2@{version}-p1.error.json"), r#"{"message":"bad"}"#);
-    };
-    let (folded, manifest) = World::new().first_of_two(1, has_failed).await;
-    assert_eq!((folded, manifest.head.failed), (Folded::Claimed, 1));
-    let has_changed = |world: &World, _: &ETag| drop(world.put("scripts/film/2.txt", "frame 3"));
-    let (folded, manifest) = World::new().first_of_two(1, has_changed).await;
-    assert_eq!((folded, manifest.head.done), (Folded::Committed, 1));
-    let has_gone = |world: &World, _: &ETag| {
-        world.store.bucket.lock().unwrap().delete("scripts/film/2.txt");
-    };
-    let (folded, manifest) = World::new().first_of_two(1, has_gone).await;
-    assert_eq!((folded, manifest.head.total), (Folded::Committed, 1));
 }

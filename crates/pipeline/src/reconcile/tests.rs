@@ -231,18 +231,3 @@ fn above_a_page_of_scripts_every_thousandth_name_is_marked() {
     assert_eq!(marked, [names[999].clone(), names[1_999].clone()]);
     assert!(marks(MARK_EVERY * MOST_MARKS + 5_000).len() <= MOST_MARKS);
 }
-
-#[test]
-fn a_few_pending_frames_are_named_from_all_over_the_animation() {
-    let awaited = |listing: &str| -> Vec<String> {
-        let awaited = manifest(listing, "").head.awaited;
-        awaited.into_iter().map(|awaited| awaited.script.to_string()).collect()
-    };
-    assert_eq!(awaited("1.txt v\n2.txt w\n3.txt x\n2@w-p1.png\n3@x-p1.error.json"), ["1"]);
-    assert_eq!(awaited("1.txt v\n1@v-p1.png"), [""; 0]);
-    let many: String = (1..=100).map(|number| format!("{number}.txt v\n")).collect();
-    assert_eq!(awaited(&many)[..3], ["1", "8", "15"]);
-    assert_eq!(awaited(&many).len(), 15);
-    let long: String = (1..=9).map(|number| format!("{number}{}.txt v\n", "x".repeat(800))).collect();
-    assert_eq!(awaited(&long).len(), 2);
-}

@@ -36,8 +36,6 @@ pub struct Scale {
     pub limits: Option<Limits>,
     /// How long the assembler takes for a frame.
     pub push: Duration,
-    /// Whether whoever has drawn a frame may leave it to one that is still to come.
-    pub leaves: bool,
     /// Milliseconds that a frame takes, from and to.
     pub draw_ms: (u64, u64),
     /// Milliseconds over which the scripts are uploaded.
@@ -51,14 +49,14 @@ impl Scale {
     pub fn unlimited(frames: u64, concurrency: usize, seed: u64) -> Self {
         let (animations, limits, push) = (1, None, Duration::ZERO);
         let (draw_ms, upload_ms) = ((800, 1_200), 200);
-        Scale { frames, animations, concurrency, limits, push, leaves: true, draw_ms, upload_ms, seed }
+        Scale { frames, animations, concurrency, limits, push, draw_ms, upload_ms, seed }
     }
 
     /// On AWS, as far as it is modelled: what is uploaded comes at 250 scripts a second.
     pub fn on_aws(frames: u64, animations: u64, concurrency: usize, push: Duration) -> Self {
         let upload_ms = frames * animations * 1_000 / UPLOADED_A_SECOND;
         let (limits, draw_ms) = (Some(Limits::S3), (800, 1_200));
-        Scale { frames, animations, concurrency, limits, push, leaves: true, draw_ms, upload_ms, seed: 1 }
+        Scale { frames, animations, concurrency, limits, push, draw_ms, upload_ms, seed: 1 }
     }
 }
 
@@ -130,10 +128,9 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
     let random = Randomness::seeded(scale.seed);
     let grounds = Grounds::new(engine.clone(), scale.seed, false);
     *lock(&grounds.limits) = scale.limits;
-    let usual = Policy::new(PIXELS);
     let platform = Platform::new(
         grounds.clone(),
-        Policy { many: if scale.leaves { usual.many } else { u64::MAX }, ..usual },
+        Policy::new(PIXELS),
         None,
         scale.concurrency,
         TIMEOUT,

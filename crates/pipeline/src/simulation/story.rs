@@ -30,9 +30,6 @@ const TROUBLES: Duration = Duration::from_secs(45);
 /// Sets apart what strangers do from the rest of a story.
 const STRANGERS: u64 = 0x0067_6172_626c_6572;
 
-/// Sets apart from how many pending frames on a frame is left to another.
-const LEAVING: u64 = 0x006c_6561_7665;
-
 /// How many sweeps a run may need.
 const MOST_SWEEPS: u32 = 24;
 
@@ -46,8 +43,7 @@ pub(super) fn run(
     log: Option<&mut Vec<String>>,
 ) -> Result<Run, String> {
     let random = Randomness::seeded(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x5eed);
-    let many = [1, 2, 1_000][pick(&Randomness::seeded(seed ^ LEAVING), 3)];
-    let judge = begin(&random, many, mutation, log.is_some())?;
+    let judge = begin(&random, mutation, log.is_some())?;
     let strangers = Randomness::seeded(seed ^ STRANGERS);
     if strangers.one_in(8) {
         judge.garble(&strangers);
@@ -66,15 +62,10 @@ pub(super) fn run(
 }
 
 /// A world with its story, before anything has happened.
-fn begin(
-    random: &Randomness,
-    many: u64,
-    mutation: Option<Mutation>,
-    is_logged: bool,
-) -> Result<Judge, String> {
+fn begin(random: &Randomness, mutation: Option<Mutation>, is_logged: bool) -> Result<Judge, String> {
     let engine = Engine::default();
     let grounds = Grounds::new(engine.clone(), random.bits(), is_logged);
-    let policy = Policy { many, ..policy(random) };
+    let policy = policy(random);
     let concurrency = [1, 2, 4, 100][pick(random, 4)];
     let draw_ms = (1, [20, 300, 3_000][pick(random, 3)]);
     let push = Duration::from_millis([0, 0, 100, 400][pick(random, 4)]);

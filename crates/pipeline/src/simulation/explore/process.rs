@@ -18,7 +18,6 @@ use std::time::Duration;
 use bytes::{Bytes, BytesMut};
 use rayfold_scene::AnimationSettings;
 
-use super::World;
 use crate::assemble::{Animator, Encoding, Unfit};
 use crate::keys::{Part, ScriptName};
 use crate::manifest::Reason;
@@ -104,7 +103,7 @@ pub(super) struct Process {
     /// Of all the above.
     begun: u64,
     history: Vec<Event>,
-    /// Answers from here on have led to nothing yet: others of requests that were sent with theirs are awaited.
+    /// Answers from here on have led to nothing yet: others of requests that were sent with theirs are yet to come.
     silent: usize,
     /// Of all that has happened.
     pub(super) hash: u64,
@@ -117,14 +116,12 @@ pub(super) struct Process {
 #[derive(Debug)]
 pub(super) struct Memo {
     standings: BTreeMap<u64, Arc<Standing>>,
-    policy: Policy,
     mutation: Option<Mutation>,
 }
 
 impl Memo {
-    pub(super) fn new(world: &World, mutation: Option<Mutation>) -> Self {
-        let policy = Policy { many: world.many, ..Policy::new(PIXELS) };
-        Memo { standings: BTreeMap::new(), policy, mutation }
+    pub(super) fn new(mutation: Option<Mutation>) -> Self {
+        Memo { standings: BTreeMap::new(), mutation }
     }
 
     /// Begins an invocation.
@@ -146,7 +143,7 @@ impl Memo {
         process
     }
 
-    /// Gives an invocation the answer to one of its requests. Answers that are awaited together are kept in the order of
+    /// Gives an invocation the answer to one of its requests. Answers that are waited for together are kept in the order of
     /// their requests, whichever came first, where that leads to the same: the invocation does not tell.
     pub(super) fn answer(&mut self, process: &Process, slot: u32, answer: Answer, now: Timestamp) -> Process {
         let mut next = process.clone();
@@ -183,7 +180,7 @@ impl Memo {
         if let Some(known) = self.standings.get(&process.hash) {
             return known.clone();
         }
-        let standing = Arc::new(relive(process, &self.policy, self.mutation));
+        let standing = Arc::new(relive(process, self.mutation));
         self.standings.insert(process.hash, standing.clone());
         standing
     }
@@ -239,10 +236,9 @@ impl Answer {
 }
 
 /// Runs the real step again from its beginning, giving it the answers in their order.
-fn relive(process: &Process, policy: &Policy, mutation: Option<Mutation>) -> Standing {
+fn relive(process: &Process, mutation: Option<Mutation>) -> Standing {
     let board = Board(Arc::new(Mutex::new(Slots { now: process.start, ..Slots::default() })));
-    let (work, request_id) = (process.work.clone(), process.request_id.clone());
-    let mut task = step(work, request_id, board.clone(), policy.clone(), mutation);
+    let mut task = step(process.work.clone(), process.request_id.clone(), board.clone(), mutation);
     let mut end = poll(&mut task);
     for Event { slot, answer, now, .. } in &process.history {
         board.answer(*slot, answer.clone(), *now);
@@ -255,9 +251,9 @@ fn relive(process: &Process, policy: &Policy, mutation: Option<Mutation>) -> Sta
 
 type Task = Pin<Box<dyn Future<Output = Result<(), End>> + Send>>;
 
-fn step(work: Work, request_id: Arc<str>, board: Board, policy: Policy, mutation: Option<Mutation>) -> Task {
+fn step(work: Work, request_id: Arc<str>, board: Board, mutation: Option<Mutation>) -> Task {
     Box::pin(async move {
-        let random = Randomness::seeded(1);
+        let (random, policy) = (Randomness::seeded(1), Policy::new(PIXELS));
         let clock = BoardClock(board.clone());
         let store = BoardStore(board);
         let deadline = clock.now().after(Duration::from_secs(900));

@@ -96,12 +96,6 @@ fn unconditional_gifs_are_noticed() {
     notices(Mutation::DropGifCondition, "one frame, overwritten twice when done, a late write", 20_000);
 }
 
-/// Of two frames each was left to the other.
-#[test]
-fn leaving_to_who_has_come_already_is_noticed() {
-    notices(Mutation::LeaveToAnyone, "two frames, then settings, one left to the other", 20_000);
-}
-
 #[test]
 fn schedules_find_nothing_where_all_rules_hold() {
     let worlds = provoking();

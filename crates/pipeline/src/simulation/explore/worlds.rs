@@ -13,8 +13,6 @@ pub struct World {
     pub(super) past: usize,
     /// Whether the event of the past's last claim comes once more.
     pub(super) is_claimed_again: bool,
-    /// From how many pending frames on whoever has drawn one may leave it to another.
-    pub(super) many: u64,
     /// What may go wrong.
     pub budget: Budget,
 }
@@ -33,12 +31,7 @@ const GONE: Option<&str> = None;
 
 fn world(name: &'static str, past: usize, budget: Budget, acts: &[(&str, Option<&'static str>)]) -> World {
     let acts = acts.iter().map(|(file, text)| (format!("scripts/a/{file}"), *text)).collect();
-    World { name, acts, past, is_claimed_again: false, many: u64::MAX, budget }
-}
-
-/// Whoever has drawn a frame leaves it to another one that is still to come.
-fn left(world: World) -> World {
-    World { many: 1, ..world }
+    World { name, acts, past, is_claimed_again: false, budget }
 }
 
 /// Between the past and what follows an assembler is woken that has nothing to do: events may come late, and again.
@@ -74,10 +67,6 @@ pub fn worlds() -> Vec<World> {
         ("2.txt", GONE),
         ("2.txt", A),
     ];
-    let settings = ("animation.json", Some("{\"frames\": 2}"));
-    let then_settings = [("1.txt", A), ("2.txt", A), settings];
-    let then_changed = [("1.txt", A), ("2.txt", A), settings, ("2.txt", B)];
-    let both = [("1.txt", A), ("2.txt", A), ("1.txt", B), ("2.txt", B), ("2.txt", A)];
     let announced = [("animation.json", Some("{\"frames\": 2}")), ("1.txt", A), ("2.txt", A)];
     vec![
         world("one frame, a kill", 0, kill, &one),
@@ -113,15 +102,6 @@ pub fn worlds() -> Vec<World> {
         )),
         world("one of two frames, changed and changed back", 2, CALM, &waiting),
         world("the second of two frames comes, goes and comes back", 2, CALM, &returning),
-        left(world("two frames, then settings, one left to the other", 0, CALM, &then_settings)),
-        left(world("two frames, then settings, one left to the other, a kill", 0, kill, &then_settings)),
-        left(world("two frames and settings, one left to the other, which changes", 0, CALM, &then_changed)),
-        left(world(
-            "two frames changed when done, one left to the other, which changes back",
-            2,
-            CALM,
-            &both,
-        )),
         world("three frames, the last one new", 2, kill, &three),
         world("three frames", 1, CALM, &three),
     ]
@@ -129,7 +109,7 @@ pub fn worlds() -> Vec<World> {
 
 /// Those in which few schedules show much: what [`super::provoke`] is best given.
 pub fn provoking() -> Vec<World> {
-    const NAMES: [&str; 11] = [
+    const NAMES: [&str; 10] = [
         "one frame, a kill",
         "one frame, an event twice",
         "one frame, deleted when done, a lost answer",
@@ -139,7 +119,6 @@ pub fn provoking() -> Vec<World> {
         "one frame, changed, changed back and changed again when done",
         "one frame, changed and changed back while an assembler looks",
         "one of two frames, changed and changed back",
-        "two frames, then settings, one left to the other",
         "the second of two frames comes, goes and comes back",
     ];
     worlds().into_iter().filter(|world| NAMES.contains(&world.name)).collect()
