@@ -25,6 +25,8 @@ pub mod parsing;
 pub mod pipeline;
 mod plot;
 pub mod sampling;
+#[cfg(feature = "bucket")]
+pub mod scale;
 pub mod scenes;
 #[cfg(feature = "bucket")]
 pub mod simulate;

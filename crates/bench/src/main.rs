@@ -5,7 +5,7 @@ use rayfold_bench::{
     accuracy, fingerprints, gif, measure, metamorphic, needs, parsing, sampling, speed, studio,
 };
 #[cfg(feature = "bucket")]
-use rayfold_bench::{cold_start, explore, pipeline, simulate};
+use rayfold_bench::{cold_start, explore, pipeline, scale, simulate};
 
 #[derive(Debug, Parser)]
 #[command(name = "rayfold-bench", about = "Measures rayfold and writes the reports in docs/reports")]
@@ -43,6 +43,9 @@ enum Measurement {
     Metamorphic(metamorphic::Args),
     /// Instructions that scenes execute for parts of the tracer that they do not use (needs valgrind)
     Needs(needs::Args),
+    /// Animations of 10 to 100,000 frames, and many at once, in a simulated world with the limits of AWS
+    #[cfg(feature = "bucket")]
+    Scale(scale::Args),
     /// Error against time of pictures of several samples a pixel
     Sampling(sampling::Args),
     /// What a ray costs, shape by shape, beside POV-Ray and Mitsuba where they are
@@ -70,6 +73,8 @@ fn main() -> anyhow::Result<()> {
         Measurement::Measure(args) => measure::run(&args),
         Measurement::Metamorphic(args) => metamorphic::run(&args),
         Measurement::Needs(args) => needs::run(&args),
+        #[cfg(feature = "bucket")]
+        Measurement::Scale(args) => scale::run(&args),
         Measurement::Sampling(args) => sampling::run(&args),
         Measurement::Shapes(args) => speed::shapes::run(&args),
         Measurement::Speed(args) => speed::run(&args),

@@ -224,8 +224,7 @@ fn scale_line(frames: u64, concurrency: usize) -> anyhow::Result<String> {
     let seeds = if frames > 2_000 { 1 } else { 10 };
     let mut worst = ScaleReport::default();
     for seed in 0..seeds {
-        let scale = Scale { frames, concurrency, draw_ms: (800, 1_200), upload_ms: 200, seed };
-        let report = measure(scale).map_err(anyhow::Error::msg)?;
+        let report = measure(Scale::unlimited(frames, concurrency, seed)).map_err(anyhow::Error::msg)?;
         worst = ScaleReport {
             requests_a_frame: worst.requests_a_frame.max(report.requests_a_frame),
             kinds_a_frame: [0, 1, 2, 3].map(|kind| worst.kinds_a_frame[kind].max(report.kinds_a_frame[kind])),
@@ -236,7 +235,7 @@ fn scale_line(frames: u64, concurrency: usize) -> anyhow::Result<String> {
             revisions: worst.revisions.max(report.revisions),
             assembling: worst.assembling.max(report.assembling),
             idle: worst.idle.max(report.idle),
-            whole: worst.whole.max(report.whole),
+            ..worst
         };
     }
     let [get, put, _, list] = worst.kinds_a_frame;

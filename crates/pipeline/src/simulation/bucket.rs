@@ -32,6 +32,31 @@ pub(super) struct Faults {
     pub(super) slow: u64,
 }
 
+/// What S3 bears of one bucket, and how fast bytes come.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Puts and deletes a second; more are answered with 503. S3 says 3,500 a prefix that it has set apart, and sets prefixes
+    /// apart only in time, so all of a bucket is one here.
+    pub writes: u64,
+    /// Reads and listings a second. S3 says 5,500 a prefix.
+    pub reads: u64,
+    /// Bytes of a body that come or go in a microsecond, on one connection.
+    pub bytes_a_microsecond: u64,
+}
+
+impl Limits {
+    /// S3's, as its documentation has them; bodies at 80 MB/s, as one connection of a function brings them (assumed).
+    pub const S3: Limits = Limits { writes: 3_500, reads: 5_500, bytes_a_microsecond: 80 };
+}
+
+/// How much of its limits a second has used up.
+#[derive(Debug, Default)]
+struct Second {
+    number: u64,
+    writes: u64,
+    reads: u64,
+}
+
 /// Who sends requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Actor {
@@ -118,6 +143,11 @@ pub(super) struct Grounds {
     pub(super) engine: Engine,
     pub(super) random: Randomness,
     pub(super) faults: Mutex<Faults>,
+    /// None: the bucket bears anything.
+    pub(super) limits: Mutex<Option<Limits>>,
+    second: Mutex<Second>,
+    /// Requests that were one too many.
+    pub(super) throttled: AtomicU64,
     pub(super) bucket: Mutex<Bucket>,
     pub(super) notify: Mutex<Option<Arc<Notify>>>,
     /// Told of the moments at which a change is most awkward.
@@ -149,6 +179,9 @@ impl Grounds {
             engine,
             random: Randomness::seeded(seed),
             faults: Mutex::default(),
+            limits: Mutex::default(),
+            second: Mutex::default(),
+            throttled: AtomicU64::new(0),
             bucket: Mutex::default(),
             notify: Mutex::new(None),
             moments: Mutex::new(None),
@@ -178,6 +211,34 @@ impl Grounds {
 
     pub(super) fn between_ms(&self, range: Range<u64>) -> Duration {
         Duration::from_micros(range.start * 1000 + self.random.below((range.end - range.start) * 1000))
+    }
+
+    /// Whether the bucket bears one more request in this second.
+    fn is_borne(&self, limits: Limits, action: Action) -> bool {
+        let mut second = lock(&self.second);
+        let number = self.engine.now_us() / 1_000_000;
+        if second.number != number {
+            *second = Second { number, ..Second::default() };
+        }
+        let (used, most) = match action {
+            Action::Put | Action::Delete => (&mut second.writes, limits.writes),
+            Action::Get | Action::List => (&mut second.reads, limits.reads),
+        };
+        *used += 1;
+        *used <= most
+    }
+
+    /// How long a request's body is on its way.
+    fn transfer(&self, limits: Limits, effect: &Effect) -> Duration {
+        let bytes = match effect {
+            Effect::Put(_, body, _) => body.len() as u64,
+            Effect::Get(key, range) => {
+                let size = lock(&self.bucket).head(key).map_or(0, |info| info.size);
+                range.end.min(size).saturating_sub(range.start)
+            }
+            Effect::Delete(_) | Effect::List(_) | Effect::Nothing(_) => 0,
+        };
+        Duration::from_micros(bytes / limits.bytes_a_microsecond.max(1))
     }
 
     fn tell(&self, moment: Moment) {
@@ -292,7 +353,10 @@ impl WorldStore {
 
         let faults = *lock(&grounds.faults);
         let slowness = if grounds.chance(faults.slow) { 1 + grounds.random.below(8) } else { 1 };
-        let latency = grounds.between_ms(effect.latency_ms()) * u32::try_from(slowness).unwrap_or(1);
+        let limits = *lock(&grounds.limits);
+        let transfer = limits.map_or(Duration::ZERO, |limits| grounds.transfer(limits, &effect));
+        let latency =
+            grounds.between_ms(effect.latency_ms()) * u32::try_from(slowness).unwrap_or(1) + transfer;
         let before_effect = grounds.random.up_to(latency);
         let countdown = self.fate.countdown.load(Ordering::Relaxed);
         if countdown > 0 {
@@ -300,6 +364,11 @@ impl WorldStore {
             if countdown == 1 {
                 self.kill_within(latency);
             }
+        }
+        if limits.is_some_and(|limits| !grounds.is_borne(limits, effect.action())) {
+            grounds.throttled.fetch_add(1, Ordering::Relaxed);
+            grounds.engine.sleep(latency).await;
+            return Err(Error::Throttled { key, source: "slow down".into() });
         }
         if grounds.chance(faults.busy) {
             grounds.engine.sleep(latency).await;

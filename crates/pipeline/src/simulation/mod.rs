@@ -30,6 +30,7 @@ mod scale;
 mod slow;
 mod story;
 
+pub use bucket::Limits;
 pub use scale::{Scale, ScaleReport, measure};
 pub use slow::{Slow, SlowReport, slowly};
 

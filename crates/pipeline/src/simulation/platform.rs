@@ -57,6 +57,8 @@ struct Job {
     work: Work,
     request_id: String,
     attempt: u64,
+    /// When it came into the queue, in microseconds.
+    queued_us: u64,
 }
 
 /// What happened, for the predicates.
@@ -74,8 +76,14 @@ pub(super) struct Diary {
     pub(super) idle: Vec<u64>,
     /// Invocations by kind: render, assemble.
     pub(super) invocations: [u64; 2],
-    /// Time of the render function's invocations that was not drawing.
+    /// Time of the render function's invocations that was not drawing, and that was.
     pub(super) beyond_drawing: Duration,
+    pub(super) drawing: Duration,
+    /// Time that events waited for a free place: the longest, and all together, by function.
+    pub(super) longest_wait: [Duration; 2],
+    pub(super) waits: [Duration; 2],
+    /// The most invocations at once.
+    pub(super) at_once: usize,
     /// Time of assemblers that came to their end, and the most assemblers at once.
     pub(super) assembling: Duration,
     pub(super) assemblers_at_once: u64,
@@ -85,6 +93,14 @@ pub(super) struct Diary {
 }
 
 impl Diary {
+    fn begins(&mut self, job: &Job, now_us: u64, running: usize) {
+        let function = usize::from(!matches!(job.work, Work::Render(..)));
+        let waited = Duration::from_micros(now_us - job.queued_us);
+        self.waits[function] += waited;
+        self.longest_wait[function] = self.longest_wait[function].max(waited);
+        self.at_once = self.at_once.max(running);
+    }
+
     fn assembler_begins(&mut self) {
         self.invocations[1] += 1;
         self.assemblers += 1;
@@ -111,6 +127,8 @@ pub(super) struct Platform {
     pub(super) diary: Mutex<Diary>,
     pub(super) mutation: Option<Mutation>,
     pub(super) concurrency: usize,
+    /// Places at the beginning, and how many more every 10 seconds, up to the concurrency; all at once when none.
+    pub(super) ramp: Mutex<Option<usize>>,
     pub(super) timeout: Duration,
     pub(super) draw_ms: (u64, u64),
     /// How long the assembler takes for a frame.
@@ -136,6 +154,7 @@ impl Platform {
             diary: Mutex::default(),
             mutation,
             concurrency,
+            ramp: Mutex::default(),
             timeout,
             draw_ms,
             push,
@@ -167,12 +186,13 @@ impl Platform {
     /// Starts work after a delay, as an event of its own.
     pub(super) fn submit(&self, work: Work, delay: Duration) {
         let request_id = format!("{:016x}", self.grounds.random.bits());
-        self.enqueue(Job { work, request_id, attempt: 1 }, delay);
+        self.enqueue(Job { work, request_id, attempt: 1, queued_us: 0 }, delay);
     }
 
-    fn enqueue(&self, job: Job, delay: Duration) {
+    fn enqueue(&self, mut job: Job, delay: Duration) {
         let Some(me) = self.me.upgrade() else { return };
         self.grounds.engine.after(delay, move || {
+            job.queued_us = me.grounds.engine.now_us();
             lock(&me.state).queue.push_back(job);
             me.launch();
         });
@@ -181,16 +201,25 @@ impl Platform {
     fn launch(&self) {
         loop {
             let mut state = lock(&self.state);
-            if state.running.len() >= self.concurrency {
+            if state.running.len() >= self.places() {
                 return;
             }
             let Some(job) = state.queue.pop_front() else { return };
             state.tokens += 1;
             let token = state.tokens;
             state.running.insert(token);
+            let running = state.running.len();
             drop(state);
+            lock(&self.diary).begins(&job, self.grounds.engine.now_us(), running);
             self.start(job, token);
         }
+    }
+
+    /// How many invocations may run now.
+    fn places(&self) -> usize {
+        let tens = usize::try_from(self.grounds.engine.now_us() / 10_000_000).unwrap_or(usize::MAX);
+        let ramp = lock(&self.ramp).map_or(usize::MAX, |step| step.saturating_mul(tens.saturating_add(1)));
+        self.concurrency.min(ramp)
     }
 
     fn start(&self, job: Job, token: u64) {
@@ -273,6 +302,7 @@ impl Platform {
                 let rendered = render_frame(&invocation, &actress, key).await?;
                 let stages = rendered.stages;
                 lock(&self.diary).beyond_drawing += stages.read + stages.put + stages.fold;
+                lock(&self.diary).drawing += stages.draw;
                 let draws_nothing = matches!(
                     rendered.outcome,
                     Outcome::Present | Outcome::Superseded | Outcome::Gone | Outcome::Settings

@@ -1,21 +1,22 @@
-//! How many requests a frame costs, and how soon the claim follows the last result.
+//! How many requests a frame costs, how soon the claim follows the last result and the GIF the first upload, who waits for a
+//! free place, and what the bucket refuses, for animations of any size and number.
 //!
-//! No faults here: the requests' latencies (GET 10-25 ms, PUT 25-60 ms, LIST 20-40 ms a page), the platform's
-//! concurrency and the drawing times are all there is.
+//! No faults here but the bucket's limits, if they are asked for: the requests' latencies (GET 10-25 ms, PUT 25-60 ms, LIST
+//! 20-40 ms a page, and the time of the bodies), the platform's concurrency and the drawing times are all there is.
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use bytes::Bytes;
 
-use super::bucket::{Actor, Grounds};
+use super::bucket::{Actor, Grounds, Limits};
 use super::engine::{Engine, WorldClock, lock};
 use super::expected::Expected;
 use super::platform::Platform;
 use super::{PIXELS, Shared};
 use crate::keys::{Animation, Key, Receipt};
-use crate::store::PutOptions;
+use crate::store::{Bucket, PutOptions};
 use crate::{Clock, Policy, Randomness};
 
 /// How long an invocation may run: as long as Lambda lets one.
@@ -24,10 +25,17 @@ const TIMEOUT: Duration = Duration::from_secs(900);
 /// What to measure.
 #[derive(Debug, Clone, Copy)]
 pub struct Scale {
-    /// Frames of the animation.
+    /// Frames of each animation.
     pub frames: u64,
-    /// Invocations at once.
+    /// Animations that are uploaded at once.
+    pub animations: u64,
+    /// Invocations at once, of both functions together.
     pub concurrency: usize,
+    /// With limits the bucket and the platform have those of AWS: a bucket's requests a second, the time of large bodies, and
+    /// 1,000 more invocations every 10 s.
+    pub limits: Option<Limits>,
+    /// How long the assembler takes for a frame.
+    pub push: Duration,
     /// Milliseconds that a frame takes, from and to.
     pub draw_ms: (u64, u64),
     /// Milliseconds over which the scripts are uploaded.
@@ -35,6 +43,28 @@ pub struct Scale {
     /// Decides everything.
     pub seed: u64,
 }
+
+impl Scale {
+    /// One animation in a bucket that bears anything, assembled in no time.
+    pub fn unlimited(frames: u64, concurrency: usize, seed: u64) -> Self {
+        let (animations, limits, push) = (1, None, Duration::ZERO);
+        let (draw_ms, upload_ms) = ((800, 1_200), 200);
+        Scale { frames, animations, concurrency, limits, push, draw_ms, upload_ms, seed }
+    }
+
+    /// On AWS, as far as it is modelled: what is uploaded comes at 250 scripts a second.
+    pub fn on_aws(frames: u64, animations: u64, concurrency: usize, push: Duration) -> Self {
+        let upload_ms = frames * animations * 1_000 / UPLOADED_A_SECOND;
+        let (limits, draw_ms) = (Some(Limits::S3), (800, 1_200));
+        Scale { frames, animations, concurrency, limits, push, draw_ms, upload_ms, seed: 1 }
+    }
+}
+
+/// Scripts that an upload brings in a second: some 10 connections at 40 ms a put.
+const UPLOADED_A_SECOND: u64 = 250;
+
+/// What Lambda adds to its places every 10 seconds.
+const RAMP: usize = 1_000;
 
 /// What was measured.
 #[derive(Debug, Clone, Default)]
@@ -57,28 +87,47 @@ pub struct ScaleReport {
     pub assembling: u64,
     /// The most requests of an event that comes once more when all is done.
     pub idle: u64,
-    /// From the first upload to the GIF.
+    /// From the first upload to the last GIF.
     pub whole: Duration,
+    /// From the first upload to the first GIF.
+    pub first: Duration,
+    /// Mean time of the render function's invocations that was drawing.
+    pub drawing: Duration,
+    /// Time of the assemble function's invocations, all together.
+    pub assembling_time: Duration,
+    /// How long events waited for a free place, on the average and at most: the render function's, the assemble function's.
+    pub waits: [[Duration; 2]; 2],
+    /// Invocations of the render and of the assemble function.
+    pub invocations: [u64; 2],
+    /// The most invocations at once.
+    pub at_once: usize,
+    /// Requests that the bucket refused as one too many, divided by the frames.
+    pub throttled: f64,
+    /// Bytes of the largest manifest.
+    pub manifest: u64,
 }
 
 #[derive(Default)]
 struct Moments {
     last_result_us: u64,
     last_claim_us: u64,
+    first_gif_us: Option<u64>,
     gif_us: u64,
     claims: u64,
     revisions: u64,
+    manifest: u64,
 }
 
-/// Renders an animation in the simulated world and counts.
+/// Renders animations in the simulated world and counts.
 ///
 /// # Errors
 ///
-/// What the bucket holds in the end, when that is not the animation.
+/// What the bucket holds in the end, when that is not the animations.
 pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
     let engine = Engine::default();
     let random = Randomness::seeded(scale.seed);
     let grounds = Grounds::new(engine.clone(), scale.seed, false);
+    *lock(&grounds.limits) = scale.limits;
     let platform = Platform::new(
         grounds.clone(),
         Policy::new(PIXELS),
@@ -86,27 +135,31 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
         scale.concurrency,
         TIMEOUT,
         scale.draw_ms,
-        Duration::ZERO,
+        scale.push,
     );
-    let animation = Animation::new("long").map_err(|error| error.to_string())?;
+    *lock(&platform.ramp) = scale.limits.map(|_| RAMP);
+    let names = (1..=scale.animations).map(|number| Animation::new(&format!("long{number}")));
+    let animations: Vec<Animation> =
+        names.collect::<crate::Result<_>>().map_err(|error| error.to_string())?;
     let moments: Shared<Moments> = Shared::default();
     {
         let (platform, moments, engine) = (Arc::downgrade(&platform), moments.clone(), engine.clone());
-        *lock(&grounds.notify) = Some(Arc::new(move |_: Actor, key: &str, there: bool, bucket: &_| {
-            lock(&moments).see(key, engine.now_us());
-            let bucket: &crate::store::Bucket = bucket;
+        *lock(&grounds.notify) = Some(Arc::new(move |_: Actor, key: &str, there: bool, bucket: &Bucket| {
+            lock(&moments).see(key, bucket, engine.now_us());
             if let Some(platform) = platform.upgrade() {
                 let etag = bucket.head(key).ok().filter(|_| there).map(|info| info.etag);
                 platform.object_event(key, etag);
             }
         }));
     }
-    let settings = format!(r#"{{"frames": {}}}"#, scale.frames);
-    change(&grounds, animation.settings(), Some(settings), Duration::ZERO);
-    for number in 1..=scale.frames {
-        let key = format!("{}{number}.txt", animation.scripts());
-        let delay = Duration::from_millis(random.below(scale.upload_ms + 1));
-        change(&grounds, key, Some(format!("frame {number}")), delay);
+    for animation in &animations {
+        let settings = format!(r#"{{"frames": {}}}"#, scale.frames);
+        change(&grounds, animation.settings(), Some(settings), Duration::ZERO);
+        for number in 1..=scale.frames {
+            let key = format!("{}{number}.txt", animation.scripts());
+            let delay = Duration::from_millis(random.below(scale.upload_ms + 1));
+            change(&grounds, key, Some(format!("frame {number}")), delay);
+        }
     }
     engine.run(Duration::from_secs(24 * 3600));
     if let Some(bug) = &lock(&platform.diary).bug {
@@ -114,54 +167,91 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
     }
     {
         let bucket = lock(&grounds.bucket);
-        Expected::of(&bucket, &animation).check(&bucket, &animation)?;
+        for animation in &animations {
+            Expected::of(&bucket, animation).check(&bucket, animation)?;
+        }
     }
-    let by_render = grounds.requests_of(Actor::Render);
-    let by_kind = [0, 1, 2, 3].map(|kind: usize| grounds.kinds[kind].load(Ordering::Relaxed) as f64);
-    let beyond_drawing = {
-        let diary = lock(&platform.diary);
-        diary.beyond_drawing / u32::try_from(diary.invocations[0]).unwrap_or(u32::MAX)
-    };
-    let read_by_render = grounds.bytes[Actor::Render as usize].load(Ordering::Relaxed);
-    let by_assemble = grounds.requests_of(Actor::Assemble);
-    lock(&platform.diary).idle.clear();
-    for number in [1, scale.frames / 2 + 1, scale.frames] {
-        let key = format!("{}{number}.txt", animation.scripts());
-        change(&grounds, key, Some(format!("frame {number}")), Duration::ZERO);
-    }
-    engine.run(Duration::from_secs(48 * 3600));
-    let idle = lock(&platform.diary).idle.clone();
-    if idle.len() != 3 {
-        return Err(format!("{} of 3 repeated events found everything done", idle.len()));
-    }
+    let mut report = platform.report(scale.frames * scale.animations);
+    report.idle = idle(&grounds, &platform, &animations, scale.frames)?;
     *lock(&grounds.notify) = None;
     engine.end();
     let moments = lock(&moments);
     let between = |from: u64, to: u64| Duration::from_micros(to.saturating_sub(from));
     Ok(ScaleReport {
-        requests_a_frame: by_render as f64 / scale.frames as f64,
-        kinds_a_frame: by_kind.map(|requests| requests / scale.frames as f64),
-        beyond_drawing,
-        bytes_a_frame: read_by_render as f64 / scale.frames as f64,
         tail: between(moments.last_result_us, moments.last_claim_us),
         claims: moments.claims,
         revisions: moments.revisions,
-        assembling: by_assemble,
-        idle: idle.into_iter().max().unwrap_or(0),
         whole: between(0, moments.gif_us),
+        first: between(0, moments.first_gif_us.unwrap_or_default()),
+        manifest: moments.manifest,
+        ..report
     })
 }
 
+/// The most requests of events that come once more when all is done.
+fn idle(
+    grounds: &Arc<Grounds>,
+    platform: &Platform,
+    animations: &[Animation],
+    frames: u64,
+) -> Result<u64, String> {
+    lock(&platform.diary).idle.clear();
+    if let Some(animation) = animations.first() {
+        for number in [1, frames / 2 + 1, frames] {
+            let key = format!("{}{number}.txt", animation.scripts());
+            change(grounds, key, Some(format!("frame {number}")), Duration::ZERO);
+        }
+    }
+    grounds.engine.run(Duration::from_secs(48 * 3600));
+    let idle = lock(&platform.diary).idle.clone();
+    match idle.len() {
+        3 => Ok(idle.into_iter().max().unwrap_or(0)),
+        found => Err(format!("{found} of 3 repeated events found everything done")),
+    }
+}
+
+impl Platform {
+    fn report(&self, frames: u64) -> ScaleReport {
+        let (grounds, diary) = (&self.grounds, lock(&self.diary));
+        let a_frame = |count: &AtomicU64| count.load(Ordering::Relaxed) as f64 / frames as f64;
+        let of = |actor: Actor| &grounds.requests[actor as usize];
+        let mean = |all: Duration, function: usize| {
+            all.div_f64(u32::try_from(diary.invocations[function]).unwrap_or(u32::MAX).max(1).into())
+        };
+        ScaleReport {
+            requests_a_frame: a_frame(of(Actor::Render)),
+            kinds_a_frame: [0, 1, 2, 3].map(|kind: usize| a_frame(&grounds.kinds[kind])),
+            beyond_drawing: mean(diary.beyond_drawing, 0),
+            bytes_a_frame: a_frame(&grounds.bytes[Actor::Render as usize]),
+            assembling: of(Actor::Assemble).load(Ordering::Relaxed),
+            drawing: mean(diary.drawing, 0),
+            assembling_time: diary.assembling,
+            waits: [0, 1]
+                .map(|function| [mean(diary.waits[function], function), diary.longest_wait[function]]),
+            invocations: diary.invocations,
+            at_once: diary.at_once,
+            throttled: a_frame(&grounds.throttled),
+            ..ScaleReport::default()
+        }
+    }
+}
+
 impl Moments {
-    fn see(&mut self, key: &str, now_us: u64) {
+    fn see(&mut self, key: &str, bucket: &Bucket, now_us: u64) {
         match key.parse() {
             Ok(Key::Receipt { receipt: Receipt::Frame { .. }, .. }) => self.last_result_us = now_us,
             Ok(Key::Claim { .. }) => {
                 self.last_claim_us = now_us;
                 self.claims += 1;
             }
-            Ok(Key::Manifest { .. }) => self.revisions += 1,
-            Ok(Key::Gif { .. }) => self.gif_us = now_us,
+            Ok(Key::Manifest { .. }) => {
+                self.revisions += 1;
+                self.manifest = self.manifest.max(bucket.head(key).map_or(0, |info| info.size));
+            }
+            Ok(Key::Gif { .. }) => {
+                self.first_gif_us.get_or_insert(now_us);
+                self.gif_us = now_us;
+            }
             _ => {}
         }
     }
@@ -182,10 +272,4 @@ pub(super) fn change(grounds: &Arc<Grounds>, key: String, text: Option<String>, 
             notify(Actor::User, &key, there, &lock(&world.bucket));
         }
     });
-}
-
-impl Grounds {
-    fn requests_of(&self, actor: Actor) -> u64 {
-        self.requests[actor as usize].load(Ordering::Relaxed)
-    }
 }

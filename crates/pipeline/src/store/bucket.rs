@@ -64,13 +64,14 @@ impl Bucket {
     /// Reads one page of a listing.
     pub fn list(&self, request: &ListRequest) -> ListPage {
         let mut page = ListPage::default();
-        let mut from = match (&request.continuation, &request.start_after) {
+        let from = match (&request.continuation, &request.start_after) {
             (Some(token), _) | (None, Some(token)) if *token >= request.prefix => {
                 Bound::Excluded(token.clone())
             }
             _ => Bound::Included(request.prefix.clone()),
         };
-        while let Some((key, object)) = self.objects.range::<String, _>((from, Bound::Unbounded)).next() {
+        let mut objects = self.objects.range::<String, _>((from, Bound::Unbounded));
+        while let Some((key, object)) = objects.next() {
             let Some(rest) = key.strip_prefix(&request.prefix) else { break };
             if page.objects.len() + page.prefixes.len() == PAGE {
                 page.next = Some(match page.prefixes.last() {
@@ -85,7 +86,8 @@ impl Bucket {
                 Some(slash) => {
                     let prefix = &key[..=request.prefix.len() + slash];
                     page.prefixes.push(prefix.to_owned());
-                    from = Bound::Excluded(end_of(prefix));
+                    let after = Bound::Excluded(end_of(prefix));
+                    objects = self.objects.range::<String, _>((after, Bound::Unbounded));
                 }
                 None => {
                     page.objects.push(Listed {
@@ -94,7 +96,6 @@ impl Bucket {
                         size: object.info.size,
                         modified: object.info.modified,
                     });
-                    from = Bound::Excluded(key.clone());
                 }
             }
         }

@@ -3,8 +3,8 @@
 //! [`explore`] visits every state that a [`World`] can come to: invocations' requests in any order, and within the world's
 //! budget kills before and after any request, writes that land after their sender's death, lost answers, and events that
 //! come twice or never. States are told apart by a hash of 64 bits; a request that can meet no other is taken alone
-//! (partial-order reduction: in a world that always comes to rest nothing is missed by it). [`provoke`] runs schedules that
-//! are chosen to provoke, with the faults aimed at writes.
+//! (partial-order reduction: in a world that always comes to rest nothing is missed by it). States that few preemptions lead
+//! to come first. [`provoke`] runs schedules that are chosen to provoke, with preemptions and faults aimed at writes.
 //!
 //! What must hold is what [`super::run`] checks: revisions grow by one, no function writes below `scripts/`, no GIF gives
 //! way to one from an older listing, and at rest manifest and GIF are what the scripts say, after sweeps where something
@@ -15,17 +15,17 @@
 
 mod order;
 mod process;
+mod search;
 mod state;
 #[cfg(test)]
 mod tests;
 mod worlds;
 
-use std::collections::BTreeSet;
-
 use crate::{Mutation, Randomness};
-use order::{Order, pick};
+use order::{Kind, MOST_WRITES, Order, pick};
 use process::Memo;
-use state::{Choice, Fate, State};
+pub use search::explore;
+use state::{Choice, Fate, Offer, State};
 pub use worlds::{World, provoking, worlds};
 
 /// How often what may go wrong in a world.
@@ -52,8 +52,11 @@ pub struct Explored {
     pub rests: u64,
     /// Steps from one state to another.
     pub steps: u64,
-    /// The most steps to a state of rest.
+    /// The most steps to a state of rest, by the way that it was reached first.
     pub depth: usize,
+    /// What preemptions and faults weigh at most on the way to a state, by the way that it was reached first: 1 before a
+    /// write, 2 elsewhere.
+    pub price: usize,
     /// There was no more to see; else the search ended at its limit.
     pub complete: bool,
 }
@@ -70,74 +73,14 @@ pub struct Counterexample {
     pub steps: Vec<String>,
     /// How many states were seen before; none by a schedule.
     pub states: u64,
+    /// What preemptions and faults weigh on the way; not counted in a schedule.
+    pub price: usize,
 }
 
-/// A state on the way, and what of it is still to be tried.
-struct Stop {
-    state: State,
-    choices: Vec<Choice>,
-    next: usize,
-}
+/// Schedules of each kind that a seed runs in each world.
+const SCHEDULES: usize = 2;
 
-/// Searches a world to its end, or until it has seen `most` states, with a rule broken on purpose if asked for.
-///
-/// # Errors
-///
-/// The first guarantee that does not hold.
-pub fn explore(
-    world: &World,
-    mutation: Option<Mutation>,
-    most: u64,
-) -> Result<Explored, Box<Counterexample>> {
-    let mut memo = Memo::new(mutation);
-    let mut path: Vec<Stop> = Vec::new();
-    let mut seen = BTreeSet::new();
-    let mut explored = Explored::default();
-    let mut next = State::begin(world, &mut memo).map_err(|what| counterexample(world, what, &[], 0))?;
-    loop {
-        if seen.insert(next.hash()) {
-            let choices = next.choices(world);
-            explored.states += 1;
-            if choices.is_empty() {
-                explored.rests += 1;
-                explored.depth = explored.depth.max(path.len());
-                next.judge(world, &mut memo)
-                    .map_err(|what| counterexample(world, what, &path, explored.states))?;
-            }
-            path.push(Stop { state: next, choices, next: 0 });
-        }
-        loop {
-            let Some(stop) = path.last_mut() else {
-                explored.complete = true;
-                return Ok(explored);
-            };
-            if explored.states >= most {
-                return Ok(explored);
-            }
-            let Some(choice) = stop.choices.get(stop.next).copied() else {
-                path.pop();
-                continue;
-            };
-            stop.next += 1;
-            explored.steps += 1;
-            let after = stop.state.after(world, &mut memo, choice);
-            next = after.map_err(|what| counterexample(world, what, &path, explored.states))?;
-            break;
-        }
-    }
-}
-
-fn counterexample(world: &World, what: String, path: &[Stop], states: u64) -> Box<Counterexample> {
-    let steps = path.iter().filter_map(|Stop { state, choices, next }| {
-        Some(state.describe(world, *choices.get(next.checked_sub(1)?)?))
-    });
-    Box::new(Counterexample { world: world.name, what, steps: steps.collect(), states })
-}
-
-/// Schedules of a seed in each world.
-const SCHEDULES: u64 = 4;
-
-/// Runs a few schedules in each world, half of them by priorities, half by turns.
+/// Runs a few schedules of each kind in each world.
 ///
 /// # Errors
 ///
@@ -145,38 +88,76 @@ const SCHEDULES: u64 = 4;
 pub fn provoke(worlds: &[World], seed: u64, mutation: Option<Mutation>) -> Result<(), Box<Counterexample>> {
     let random = Randomness::seeded(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x70_6374);
     worlds.iter().try_for_each(|world| {
-        (0..SCHEDULES)
-            .try_for_each(|number| schedule(world, &random, Order::new(&random, number % 2 == 0), mutation))
+        let mut memo = Memo::new(mutation);
+        let begin = State::begin(world, &mut memo);
+        let begin = begin.map_err(|what| counterexample_of_schedule(world, what, &[]))?;
+        let kinds = Kind::ALL.repeat(SCHEDULES);
+        kinds.into_iter().try_for_each(|kind| {
+            schedule(world, begin.clone(), &mut memo, Order::new(&random, kind), &random)
+        })
     })
+}
+
+/// When something goes wrong that may.
+enum Aim {
+    /// Once in so many steps.
+    Anywhere(u64),
+    /// In this write, counted from 0.
+    Write(u64),
+}
+
+impl Aim {
+    fn new(random: &Randomness) -> Self {
+        match random.one_in(2) {
+            true => Aim::Write(random.below(MOST_WRITES)),
+            false => Aim::Anywhere(1 + random.below(12)),
+        }
+    }
+
+    /// Whether it is now, `writes` having been begun before.
+    fn is_met(&self, is_write: bool, writes: u64, random: &Randomness) -> bool {
+        match self {
+            Aim::Anywhere(seldom) => random.one_in(*seldom),
+            Aim::Write(number) => is_write && writes == *number,
+        }
+    }
+}
+
+fn counterexample_of_schedule(world: &World, what: String, steps: &[String]) -> Box<Counterexample> {
+    Box::new(Counterexample { world: world.name, what, steps: steps.to_vec(), states: 0, price: 0 })
 }
 
 fn schedule(
     world: &World,
-    random: &Randomness,
+    mut state: State,
+    memo: &mut Memo,
     mut order: Order,
-    mutation: Option<Mutation>,
+    random: &Randomness,
 ) -> Result<(), Box<Counterexample>> {
-    let mut memo = Memo::new(mutation);
     let mut steps = Vec::new();
-    let failed = |what: String, steps: &[String]| {
-        Box::new(Counterexample { world: world.name, what, steps: steps.to_vec(), states: 0 })
-    };
-    let mut state = State::begin(world, &mut memo).map_err(|what| failed(what, &steps))?;
-    // How seldom something goes wrong that may.
-    let calm = 1 + random.below(12);
+    let failed = |what: String, steps: &[String]| counterexample_of_schedule(world, what, steps);
+    let (aim, mut writes) = (Aim::new(random), 0);
+    let lands_last = random.one_in(2);
     loop {
-        let choices = state.choices(world);
-        let Some(actor) = order.next(&state, &choices, random) else { break };
+        let Offer { mut choices, is_alone } = state.offer(world);
+        if lands_last && choices.iter().any(|choice| !matches!(choice, Choice::Ghost(_))) {
+            choices.retain(|choice| !matches!(choice, Choice::Ghost(_)));
+        }
+        // What meets nobody is no turn of its own.
+        let alone = choices.first().filter(|_| is_alone).map(|choice| state.actor(*choice));
+        let Some(actor) = alone.or_else(|| order.next(&state, &choices, random)) else { break };
         let mine = choices.into_iter().filter(|choice| state.actor(*choice) == actor);
         let (plain, awkward): (Vec<Choice>, Vec<Choice>) = mine.partition(|choice| is_plain(*choice));
-        let is_awkward = !awkward.is_empty() && (random.one_in(calm) || plain.is_empty());
+        let is_write = plain.iter().any(|choice| state.is_write(*choice));
+        let is_awkward = !awkward.is_empty() && (plain.is_empty() || aim.is_met(is_write, writes, random));
+        writes += u64::from(is_write);
         let choice = pick(if is_awkward { &awkward } else { &plain }, random);
         let Some(choice) = choice.copied() else { break };
         order.done(&state, choice);
         steps.push(state.describe(world, choice));
-        state = state.after(world, &mut memo, choice).map_err(|what| failed(what, &steps))?;
+        state = state.after(world, memo, choice).map_err(|what| failed(what, &steps))?;
     }
-    state.judge(world, &mut memo).map_err(|what| failed(what, &steps))
+    state.judge(world, memo).map_err(|what| failed(what, &steps))
 }
 
 /// Whether nothing goes wrong in it.

@@ -42,7 +42,7 @@ pub(super) enum Work {
 }
 
 /// A request that waits to take effect.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) enum Request {
     Get(String, Range<u64>),
     Put(String, Bytes, PutOptions),
@@ -64,7 +64,7 @@ pub(super) enum Answer {
 }
 
 /// What an invocation has come to.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 pub(super) struct Standing {
     /// The requests that it waits on, each with its number.
     pub(super) requests: Vec<(u32, Request)>,
@@ -87,6 +87,8 @@ pub(super) struct Event {
     slot: u32,
     answer: Answer,
     now: Timestamp,
+    /// Of all that has happened up to it.
+    hash: u64,
 }
 
 /// An invocation: its event, and all that has happened to it.
@@ -98,8 +100,12 @@ pub(super) struct Process {
     /// Counted from 1.
     pub(super) attempt: u32,
     start: Timestamp,
-    history: Vec<Event>,
     /// Of all the above.
+    begun: u64,
+    history: Vec<Event>,
+    /// Answers from here on have led to nothing yet: others of requests that were sent with theirs are yet to come.
+    silent: usize,
+    /// Of all that has happened.
     pub(super) hash: u64,
     pub(super) standing: Arc<Standing>,
     /// When it last listed the scripts.
@@ -107,7 +113,7 @@ pub(super) struct Process {
 }
 
 /// What is known of invocations by the hash of what has happened to them.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Memo {
     standings: BTreeMap<u64, Arc<Standing>>,
     mutation: Option<Mutation>,
@@ -130,13 +136,15 @@ impl Memo {
         (&work, &request_id, attempt, now).hash(&mut hasher);
         let standing = Arc::new(Standing { requests: Vec::new(), end: None });
         let (history, hash) = (Vec::new(), hasher.finish());
+        let (start, begun, silent, listed) = (now, hash, 0, Timestamp(0));
         let mut process =
-            Process { work, request_id, attempt, start: now, history, hash, standing, listed: Timestamp(0) };
+            Process { work, request_id, attempt, start, begun, history, silent, hash, standing, listed };
         process.standing = self.standing(&process);
         process
     }
 
-    /// Gives an invocation the answer to one of its requests.
+    /// Gives an invocation the answer to one of its requests. Answers that are waited for together are kept in the order of
+    /// their requests, whichever came first, where that leads to the same: the invocation does not tell.
     pub(super) fn answer(&mut self, process: &Process, slot: u32, answer: Answer, now: Timestamp) -> Process {
         let mut next = process.clone();
         let asked = process.standing.requests.iter().find(|(of, _)| *of == slot);
@@ -145,12 +153,26 @@ impl Memo {
         {
             next.listed = now;
         }
-        let mut hasher = DefaultHasher::new();
-        (process.hash, slot, now).hash(&mut hasher);
-        answer.hash_into(&mut hasher);
-        next.hash = hasher.finish();
-        next.history.push(Event { slot, answer, now });
+        next.history.push(Event { slot, answer, now, hash: 0 });
+        let last = next.history.len() - 1;
+        next.rehash_from(last);
         next.standing = self.standing(&next);
+        let later = |event: &&Event| event.slot > slot && event.now == now;
+        let passed = next.history[next.silent..last].iter().rev().take_while(later).count();
+        if passed > 0 {
+            let mut sorted = next.clone();
+            sorted.history[last - passed..].rotate_right(1);
+            sorted.rehash_from(last - passed);
+            sorted.standing = self.standing(&sorted);
+            if sorted.standing == next.standing {
+                next = sorted;
+            }
+        }
+        let is_silent = next.standing.end.is_none()
+            && next.standing.requests.len() + 1 == process.standing.requests.len();
+        if !is_silent {
+            next.silent = next.history.len();
+        }
         next
     }
 
@@ -161,6 +183,22 @@ impl Memo {
         let standing = Arc::new(relive(process, self.mutation));
         self.standings.insert(process.hash, standing.clone());
         standing
+    }
+}
+
+impl Process {
+    /// Hashes what has happened from this answer on.
+    fn rehash_from(&mut self, place: usize) {
+        let before = place.checked_sub(1).and_then(|before| self.history.get(before));
+        let mut hash = before.map_or(self.begun, |event| event.hash);
+        for event in &mut self.history[place..] {
+            let mut hasher = DefaultHasher::new();
+            (hash, event.slot, event.now).hash(&mut hasher);
+            event.answer.hash_into(&mut hasher);
+            hash = hasher.finish();
+            event.hash = hash;
+        }
+        self.hash = hash;
     }
 }
 
@@ -202,7 +240,7 @@ fn relive(process: &Process, mutation: Option<Mutation>) -> Standing {
     let board = Board(Arc::new(Mutex::new(Slots { now: process.start, ..Slots::default() })));
     let mut task = step(process.work.clone(), process.request_id.clone(), board.clone(), mutation);
     let mut end = poll(&mut task);
-    for Event { slot, answer, now } in &process.history {
+    for Event { slot, answer, now, .. } in &process.history {
         board.answer(*slot, answer.clone(), *now);
         end = poll(&mut task);
     }

@@ -34,7 +34,10 @@ const ATTEMPTS: u32 = 3;
 /// Steps after which a world that should come to rest does not.
 const MOST_STEPS: u32 = 100_000;
 
-/// What can happen next.
+/// The user among those who act.
+pub(super) const USER: u64 = 0;
+
+/// One thing that can happen next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Choice {
     /// The user does the next thing.
@@ -43,6 +46,15 @@ pub(super) enum Choice {
     Request { process: usize, slot: u32, fate: Fate },
     /// A write lands whose sender is dead.
     Ghost(usize),
+}
+
+/// What can happen next.
+#[derive(Debug)]
+pub(super) struct Offer {
+    /// Each of them alone.
+    pub(super) choices: Vec<Choice>,
+    /// They are what can come of one request, which meets no other.
+    pub(super) is_alone: bool,
 }
 
 /// How often an event is delivered.
@@ -113,6 +125,11 @@ impl State {
         while state.acted < world.past {
             state = state.after(world, memo, Choice::User(Delivery::Once))?.at_rest(world, memo)?;
         }
+        if world.is_claimed_again {
+            let claims = state.contents.bucket.keys().filter(|key| key.starts_with("assemblies/"));
+            let claim = claims.last().unwrap_or_default().to_owned();
+            state.changed(memo, &claim, true, None, Delivery::Once)?;
+        }
         state.budget = world.budget;
         Ok(state)
     }
@@ -136,14 +153,14 @@ impl State {
 
     /// All that can happen next; nothing when the world has come to rest. If a request meets no other, now or later, it
     /// alone: whatever else happens could as well happen after it.
-    pub(super) fn choices(&self, world: &World) -> Vec<Choice> {
+    pub(super) fn offer(&self, world: &World) -> Offer {
         let mut choices = Vec::new();
         for (place, process) in self.processes.iter().enumerate() {
             for (slot, request) in &process.standing.requests {
                 if self.meets_no_other(world, request) {
                     choices.clear();
                     self.add_fates(place, process, *slot, request, &mut choices);
-                    return choices;
+                    return Offer { choices, is_alone: true };
                 }
                 self.add_fates(place, process, *slot, request, &mut choices);
             }
@@ -152,7 +169,7 @@ impl State {
         if self.acted < world.acts.len() {
             choices.extend(self.deliveries().map(Choice::User));
         }
-        choices
+        Offer { choices, is_alone: false }
     }
 
     /// Whether nothing that can happen to the world's end changes what the request finds, or finds what it changes.
@@ -447,7 +464,7 @@ impl State {
     /// Who does it: the user, an attempt at an event, or what a dead one has left.
     pub(super) fn actor(&self, choice: Choice) -> u64 {
         match choice {
-            Choice::User(_) => 0,
+            Choice::User(_) => USER,
             Choice::Ghost(place) => self.ghosts[place].hash,
             Choice::Request { process, .. } => {
                 let mut hasher = DefaultHasher::new();

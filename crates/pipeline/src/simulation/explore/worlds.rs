@@ -11,6 +11,8 @@ pub struct World {
     pub(super) acts: Vec<(String, Option<&'static str>)>,
     /// How many of the acts are past: all has come to rest after each.
     pub(super) past: usize,
+    /// Whether the event of the past's last claim comes once more.
+    pub(super) is_claimed_again: bool,
     /// What may go wrong.
     pub budget: Budget,
 }
@@ -29,7 +31,12 @@ const GONE: Option<&str> = None;
 
 fn world(name: &'static str, past: usize, budget: Budget, acts: &[(&str, Option<&'static str>)]) -> World {
     let acts = acts.iter().map(|(file, text)| (format!("scripts/a/{file}"), *text)).collect();
-    World { name, acts, past, budget }
+    World { name, acts, past, is_claimed_again: false, budget }
+}
+
+/// Between the past and what follows an assembler is woken that has nothing to do: events may come late, and again.
+fn claimed_again(world: World) -> World {
+    World { is_claimed_again: true, ..world }
 }
 
 /// All of them.
@@ -51,6 +58,7 @@ pub fn worlds() -> Vec<World> {
     let split = [("1.txt", Some("split 2 0"))];
     let thrice = [("1.txt", A), ("1.txt", B), ("1.txt", C)];
     let again = [("1.txt", A), ("1.txt", B), ("1.txt", C), ("1.txt", B)];
+    let to_and_fro = [("1.txt", A), ("1.txt", B), ("1.txt", A), ("1.txt", B)];
     let waiting = [("animation.json", Some("{\"frames\": 2}")), ("1.txt", A), ("1.txt", B), ("1.txt", A)];
     let returning = [
         ("animation.json", Some("{\"frames\": 2}")),
@@ -85,6 +93,13 @@ pub fn worlds() -> Vec<World> {
         world("two frames, one changed and changed back when done", 2, CALM, &flicker),
         world("one frame, overwritten twice when done, a late write", 1, late, &thrice),
         world("one frame, changed thrice when done", 1, CALM, &again),
+        world("one frame, changed, changed back and changed again when done", 1, CALM, &to_and_fro),
+        claimed_again(world(
+            "one frame, changed and changed back while an assembler looks",
+            1,
+            CALM,
+            &revert,
+        )),
         world("one of two frames, changed and changed back", 2, CALM, &waiting),
         world("the second of two frames comes, goes and comes back", 2, CALM, &returning),
         world("three frames, the last one new", 2, kill, &three),
@@ -94,13 +109,15 @@ pub fn worlds() -> Vec<World> {
 
 /// Those in which few schedules show much: what [`super::provoke`] is best given.
 pub fn provoking() -> Vec<World> {
-    const NAMES: [&str; 8] = [
+    const NAMES: [&str; 10] = [
         "one frame, a kill",
         "one frame, an event twice",
         "one frame, deleted when done, a lost answer",
         "one frame, changed and changed back when done, a kill",
         "one frame, overwritten twice when done, a late write",
         "one frame, changed thrice when done",
+        "one frame, changed, changed back and changed again when done",
+        "one frame, changed and changed back while an assembler looks",
         "one of two frames, changed and changed back",
         "the second of two frames comes, goes and comes back",
     ];

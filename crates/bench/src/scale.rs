@@ -1,0 +1,234 @@
+//! What animations of 10 to 100,000 frames take, and many at once, in a simulated world with the limits of AWS.
+//!
+//! Simulated time: the figures do not depend on the machine. What a frame costs follows from counted requests, the time of
+//! the invocations and `infra/prices.json`. Writes `docs/reports/scale.md`, its figures and its plots.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use anyhow::Context as _;
+use rayfold_pipeline::simulation::{Scale, ScaleReport, measure};
+use serde::Deserialize;
+
+use crate::plot::{Labels, Series, log_log};
+
+/// Memory of the functions in GB, as the stack gives it unless told otherwise.
+const RENDER_GB: f64 = 1_769.0 / 1_024.0;
+const ASSEMBLE_GB: f64 = 3_008.0 / 1_024.0;
+
+/// What the assembler takes for a frame of 512 x 512 (`docs/decisions/gif-in-one-piece.md`).
+const PUSH: Duration = Duration::from_millis(6);
+
+/// Frames, animations and places.
+const SIZES: [(u64, u64, usize); 8] = [
+    (10, 1, 1_000),
+    (100, 1, 1_000),
+    (1_000, 1, 1_000),
+    (10_000, 1, 1_000),
+    (30_000, 1, 1_000),
+    (100_000, 1, 1_000),
+    (10, 1_000, 1_000),
+    (100, 100, 1_000),
+];
+
+/// Options of `rayfold-bench scale`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Sizes with more frames are left out, which the report then says
+    #[arg(long)]
+    most: Option<u64>,
+    /// Prices
+    #[arg(long, default_value = "infra/prices.json")]
+    prices: PathBuf,
+    /// Folder of the report
+    #[arg(long, default_value = "docs/reports")]
+    output: PathBuf,
+}
+
+#[derive(Deserialize)]
+struct Prices {
+    lambda: LambdaPrices,
+    s3: S3Prices,
+}
+
+#[derive(Deserialize)]
+struct LambdaPrices {
+    request: f64,
+    gb_second_x86_64: f64,
+}
+
+#[derive(Deserialize)]
+struct S3Prices {
+    put_copy_post_list: f64,
+    get_and_other: f64,
+}
+
+/// One size and what came of it.
+struct Row {
+    frames: u64,
+    animations: u64,
+    places: usize,
+    report: ScaleReport,
+    dollars_a_frame: f64,
+}
+
+/// What of a row a plot shows.
+type Value = fn(&Row) -> f64;
+
+/// Measures.
+///
+/// # Errors
+///
+/// When an animation does not come right, or the report cannot be written.
+#[expect(clippy::print_stdout, reason = "a measurement tells what it finds")]
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let text = std::fs::read_to_string(&args.prices)
+        .with_context(|| format!("cannot read {}", args.prices.display()))?;
+    let prices: Prices = serde_json::from_str(&text)?;
+    let mut rows = Vec::new();
+    for (frames, animations, places) in SIZES {
+        if args.most.is_some_and(|most| frames * animations > most) {
+            continue;
+        }
+        let start = Instant::now();
+        let report = measure(Scale::on_aws(frames, animations, places, PUSH)).map_err(anyhow::Error::msg)?;
+        let dollars_a_frame = dollars(&report, frames * animations, &prices);
+        let row = Row { frames, animations, places, report, dollars_a_frame };
+        println!("{} {:.0} s", line(&row), start.elapsed().as_secs_f64());
+        rows.push(row);
+    }
+    write_report(args, &rows)
+}
+
+/// What a frame costs, in USD: requests and functions; the upload, the download and keeping it are not in it.
+fn dollars(report: &ScaleReport, frames: u64, prices: &Prices) -> f64 {
+    let [get, put, _, list] = report.kinds_a_frame;
+    let [render, assemble] = report.invocations.map(|count| count as f64);
+    let rendering = (report.drawing + report.beyond_drawing).as_secs_f64() * render * RENDER_GB;
+    let assembling = report.assembling_time.as_secs_f64() * ASSEMBLE_GB;
+    let lambda = (render + assemble) * prices.lambda.request
+        + (rendering + assembling) * prices.lambda.gb_second_x86_64;
+    (put + list) * prices.s3.put_copy_post_list + get * prices.s3.get_and_other + lambda / frames as f64
+}
+
+const HEADER: &str = "# Animations of any size
+
+Written by `cargo run --release -p rayfold-bench -- scale`, in simulated time: the figures do not depend on the machine. The
+real steps work in a bucket that bears 3,500 writes and 5,500 reads a second, all its keys together, and answers the rest with
+503; GET takes 10-25 ms, PUT 25-60 ms, LIST 20-40 ms for each 1,000 names, bodies come and go at 80 MB/s (assumed). Lambda has
+1,000 places for both functions, the account's default. Scripts come at 250 a second, with `frames` set; a frame is drawn in
+800 to 1,200 ms and encoded in 6 ms (512 x 512). Processor time of the folds is not modelled.
+
+*Requests* are those of the render function, 503s included. *Beyond* is the mean time of its invocations that was not drawing:
+Lambda bills it. *Tail*: from the last frame's put to the last claim's. *Waited*: for a free place, on the average and at most.
+*Cost* in USD for 1,000 frames: requests and both functions.
+";
+
+const TABLE: &str = "
+| frames | animations | requests a frame | LIST a frame | 503 a frame | beyond, ms | tail, ms | claims | manifests written | largest manifest, KB | first GIF, s | last GIF, s | assembling, s | render waited, s | assemble waited, s | cost of 1,000 |
+| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
+";
+
+fn line(row: &Row) -> String {
+    let Row { frames, animations, report, dollars_a_frame, .. } = row;
+    let ScaleReport { requests_a_frame, tail, claims, revisions, throttled, .. } = report;
+    let seconds = |time: Duration| time.as_secs_f64();
+    let waits = report.waits.map(|[mean, most]| format!("{:.2}, {:.1}", seconds(mean), seconds(most)));
+    format!(
+        "| {frames} | {animations} | {requests_a_frame:.2} | {:.2} | {throttled:.2} | {} | {} | {claims} | {revisions} | {:.0} | \
+         {:.1} | {:.1} | {:.1} | {} | {} | {:.4} |",
+        report.kinds_a_frame[3],
+        report.beyond_drawing.as_millis(),
+        tail.as_millis(),
+        report.manifest as f64 / 1000.0,
+        seconds(report.first),
+        seconds(report.whole),
+        seconds(report.assembling_time),
+        waits[0],
+        waits[1],
+        dollars_a_frame * 1000.0,
+    )
+}
+
+fn write_report(args: &Args, rows: &[Row]) -> anyhow::Result<()> {
+    let mut page = HEADER.to_owned();
+    page.push_str(TABLE);
+    for row in rows {
+        writeln!(page, "{}", line(row))?;
+    }
+    if let Some(most) = args.most {
+        writeln!(page, "\nSizes with more than {most} frames in all were not run.")?;
+    }
+    let mut figures = csv::Writer::from_writer(Vec::new());
+    figures.write_record([
+        "frames",
+        "animations",
+        "places",
+        "requests_a_frame",
+        "get",
+        "put",
+        "list",
+        "throttled",
+        "bytes_a_frame",
+        "beyond_ms",
+        "tail_ms",
+        "claims",
+        "revisions",
+        "manifest_bytes",
+        "first_s",
+        "whole_s",
+        "assembling_s",
+        "render_wait_s",
+        "assemble_wait_s",
+        "at_once",
+        "dollars_a_frame",
+    ])?;
+    for Row { frames, animations, places, report, dollars_a_frame } in rows {
+        let [get, put, _, list] = report.kinds_a_frame;
+        let seconds = |time: Duration| time.as_secs_f64().to_string();
+        figures.write_record([
+            frames.to_string(),
+            animations.to_string(),
+            places.to_string(),
+            report.requests_a_frame.to_string(),
+            get.to_string(),
+            put.to_string(),
+            list.to_string(),
+            report.throttled.to_string(),
+            report.bytes_a_frame.to_string(),
+            report.beyond_drawing.as_millis().to_string(),
+            report.tail.as_millis().to_string(),
+            report.claims.to_string(),
+            report.revisions.to_string(),
+            report.manifest.to_string(),
+            seconds(report.first),
+            seconds(report.whole),
+            seconds(report.assembling_time),
+            seconds(report.waits[0][0]),
+            seconds(report.waits[1][0]),
+            report.at_once.to_string(),
+            dollars_a_frame.to_string(),
+        ])?;
+    }
+    for (name, bytes) in [("scale.md", page.into_bytes()), ("scale.csv", figures.into_inner()?)] {
+        let path = args.output.join(name);
+        std::fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    let plots: [(&str, &str, Value); 3] = [
+        ("requests", "requests a frame", |row| row.report.requests_a_frame),
+        ("time", "seconds to the GIF", |row| row.report.whole.as_secs_f64()),
+        ("cost", "USD for 1,000 frames", |row| row.dollars_a_frame * 1000.0),
+    ];
+    for (name, y, value) in plots {
+        let alone = rows.iter().filter(|row| row.animations == 1);
+        let series = [Series {
+            name: "one animation".to_owned(),
+            points: alone.map(|row| (row.frames as f64, value(row))).collect(),
+            joined: true,
+        }];
+        let labels = Labels { title: y, x: "frames of the animation", y };
+        log_log(&args.output.join(format!("scale-{name}.svg")), &labels, &series)?;
+    }
+    Ok(())
+}
