@@ -1,6 +1,6 @@
 //! `rayfold-bench metamorphic`: random scenes of all kinds, each against what must show the same.
 //!
-//! A scene is drawn as users get it (`auto`), and so is what a [relation](relations::RELATIONS) makes of it: scaled by a power of two,
+//! A scene is drawn as users get it (`auto`), and so is what a relation makes of it: scaled by a power of two,
 //! turned by right angles, its objects in another order, taken apart, put into groups. Where two pixels differ, the oracle says
 //! of both whether they are right in their scene: what is right to a sixteenth of a pixel in both is explained. The plain
 //! tracer is one relation more. Everything random comes from the seed of the scene.
