@@ -10,7 +10,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
 
-import { drag, isDrawn, open, over, program, scenes, shot, until } from "./stage.mjs";
+import { drag, isDrawn, open, over, program, row, scenes, shot, until } from "./stage.mjs";
 
 test("the viewport's pixels are the tracer's, also after a drag", async (t) => {
   const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
@@ -32,8 +32,7 @@ test("moving one object of each example by an arrow key changes one line of one 
       const from = join(scenes, name);
       const studio = await open(t, { from, name });
       await studio.settled();
-      const first = studio.page.locator(".item.object").first();
-      await first.click();
+      await (await row(studio.page, ".item.object")).click();
       await studio.page.locator(".viewport").focus();
       await studio.page.keyboard.press("ArrowRight");
       const changed = () =>
@@ -87,7 +86,7 @@ test("the script and the picture follow each other, and faults are told where th
   const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
   const { page } = studio;
   const ball = page.getByLabel("Line 34", { exact: true });
-  await page.locator(".item", { hasText: "Sphere" }).first().click();
+  await (await row(page, ".item", { hasText: "Sphere" })).click();
   await ball.waitFor();
   const text = await ball.inputValue();
   assert.match(text, /^Sphere/);

@@ -108,6 +108,18 @@ export async function over(page, x, y) {
   return [box.x + x * box.width, box.y + y * box.height];
 }
 
+/** A row of the outliner, brought in sight: only rows in sight are made. */
+export async function row(page, selector, options) {
+  const found = page.locator(selector, options).first();
+  const list = page.getByRole("listbox");
+  for (let top = 0; (await found.count()) === 0; top += 100) {
+    const end = await list.evaluate((list, top) => ((list.scrollTop = top), list.scrollHeight), top);
+    assert.ok(top < end, `no row is ${selector}`);
+    await page.waitForTimeout(50);
+  }
+  return found;
+}
+
 export async function drag(page, from, to, steps = 8) {
   await page.mouse.move(...from);
   await page.mouse.down();

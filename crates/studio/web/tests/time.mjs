@@ -150,8 +150,9 @@ test("a drag at a frame writes its key, with the switch or where there are keys,
   await studio.settled();
   await isDrawn(page, studio.path, 26);
   await page.keyboard.press("Control+z");
+  await until(async () => Math.abs((await handle())[0] - at[0]) < 0.5);
   await page.keyboard.down("Alt");
-  await drag(page, await handle(), [at[0] - 30, at[1]]);
+  await drag(page, at, [at[0] - 30, at[1]]);
   await page.keyboard.up("Alt");
   text = await studio.saved();
   const [, first, second, third] = line(text, "red").match(/\(1:([-\d.]+) 26:([-\d.]+) 50:([-\d.]+)\)/).map(Number);
