@@ -142,7 +142,10 @@ fn judged(
         } else {
             apart <= 2 || !is_wrong_at(scene, (x, y), pixel.0) && !is_wrong_at(other, (x, y), its.0)
         };
-        found.unexplained += usize::from(!is_explained);
+        if !is_explained {
+            found.unexplained += 1;
+            eprintln!("seed {seed}, {}, pixel ({x}, {y}): {:?} and {:?}", relation.name, pixel.0, its.0);
+        }
     }
     if found.unexplained > 0 {
         found.seeds.push(seed);

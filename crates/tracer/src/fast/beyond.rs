@@ -15,7 +15,7 @@ use super::real::Real;
 /// What few scenes have.
 #[derive(Debug)]
 pub(super) struct Beyond<E> {
-    pub(super) bodies: Bodies<E>,
+    bodies: Option<Bodies<E>>,
     lamps: Vec<Lamp<E>>,
     finishes: Option<Finishes>,
     glass: Option<Glass<E>>,
@@ -25,11 +25,17 @@ impl<E: Real> Beyond<E> {
     /// None for scenes that have nothing of it.
     pub(super) fn new(scene: &Scene, geometry: &Geometry) -> Option<Self> {
         is_needed(geometry).then(|| Self {
-            bodies: Bodies::new(&geometry.bodies),
+            bodies: (!geometry.bodies.is_empty()).then(|| Bodies::new(&geometry.bodies)),
             lamps: geometry.lamps.iter().map(Lamp::new).collect(),
             finishes: Finishes::new(scene, geometry),
             glass: Glass::new(scene),
         })
+    }
+
+    /// Its bodies, if it has any.
+    #[inline(always)]
+    pub(super) fn bodies(&self) -> Option<&Bodies<E>> {
+        self.bodies.as_ref()
     }
 
     /// Its glass, if it has any.

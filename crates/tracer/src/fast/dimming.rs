@@ -53,7 +53,9 @@ impl<S: Simd, E: Real> Arriving<S, E> {
                         break;
                     }
                     let mut found = nearest::<S, E, F, false>(simd, scene, ray, scene.all());
-                    beyond.bodies.meet(simd, ray, &mut found);
+                    if let Some(bodies) = beyond.bodies() {
+                        bodies.meet(simd, ray, &mut found);
+                    }
                     let hit = open & found.distance.simd_lt(far);
                     lit |= open & !hit;
                     open = hit;

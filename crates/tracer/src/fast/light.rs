@@ -14,7 +14,7 @@ use super::lights::buffer::{LightBuffer, Seen};
 use super::lights::lamp::Rays;
 use super::packet::Ray;
 use super::prepare::Prepared;
-use super::real::{Lanes, Real, Vec3, constant};
+use super::real::{Lanes, Mask, Real, Vec3, constant};
 use super::search::{nearest, unoccluded};
 
 /// What can stand in the way of each sun.
@@ -117,9 +117,9 @@ pub(super) fn light_up<S: Simd, E: Real, F: Features<E>, const SHADOWS: bool>(
     );
 }
 
-/// Adds the light of suns and lamps that reaches the hits past objects and bodies.
+/// Adds the light of suns and lamps that reaches the hits past objects and bodies, with `GLASS` also what comes through it.
 #[inline(never)]
-pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
+pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool, const GLASS: bool>(
     simd: S,
     scene: &Prepared<E>,
     beyond: &Beyond<E>,
@@ -132,66 +132,72 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>
         || {
             let zero = constant::<S, E>(simd, 0.0);
             let far = constant::<S, E>(simd, E::FAR);
+            // Asked once, and not for each packet.
+            let (bodies, lamps) = (beyond.bodies(), beyond.lamps());
+            let (glossy, glass) = (beyond.glossy(), beyond.glass().filter(|_| GLASS));
             for &(at, others) in &hits.packets {
                 let normal = Vec3::load(simd, &hits.normal, at);
                 let start = Vec3::load(simd, &hits.start, at);
                 let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
                 let seen = Ray { origin: start, direction: Vec3::load(simd, &queue.direction, at) };
-                let mut gloss = beyond.glossy().map(Finishes::gloss);
-                // Most of glass scatters nothing, and needs no shadow rays.
-                let mut shows = zero.simd_eq(zero);
-                if beyond.glass().is_some() {
-                    let diffuse = Vec3::<S, E>::load(simd, &hits.diffuse, at);
-                    shows = diffuse.x.simd_ne(zero) | diffuse.y.simd_ne(zero) | diffuse.z.simd_ne(zero);
-                    if let Some(finishes) = beyond.glossy() {
-                        shows |= finishes.shines(simd, orders);
-                    }
-                }
+                let mut gloss = glossy.map(Finishes::gloss);
                 let mut sum = Vec3::zero(simd);
                 for (light, obstacles) in scene.suns.iter().zip(&obstacles.of) {
                     let towards = light.sun.towards(simd);
                     let cosine = normal.dot(towards);
-                    let facing = cosine.simd_gt(zero) & shows;
+                    let mut facing = cosine.simd_gt(zero);
+                    if glass.is_some() {
+                        facing &= shows(simd, hits, at, glossy);
+                    }
                     let mut lit = facing;
                     if lit.any_true() {
                         let candidates = obstacles.candidates(others, F::KINDS);
                         lit = unoccluded::<S, E, F>(simd, scene, light, start, lit, candidates);
                     }
                     let ray = Ray { origin: start, direction: towards };
-                    if lit.any_true() {
-                        lit = beyond.bodies.unoccluded(simd, ray, far, lit);
+                    if let Some(bodies) = bodies
+                        && lit.any_true()
+                    {
+                        lit = bodies.unoccluded(simd, ray, far, lit);
                     }
-                    let mut arriving = Arriving { color: Vec3::splat(simd, light.sun.color), lit };
-                    if let Some(glass) = beyond.glass() {
+                    let mut color = Vec3::splat(simd, light.sun.color);
+                    if let Some(glass) = glass {
                         let glass = (scene, beyond, glass);
                         let shadow = Shadow { ray, far };
-                        arriving = arriving.through_glass::<F>(simd, glass, facing & !lit, shadow);
+                        let arriving = Arriving { color, lit };
+                        let through = arriving.through_glass::<F>(simd, glass, facing & !lit, shadow);
+                        (color, lit) = (through.color, through.lit);
                     }
-                    let Arriving { color, lit } = arriving;
                     sum = color.scale_add(lit.select(cosine, zero), sum);
                     if let Some(gloss) = &mut gloss {
                         gloss.add(Lit { lanes: lit, towards, color }, (seen, normal), orders);
                     }
                 }
-                for lamp in beyond.lamps() {
+                for lamp in lamps {
                     let Rays { ray, far, part } = lamp.rays(simd, start);
                     let cosine = normal.dot(ray.direction);
-                    let facing = cosine.simd_gt(zero) & shows;
+                    let mut facing = cosine.simd_gt(zero);
+                    if glass.is_some() {
+                        facing &= shows(simd, hits, at, glossy);
+                    }
                     let mut lit = facing;
-                    if lit.any_true() {
-                        lit = beyond.bodies.unoccluded(simd, ray, far, lit);
+                    if let Some(bodies) = bodies
+                        && lit.any_true()
+                    {
+                        lit = bodies.unoccluded(simd, ray, far, lit);
                     }
                     if lit.any_true() {
                         let met = nearest::<S, E, F, false>(simd, scene, ray, scene.all());
                         lit &= !met.distance.simd_lt(far);
                     }
-                    let mut arriving = Arriving { color: Vec3::splat(simd, lamp.color), lit };
-                    if let Some(glass) = beyond.glass() {
+                    let mut color = Vec3::splat(simd, lamp.color);
+                    if let Some(glass) = glass {
                         let glass = (scene, beyond, glass);
                         let shadow = Shadow { ray, far };
-                        arriving = arriving.through_glass::<F>(simd, glass, facing & !lit, shadow);
+                        let arriving = Arriving { color, lit };
+                        let through = arriving.through_glass::<F>(simd, glass, facing & !lit, shadow);
+                        (color, lit) = (through.color, through.lit);
                     }
-                    let Arriving { color, lit } = arriving;
                     sum = color.scale_add(lit.select(cosine * part, zero), sum);
                     if let Some(gloss) = &mut gloss {
                         let lit = Lit { lanes: lit, towards: ray.direction, color: color.scale(part) };
@@ -203,6 +209,23 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool>
             }
         },
     );
+}
+
+/// Which hits of a packet show the light that reaches them: most of glass scatters nothing, and needs no shadow rays.
+#[inline(always)]
+pub(super) fn shows<S: Simd, E: Real>(
+    simd: S,
+    hits: &Hits<E>,
+    at: usize,
+    glossy: Option<&Finishes>,
+) -> Mask<S, E> {
+    let zero = constant::<S, E>(simd, 0.0);
+    let diffuse = Vec3::<S, E>::load(simd, &hits.diffuse, at);
+    let scatters = diffuse.x.simd_ne(zero) | diffuse.y.simd_ne(zero) | diffuse.z.simd_ne(zero);
+    match glossy {
+        Some(finishes) => scatters | finishes.shines(simd, &hits.order.0[at..at + Lanes::<S, E>::LEN]),
+        None => scatters,
+    }
 }
 
 /// Adds to the colours of a packet's hits the `sum` of the lights that reach them, and their highlights.

@@ -146,10 +146,41 @@ pub(super) fn look<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
 
 /// What the first `count` rays of a queue meet of bodies, nearer than what they have met; `EYE` says that they start at the
 /// origin of the coordinates.
-#[inline(never)]
+#[inline(always)]
 pub(super) fn look_at_bodies<S: Simd, E: Real, const EYE: bool>(
     simd: S,
     bodies: &Bodies<E>,
+    count: usize,
+    queue: &Queue<E>,
+    hits: &mut Hits<E>,
+) {
+    if bodies.has_planes() {
+        look_at_some::<S, E, EYE>(
+            simd,
+            #[inline(always)]
+            |ray, nearest| bodies.meet_planes(simd, ray, nearest),
+            count,
+            queue,
+            hits,
+        );
+    }
+    if let Some(tree) = bodies.tree() {
+        look_at_some::<S, E, EYE>(
+            simd,
+            #[inline(always)]
+            |ray, nearest| bodies.meet_bounded(simd, tree, ray, nearest),
+            count,
+            queue,
+            hits,
+        );
+    }
+}
+
+/// The same for what `meet` offers.
+#[inline(never)]
+fn look_at_some<S: Simd, E: Real, const EYE: bool>(
+    simd: S,
+    meet: impl Fn(Ray<S, E>, &mut Nearest<S, E>),
     count: usize,
     queue: &Queue<E>,
     hits: &mut Hits<E>,
@@ -176,7 +207,7 @@ pub(super) fn look_at_bodies<S: Simd, E: Real, const EYE: bool>(
                 };
                 let origin = if EYE { Vec3::zero(simd) } else { Vec3::load(simd, &queue.origin, at) };
                 let ray = Ray { origin, direction: Vec3::load(simd, &queue.direction, at) };
-                bodies.meet(simd, ray, &mut nearest);
+                meet(ray, &mut nearest);
                 if nearest.hit(simd).any_true() {
                     nearest.distance.store_slice(&mut hits.distance.0[at..end]);
                     nearest.order.store_slice(&mut hits.order.0[at..end]);

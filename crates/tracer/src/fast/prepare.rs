@@ -123,7 +123,7 @@ impl<E: Real> Prepared<E> {
         let beyond = Beyond::new(scene, geometry);
         needs.beyond = beyond.is_some() || sky.is_some();
         needs.glass = beyond.as_ref().is_some_and(Beyond::has_glass);
-        for (order, at) in beyond.iter().flat_map(|beyond| beyond.bodies.places()) {
+        for (order, at) in beyond.iter().filter_map(Beyond::bodies).flat_map(|bodies| bodies.places()) {
             let entry = &mut entries[order];
             entry.is_body = true;
             entry.index = at as u32;

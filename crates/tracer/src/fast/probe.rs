@@ -7,6 +7,7 @@ use fearless_simd::{Level, Simd};
 use glam::DVec3;
 use rayfold_scene::Scene;
 
+use super::beyond::Beyond;
 use super::dispatch::on;
 use super::features::{Anything, Everything};
 use super::geometry::Geometry;
@@ -127,8 +128,8 @@ impl<E: Real> Batch<'_, E> {
                 } else {
                     nearest::<S, E, Everything<Robust>, false>(simd, self.scene, ray, self.scene.all())
                 };
-                if let Some(beyond) = &self.scene.beyond {
-                    beyond.bodies.meet(simd, ray, &mut found);
+                if let Some(bodies) = self.scene.beyond.as_ref().and_then(Beyond::bodies) {
+                    bodies.meet(simd, ray, &mut found);
                 }
                 let hit = found.hit(simd).to_bitmask();
                 let mut normals = [DVec3::ZERO; 16];

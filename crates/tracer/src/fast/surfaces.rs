@@ -3,6 +3,7 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
+use super::beyond::Beyond;
 use super::bounce::{Column, Columns, Hits, Queue, lanes, weigh};
 use super::features::Features;
 use super::packet::{Nearest, Ray, Surface};
@@ -256,9 +257,9 @@ pub(super) fn surface<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
 ) -> Surface<S, E> {
     if F::BODIES
         && entry.is_body
-        && let Some(beyond) = &scene.beyond
+        && let Some(bodies) = scene.beyond.as_ref().and_then(Beyond::bodies)
     {
-        return beyond.bodies.surface(simd, entry.index as usize, ray, distance);
+        return bodies.surface(simd, entry.index as usize, ray, distance);
     }
     let object = (F::one_of_these(entry.kind), entry.index as usize);
     scene.shapes.surface::<S, F::By, EYE>(simd, object, ray, distance)

@@ -259,14 +259,20 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     in_the_way: &mut InTheWay,
 ) {
     let queue = met.queue;
-    look_at_bodies::<S, E, EYE>(simd, &beyond.bodies, met.count, queue, hits);
+    if let Some(bodies) = beyond.bodies() {
+        look_at_bodies::<S, E, EYE>(simd, bodies, met.count, queue, hits);
+    }
     if hits.packets.is_empty() {
         return;
     }
     surfaces::<S, E, Anything<N::By>, EYE, true, true>(simd, scene, met.background, queue, hits);
     let is_painted = paint::<S, E, EYE>(beyond, queue, hits);
     in_the_way.find(simd, scene, hits);
-    light_up_beyond::<S, E, Anything<N::By>, EYE>(simd, scene, beyond, queue, hits, in_the_way);
+    if beyond.glass().is_some() {
+        light_up_beyond::<S, E, Anything<N::By>, EYE, true>(simd, scene, beyond, queue, hits, in_the_way);
+    } else {
+        light_up_beyond::<S, E, Anything<N::By>, EYE, false>(simd, scene, beyond, queue, hits, in_the_way);
+    }
     go_on::<S, E, N, EYE>(simd, scene, is_painted, met, hits);
 }
 
@@ -281,8 +287,8 @@ fn shade_softly<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     in_the_way: &mut InTheWay,
 ) {
     let queue = met.queue;
-    if let Some(beyond) = beyond {
-        look_at_bodies::<S, E, EYE>(simd, &beyond.bodies, met.count, queue, hits);
+    if let Some(bodies) = beyond.and_then(Beyond::bodies) {
+        look_at_bodies::<S, E, EYE>(simd, bodies, met.count, queue, hits);
     }
     if hits.packets.is_empty() {
         return;

@@ -192,7 +192,15 @@ pub(super) struct Bodies<E> {
     /// Planes first, then in the order of the tree's leaves.
     bodies: Vec<Body<E>>,
     planes: usize,
-    tree: Option<Tree<E>>,
+    way: Way<E>,
+}
+
+/// How bodies are found: one question, so that those in a tree do not ask for planes.
+#[derive(Debug)]
+enum Way<E> {
+    Tree(Tree<E>),
+    Planes,
+    Both(Tree<E>),
 }
 
 impl<E: Real> Bodies<E> {
@@ -203,7 +211,12 @@ impl<E: Real> Bodies<E> {
         let count = planes.len();
         let tree = branches.map(|branches| Tree::new(&branches, &bounded, |place| (count + place) as u32));
         planes.append(&mut bounded);
-        Self { bodies: planes.iter().map(Body::new).collect(), planes: count, tree }
+        let way = match tree {
+            Some(tree) if count == 0 => Way::Tree(tree),
+            Some(tree) => Way::Both(tree),
+            None => Way::Planes,
+        };
+        Self { bodies: planes.iter().map(Body::new).collect(), planes: count, way }
     }
 
     /// Where each stands, by its order in the script.
@@ -214,10 +227,38 @@ impl<E: Real> Bodies<E> {
     /// Offers where the rays meet a body that is not farther than what they met before.
     #[inline(always)]
     pub(super) fn meet<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
-        for plane in &self.bodies[..self.planes] {
-            plane.meet(simd, ray, nearest);
+        match &self.way {
+            Way::Tree(tree) => self.meet_bounded(simd, tree, ray, nearest),
+            Way::Planes => self.meet_planes(simd, ray, nearest),
+            Way::Both(tree) => {
+                self.meet_planes(simd, ray, nearest);
+                self.meet_bounded(simd, tree, ray, nearest);
+            }
         }
-        let Some(tree) = &self.tree else { return };
+    }
+
+    /// Whether any body is a plane.
+    pub(super) fn has_planes(&self) -> bool {
+        BUILT.planes && self.planes > 0
+    }
+
+    /// The tree of those that have bounds.
+    pub(super) fn tree(&self) -> Option<&Tree<E>> {
+        match &self.way {
+            Way::Tree(tree) | Way::Both(tree) => Some(tree),
+            Way::Planes => None,
+        }
+    }
+
+    /// Offers where the rays meet a body of the tree.
+    #[inline(always)]
+    pub(super) fn meet_bounded<S: Simd>(
+        &self,
+        simd: S,
+        tree: &Tree<E>,
+        ray: Ray<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
         // Computed distances are no nearer than this to those of boxes beyond them.
         let slack = constant::<S, E>(simd, super::rounding::distance_error::<E>());
         let crossing = Crossing::new(simd, ray);
@@ -242,6 +283,34 @@ impl<E: Real> Bodies<E> {
             },
         );
         *nearest = found.get();
+    }
+
+    /// Offers where the rays meet the planes, of which no more than one axis is needed.
+    #[inline(always)]
+    pub(super) fn meet_planes<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+        // What others may write to stands in memory: a copy does, and `nearest` need not.
+        let mut with = *nearest;
+        self.meet_planes_out_of_line(simd, ray, &mut with);
+        *nearest = with;
+    }
+
+    // So that scenes without planes are not prepared for them.
+    #[inline(never)]
+    fn meet_planes_out_of_line<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+        if !BUILT.planes {
+            return;
+        }
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                for plane in &self.bodies[..self.planes] {
+                    let up = Vec3::<S, E>::splat(simd, plane.axes[2]);
+                    let high = up.dot(ray.origin.sub(Vec3::splat(simd, plane.center)));
+                    let (hit, distance) = plane::across::<S, E>(simd, high, up.dot(ray.direction));
+                    nearest.offer(simd, hit, distance, plane.order);
+                }
+            },
+        );
     }
 
     /// Which of the rays that `lit` names meet no body nearer than `far`.

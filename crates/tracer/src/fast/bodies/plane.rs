@@ -11,8 +11,18 @@ use crate::fast::real::{Lanes, Mask, Real, Vec3, constant};
 /// a face is met where the face is. A ray along the plane meets nothing: its distance is infinite or not a number.
 #[inline(always)]
 pub(super) fn along<S: Simd, E: Real>(simd: S, ray: Local<S, E>) -> (Mask<S, E>, Lanes<S, E>) {
+    across::<S, E>(simd, ray.origin.z, ray.direction.z)
+}
+
+/// The same for rays of which no more is known than how `high` over the plane they start, and how they `climb`.
+#[inline(always)]
+pub(super) fn across<S: Simd, E: Real>(
+    simd: S,
+    high: Lanes<S, E>,
+    climb: Lanes<S, E>,
+) -> (Mask<S, E>, Lanes<S, E>) {
     let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
-    let distance = (zero - ray.origin.z) * (one / ray.direction.z);
+    let distance = (zero - high) * (one / climb);
     let is_ahead = distance.simd_gt(zero) & distance.simd_lt(constant::<S, E>(simd, E::FAR));
     (is_ahead, distance)
 }

@@ -13,7 +13,7 @@ use crate::fast::dimming::{Arriving, Shadow};
 use crate::fast::features::Features;
 use crate::fast::finish::{Finishes, Lit};
 use crate::fast::geometry::Geometry;
-use crate::fast::light::{InTheWay, add_light, region};
+use crate::fast::light::{InTheWay, add_light, region, shows};
 use crate::fast::lights::lamp::Rays;
 use crate::fast::packet::Ray;
 use crate::fast::prepare::Prepared;
@@ -180,6 +180,9 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
             let from = Region::new(low, high);
             let beyond = scene.beyond.as_ref();
             let lamps = beyond.map_or(&[][..], Beyond::lamps);
+            let bodies = beyond.and_then(Beyond::bodies);
+            let finishes = beyond.and_then(Beyond::glossy);
+            let glass = beyond.and_then(|beyond| Some((scene, beyond, beyond.glass()?)));
             let all = |mask: u64| match &extents.hulls {
                 Some(_) => Candidates::masked(scene.masks(mask)),
                 None => scene.all(),
@@ -204,18 +207,7 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                 let start = Vec3::load(simd, &hits.start, at);
                 let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
                 let seen = Ray { origin: start, direction: Vec3::load(simd, &queue.direction, at) };
-                let finishes = beyond.and_then(Beyond::glossy);
                 let mut gloss = finishes.map(Finishes::gloss);
-                let glass = beyond.and_then(|beyond| Some((scene, beyond, beyond.glass()?)));
-                // Most of glass scatters nothing, and needs no shadow rays.
-                let mut shows = zero.simd_eq(zero);
-                if glass.is_some() {
-                    let diffuse = Vec3::<S, E>::load(simd, &hits.diffuse, at);
-                    shows = diffuse.x.simd_ne(zero) | diffuse.y.simd_ne(zero) | diffuse.z.simd_ne(zero);
-                    if let Some(finishes) = finishes {
-                        shows |= finishes.shines(simd, orders);
-                    }
-                }
                 let mut sum = Vec3::zero(simd);
                 for (index, light) in scene.suns.iter().enumerate() {
                     let own = extents.suns[index].as_ref();
@@ -225,7 +217,10 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                     };
                     let ray = Ray { origin: start, direction: towards };
                     let cosine = normal.dot(towards);
-                    let facing = cosine.simd_gt(zero) & shows;
+                    let mut facing = cosine.simd_gt(zero);
+                    if glass.is_some() {
+                        facing &= shows(simd, hits, at, finishes);
+                    }
                     let mut lit = facing;
                     if lit.any_true() {
                         lit = if own.is_some() {
@@ -237,17 +232,18 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                             unoccluded::<S, E, F>(simd, scene, light, start, lit, candidates)
                         };
                     }
-                    if let Some(beyond) = beyond
+                    if let Some(bodies) = bodies
                         && lit.any_true()
                     {
-                        lit = beyond.bodies.unoccluded(simd, ray, far, lit);
+                        lit = bodies.unoccluded(simd, ray, far, lit);
                     }
-                    let mut arriving = Arriving { color: Vec3::splat(simd, light.sun.color), lit };
+                    let mut color = Vec3::splat(simd, light.sun.color);
                     if let Some(glass) = glass {
-                        arriving =
-                            arriving.through_glass::<F>(simd, glass, facing & !lit, Shadow { ray, far });
+                        let shadow = Shadow { ray, far };
+                        let arriving = Arriving { color, lit };
+                        let through = arriving.through_glass::<F>(simd, glass, facing & !lit, shadow);
+                        (color, lit) = (through.color, through.lit);
                     }
-                    let Arriving { color, lit } = arriving;
                     sum = color.scale_add(lit.select(cosine, zero), sum);
                     if let Some(gloss) = &mut gloss {
                         gloss.add(Lit { lanes: lit, towards, color }, (seen, normal), orders);
@@ -262,22 +258,26 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                         }
                     };
                     let cosine = normal.dot(ray.direction);
-                    let facing = cosine.simd_gt(zero) & shows;
+                    let mut facing = cosine.simd_gt(zero);
+                    if glass.is_some() {
+                        facing &= shows(simd, hits, at, finishes);
+                    }
                     let mut lit = facing;
-                    if let Some(beyond) = beyond
+                    if let Some(bodies) = bodies
                         && lit.any_true()
                     {
-                        lit = beyond.bodies.unoccluded(simd, ray, far, lit);
+                        lit = bodies.unoccluded(simd, ray, far, lit);
                     }
                     let mut candidates = all(lamp_masks[index]);
                     candidates.masks = candidates.masks.and_spheres(others);
                     lit = unmet::<S, E, F>(simd, scene, ray, far, lit, candidates);
-                    let mut arriving = Arriving { color: Vec3::splat(simd, lamp.color), lit };
+                    let mut color = Vec3::splat(simd, lamp.color);
                     if let Some(glass) = glass {
-                        arriving =
-                            arriving.through_glass::<F>(simd, glass, facing & !lit, Shadow { ray, far });
+                        let shadow = Shadow { ray, far };
+                        let arriving = Arriving { color, lit };
+                        let through = arriving.through_glass::<F>(simd, glass, facing & !lit, shadow);
+                        (color, lit) = (through.color, through.lit);
                     }
-                    let Arriving { color, lit } = arriving;
                     sum = color.scale_add(lit.select(cosine * part, zero), sum);
                     if let Some(gloss) = &mut gloss {
                         let lit = Lit { lanes: lit, towards: ray.direction, color: color.scale(part) };
