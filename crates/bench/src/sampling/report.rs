@@ -5,8 +5,8 @@ use std::path::Path;
 
 use anyhow::Result;
 
+use super::measure::{Agreement, Drawn};
 use super::scenes::EFFECTS;
-use super::{Agreement, Drawn};
 use crate::plot::{Labels, Series, log_log};
 
 const WAYS: [(&str, &str); 4] = [

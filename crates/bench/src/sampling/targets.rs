@@ -7,8 +7,8 @@ use glam::DVec3;
 use rayfold_scene::{Samples, Scene};
 use rayfold_tracer::RenderOptions;
 
+use super::measure::{Args, measure, root_mean_square, shortest, truth};
 use super::scenes::Picture;
-use super::{Args, measure, root_mean_square, shortest, truth};
 use crate::backends::levels;
 use crate::plot::{Labels, Series, log_log};
 use crate::scenes::table;
