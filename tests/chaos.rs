@@ -10,7 +10,7 @@
 //! RAYFOLD_CHAOS_MINUTES=10 cargo test -p rayfold-lambda --test chaos -- --nocapture
 //! ```
 //!
-//! and with `RAYFOLD_CHAOS_REPORT=docs/reports/chaos.md` it writes what it saw there.
+//! and with `RAYFOLD_CHAOS_REPORT=$PWD/docs/reports/chaos.md` it writes what it saw there.
 //!
 //! A full disk is a limit on the size of files (`ulimit -f`), set where the largest one has nearly arrived: no file system of
 //! its own is needed, nor rights to mount one. Clocks step by `libfaketime` where that is installed (Debian's package); where

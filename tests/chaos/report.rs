@@ -35,7 +35,7 @@ const HEADER: &str = "# Chaos on the real parts
 
 Written by
 
-    RAYFOLD_CHAOS_MINUTES=10 RAYFOLD_CHAOS_REPORT=docs/reports/chaos.md cargo test -p rayfold-lambda --test chaos -- --nocapture
+    RAYFOLD_CHAOS_MINUTES=11 RAYFOLD_CHAOS_REPORT=$PWD/docs/reports/chaos.md cargo test -p rayfold-lambda --test chaos -- --nocapture
 
 A round has a seed and a bucket of its own. For 20 s the store on board, the invoker and the function processes are killed
 (`kill -9`), each by itself; proxies before the store and before the invoker slow connections, cut them in the middle of a
