@@ -124,7 +124,7 @@ const HEADER: &str = "# Animations of any size
 
 Written by `cargo run --release -p rayfold-bench -- scale`, in simulated time: the figures do not depend on the machine. The
 real steps work in a bucket that bears 3,500 writes and 5,500 reads a second, all its keys together, and answers the rest with
-503; GET takes 10-25 ms, PUT 25-60 ms, LIST 20-40 ms for each 1,000 names, bodies come and go at 80 MB/s (assumed). Lambda has
+503, which S3's client meets by sending three times; GET takes 10-25 ms, PUT 25-60 ms, LIST 20-40 ms for each 1,000 names, bodies come and go at 80 MB/s (assumed). Lambda has
 1,000 places for both functions, the account's default. Scripts come at 1,000 a second, with `frames` set; a frame is drawn in
 800 to 1,200 ms and encoded in 6 ms (512 x 512). Not modelled: processor time and memory of the folds, events that come late.
 
@@ -187,8 +187,8 @@ fn conclusions(rows: &[Row]) -> String {
         "
 ## What is near its limit
 
-- **The assembler's 15 minutes.** {frames} frames were assembled in {:.0} s of {}. At 6 ms a frame (512 x 512) {} fit, at 30 ms
-  (1080p) {}; a larger set is refused by name, and what a cut in time would carry is
+- **The assembler's 15 minutes.** {frames} frames were assembled in {:.0} s of {}. Encoding alone, at 6 ms a frame (512 x 512), fills them with {},
+  at 30 ms (1080p) with {}; a larger set is refused by name, and what a cut in time would carry is
   [written down](../decisions/gif-in-one-piece.md).
 - **Requests.** {frames} frames take {:.2} a frame, of {GOAL}; the most are {:.2}, of {}. Whose listing is many requests lets
   others list, by lot, until nobody has written for a while ([pipeline](../pipeline.md#folding)): {:.2} listings a frame in all,
