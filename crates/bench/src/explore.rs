@@ -164,6 +164,11 @@ fn write_report(
     }
     let seeds = args.seeds;
     writeln!(page, "\nSeeds are of {seeds}. With no rule broken {found} of {seeds} found anything.")?;
+    let Args { most, most_of_a_rule, .. } = args;
+    writeln!(
+        page,
+        "The limits: worlds to {most} states, each broken rule to {most_of_a_rule} states a world."
+    )?;
     let files = [("search.md", page.into_bytes()), ("search.csv", figures.into_inner()?)];
     for (name, bytes) in files {
         let path = args.output.join(name);

@@ -20,17 +20,25 @@ const ASSEMBLE_GB: f64 = 3_008.0 / 1_024.0;
 /// What the assembler takes for a frame of 512 x 512 (`docs/decisions/gif-in-one-piece.md`).
 const PUSH: Duration = Duration::from_millis(6);
 
-/// Frames, animations and places.
-const SIZES: [(u64, u64, usize); 8] = [
-    (10, 1, 1_000),
-    (100, 1, 1_000),
-    (1_000, 1, 1_000),
-    (10_000, 1, 1_000),
-    (30_000, 1, 1_000),
-    (100_000, 1, 1_000),
-    (10, 1_000, 1_000),
-    (100, 100, 1_000),
-];
+/// The same for 1920 x 1080.
+const PUSH_LARGE: Duration = Duration::from_millis(30);
+
+/// How long an assembler may run.
+const ASSEMBLER_TIME: Duration = Duration::from_secs(900);
+
+/// Scripts that an upload brings in a second: some 40 connections at 40 ms a put. As many frames end in a second on 1,000
+/// places.
+const UPLOADED: u64 = 1_000;
+
+/// What a frame may cost in requests, on the average.
+const GOAL: f64 = 12.0;
+
+/// Places for both functions, as an account has them by default.
+const PLACES: usize = 1_000;
+
+/// Frames and animations.
+const SIZES: [(u64, u64); 8] =
+    [(10, 1), (100, 1), (1_000, 1), (10_000, 1), (30_000, 1), (100_000, 1), (10, 1_000), (100, 1_000)];
 
 /// Options of `rayfold-bench scale`.
 #[derive(Debug, clap::Args)]
@@ -68,7 +76,6 @@ struct S3Prices {
 struct Row {
     frames: u64,
     animations: u64,
-    places: usize,
     report: ScaleReport,
     dollars_a_frame: f64,
 }
@@ -87,14 +94,15 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         .with_context(|| format!("cannot read {}", args.prices.display()))?;
     let prices: Prices = serde_json::from_str(&text)?;
     let mut rows = Vec::new();
-    for (frames, animations, places) in SIZES {
+    for (frames, animations) in SIZES {
         if args.most.is_some_and(|most| frames * animations > most) {
             continue;
         }
         let start = Instant::now();
-        let report = measure(Scale::on_aws(frames, animations, places, PUSH)).map_err(anyhow::Error::msg)?;
+        let scale = Scale::on_aws(frames, animations, UPLOADED, PLACES, PUSH);
+        let report = measure(scale).map_err(anyhow::Error::msg)?;
         let dollars_a_frame = dollars(&report, frames * animations, &prices);
-        let row = Row { frames, animations, places, report, dollars_a_frame };
+        let row = Row { frames, animations, report, dollars_a_frame };
         println!("{} {:.0} s", line(&row), start.elapsed().as_secs_f64());
         rows.push(row);
     }
@@ -116,9 +124,9 @@ const HEADER: &str = "# Animations of any size
 
 Written by `cargo run --release -p rayfold-bench -- scale`, in simulated time: the figures do not depend on the machine. The
 real steps work in a bucket that bears 3,500 writes and 5,500 reads a second, all its keys together, and answers the rest with
-503; GET takes 10-25 ms, PUT 25-60 ms, LIST 20-40 ms for each 1,000 names, bodies come and go at 80 MB/s (assumed). Lambda has
-1,000 places for both functions, the account's default. Scripts come at 250 a second, with `frames` set; a frame is drawn in
-800 to 1,200 ms and encoded in 6 ms (512 x 512). Processor time of the folds is not modelled.
+503, which S3's client meets by sending three times; GET takes 10-25 ms, PUT 25-60 ms, LIST 20-40 ms for each 1,000 names, bodies come and go at 80 MB/s (assumed). Lambda has
+1,000 places for both functions, the account's default. Scripts come at 1,000 a second, with `frames` set; a frame is drawn in
+800 to 1,200 ms and encoded in 6 ms (512 x 512). Not modelled: processor time and memory of the folds, events that come late.
 
 *Requests* are those of the render function, 503s included. *Beyond* is the mean time of its invocations that was not drawing:
 Lambda bills it. *Tail*: from the last frame's put to the last claim's. *Waited*: for a free place, on the average and at most.
@@ -151,6 +159,64 @@ fn line(row: &Row) -> String {
     )
 }
 
+const PLOTS: &str = "
+![Requests a frame](scale-requests.svg)
+![Seconds to the GIF](scale-time.svg)
+![USD for 1,000 frames](scale-cost.svg)
+";
+
+/// What the figures say of the limits.
+fn conclusions(rows: &[Row]) -> String {
+    let of_one: Vec<&Row> = rows.iter().filter(|row| row.animations == 1).collect();
+    let (Some(largest), Some(dearest)) = (
+        of_one.iter().max_by_key(|row| row.frames),
+        rows.iter().max_by(|a, b| a.report.requests_a_frame.total_cmp(&b.report.requests_a_frame)),
+    ) else {
+        return String::new();
+    };
+    let fit = |push: Duration| ASSEMBLER_TIME.as_millis() / push.as_millis();
+    let Row { frames, report, .. } = largest;
+    let most_refused = rows.iter().max_by(|a, b| a.report.throttled.total_cmp(&b.report.throttled));
+    let most_refused = most_refused.unwrap_or(dearest);
+    let longest = rows.iter().max_by_key(|row| row.report.waits[1][1]).unwrap_or(dearest);
+    let many = |row: &Row| match row.animations {
+        1 => format!("one animation of {} frames", row.frames),
+        count => format!("{count} animations of {} frames", row.frames),
+    };
+    format!(
+        "
+## What is near its limit
+
+- **The assembler's 15 minutes.** {frames} frames were assembled in {:.0} s of {}. Encoding alone, at 6 ms a frame (512 x 512), fills them with {},
+  at 30 ms (1080p) with {}; a larger set is refused by name, and what a cut in time would carry is
+  [written down](../decisions/gif-in-one-piece.md).
+- **Requests.** {frames} frames take {:.2} a frame, of {GOAL}; the most are {:.2}, of {}. Whose listing is many requests lets
+  others list, by lot, until nobody has written for a while ([pipeline](../pipeline.md#folding)): {:.2} listings a frame in all,
+  of which one is the look for a result before drawing.
+- **The manifest** has {:.0} bytes a frame at {frames} frames, {:.1} MB in all, and was written {} times: as often as listing and
+  putting it take, while frames come.
+- **The bucket's limits.** The most 503s are {:.2} a frame, of {}; each is sent again after a pause.
+- **Who waits for whom.** An assembler waited for a free place for at most {:.1} s, of {}: invocations of both functions queue
+  for the same places, in the order of their events.
+",
+        report.assembling_time.as_secs_f64(),
+        ASSEMBLER_TIME.as_secs(),
+        fit(PUSH),
+        fit(PUSH_LARGE),
+        report.requests_a_frame,
+        dearest.report.requests_a_frame,
+        many(dearest),
+        report.kinds_a_frame[3],
+        report.manifest as f64 / *frames as f64,
+        report.manifest as f64 / 1e6,
+        report.revisions,
+        most_refused.report.throttled,
+        many(most_refused),
+        longest.report.waits[1][1].as_secs_f64(),
+        many(longest),
+    )
+}
+
 fn write_report(args: &Args, rows: &[Row]) -> anyhow::Result<()> {
     let mut page = HEADER.to_owned();
     page.push_str(TABLE);
@@ -160,11 +226,12 @@ fn write_report(args: &Args, rows: &[Row]) -> anyhow::Result<()> {
     if let Some(most) = args.most {
         writeln!(page, "\nSizes with more than {most} frames in all were not run.")?;
     }
+    page.push_str(PLOTS);
+    page.push_str(&conclusions(rows));
     let mut figures = csv::Writer::from_writer(Vec::new());
     figures.write_record([
         "frames",
         "animations",
-        "places",
         "requests_a_frame",
         "get",
         "put",
@@ -184,13 +251,12 @@ fn write_report(args: &Args, rows: &[Row]) -> anyhow::Result<()> {
         "at_once",
         "dollars_a_frame",
     ])?;
-    for Row { frames, animations, places, report, dollars_a_frame } in rows {
+    for Row { frames, animations, report, dollars_a_frame } in rows {
         let [get, put, _, list] = report.kinds_a_frame;
         let seconds = |time: Duration| time.as_secs_f64().to_string();
         figures.write_record([
             frames.to_string(),
             animations.to_string(),
-            places.to_string(),
             report.requests_a_frame.to_string(),
             get.to_string(),
             put.to_string(),

@@ -3,7 +3,8 @@
 //!
 //! 1. Read the manifest, of a large one the beginning; leave if it covers the fact and is someone else's.
 //! 2. Pause, the longer the more frames are to come, and look again, until a pause has passed in which no one wrote: with
-//!    many finishers one listing serves all.
+//!    many finishers one listing serves all. A large animation's listing is many requests, so of those who have seen no one
+//!    write few list, by lot; the others pause anew, and are the likelier to list the longer that goes on ([`chance`]).
 //! 3. List, reconcile, and where the manifest differs put it on the condition that it is still the one that was read.
 //! 4. **List again**, and commit again until a listing agrees with what was committed: the first listing may be older
 //!    than a quick change and change back.
@@ -18,8 +19,8 @@
 
 use crate::invocation::{Glimpse, Invocation, Known, Mutation};
 use crate::keys::{Animation, Key};
-use crate::manifest::{Fact, Manifest};
-use crate::store::{PutOptions, Store};
+use crate::manifest::{Fact, Head, Manifest};
+use crate::store::{PAGE, PutOptions, Store};
 use crate::{Clock, Error, Result, invariants};
 
 /// How a fold ended.
@@ -33,6 +34,23 @@ pub enum Folded {
     Committed,
     /// This invocation's revision is the manifest, and its claim is put.
     Claimed,
+}
+
+/// How often an invocation commits, one listing after the other, before it lets others do so.
+const MOST_COMMITS: u32 = 16;
+
+/// How much likelier whoever has seen no one write lists after each further pause.
+const LIKELIER: u64 = 4;
+
+/// Of how many frames on one in one more lists: a quarter of a listing's page.
+const FRAMES_A_LOT: u64 = PAGE as u64 / 4;
+
+/// One in how many lists, of those who have seen no one write in `quiet` pauses before this one: of a small animation
+/// everyone; of a large one at first one in four times as many as its listing has pages, or as frames are to come.
+fn chance(head: Option<&Head>, quiet: u32) -> u64 {
+    let Some(head) = head else { return 1 };
+    let lots = head.total / FRAMES_A_LOT;
+    lots.min(head.missing()).checked_div(LIKELIER.saturating_pow(quiet)).unwrap_or(0).max(1)
 }
 
 /// How long a fact has held.
@@ -65,6 +83,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         if is_worth_it && self.may_leave(&glimpse) && self.shows(animation, &glimpse, fact).await? {
             return Ok(Folded::Covered);
         }
+        let mut quiet = 0;
         loop {
             let before = glimpse.revision();
             self.pause(glimpse.head()).await;
@@ -74,6 +93,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                     return Ok(Folded::Covered);
                 }
                 // Whoever wrote this lists once more, and will see what it has missed.
+                quiet = 0;
+                continue;
+            }
+            let chance = chance(glimpse.head(), quiet);
+            if chance > 1 && !self.random.one_in(chance) {
+                quiet += 1;
                 continue;
             }
             let mut known = match glimpse {
@@ -108,13 +133,14 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.shows(animation, glimpse, fact).await
     }
 
-    /// Lists and commits until a listing agrees; `None` when someone else's commit came first.
+    /// Lists and commits until a listing agrees; `None` when someone else's commit came first, or when frames come as fast as
+    /// they are written down and it is others' turn to do that.
     async fn commit_until_agreed(
         &self,
         animation: &Animation,
         known: &mut Option<Known>,
     ) -> Result<Option<Folded>> {
-        loop {
+        for _ in 0..=MOST_COMMITS {
             let observed = self.observe(animation, known.as_ref()).await?.manifest;
             if let Some(known) = known.as_ref().filter(|known| known.manifest.agrees_with(&observed)) {
                 return self.end(known).await.map(Some);
@@ -130,6 +156,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 None => return Ok(None),
             }
         }
+        Ok(None)
     }
 
     /// Claims for what this invocation has committed, if nothing is left to come.
@@ -197,4 +224,29 @@ pub async fn fold<S: Store, C: Clock>(
     animation: &Animation,
 ) -> Result<Folded, Error> {
     invocation.fold(animation, &Fact::Fold, Age::Old).await
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::manifest::Settings;
+    use crate::reconcile::{Results, Scripts, reconcile};
+
+    fn head(total: u64, pending: u64) -> Head {
+        let animation = Animation::new("film").unwrap();
+        let manifest = reconcile(&animation, &Scripts::default(), &Results::default(), &Settings::absent());
+        Head { total, pending, ..manifest.head }
+    }
+
+    #[test]
+    fn everyone_lists_what_is_small_and_few_what_is_large_until_nobody_writes() {
+        let lots = |head: &Head| (0..7).map(|quiet| chance(Some(head), quiet)).collect::<Vec<_>>();
+        assert_eq!(chance(None, 0), 1, "whoever finds no manifest lists");
+        assert_eq!(lots(&head(499, 400)), [1; 7]);
+        assert_eq!(lots(&head(100_000, 50_000)), [400, 100, 25, 6, 1, 1, 1]);
+        // Those who could list, too, are no more than the frames to come: the last one never waits for others.
+        assert_eq!(lots(&head(100_000, 20)), [20, 5, 1, 1, 1, 1, 1]);
+        assert_eq!(lots(&head(100_000, 1)), [1; 7]);
+        assert_eq!(lots(&head(100_000, 0)), [1; 7]);
+    }
 }

@@ -4,6 +4,8 @@
 //! lease taken, and left, was woken for a manifest that was written before. A holder that dies leaves it to the platform's
 //! next attempt at its event, which has the same request id, or for anyone to take over once its time is up.
 
+use std::time::Duration;
+
 use serde::{Deserialize, Serialize};
 
 use crate::invocation::Invocation;
@@ -14,6 +16,10 @@ use crate::{Clock, Error, Result, Timestamp};
 /// How often a lease that comes and goes is asked for.
 const ATTEMPTS: u32 = 3;
 
+/// The longest time that a lease can still have: Lambda's 15 minutes, and clocks that disagree by a few. One that says more
+/// was written by a clock that was wrong, and would hold others off for as long as that was ahead.
+const LONGEST: Duration = Duration::from_secs(20 * 60);
+
 /// What the object says.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Lease {
@@ -21,6 +27,13 @@ struct Lease {
     assembler: String,
     /// When the platform will have ended the holder.
     until: Timestamp,
+}
+
+impl Lease {
+    /// Whether its time is not up.
+    fn stands(&self, now: Timestamp) -> bool {
+        self.until > now && self.until <= now.after(LONGEST)
+    }
 }
 
 /// Whose lease it is; one that cannot be read is nobody's.
@@ -47,7 +60,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             let Some(there) = self.get(&key).await? else { continue };
             let holder = holder(&there.body);
             let is_own = holder.as_ref().is_some_and(|holder| holder.assembler == self.request_id());
-            if holder.is_some_and(|holder| !is_own && holder.until > self.clock.now()) {
+            if holder.is_some_and(|holder| !is_own && holder.stands(self.clock.now())) {
                 return Ok(false);
             }
             // An own one need not be renewed.
@@ -86,12 +99,10 @@ mod tests {
     use crate::store::MemoryStore;
     use crate::{Policy, Randomness, SystemClock};
 
-    /// The time of the test's invocations, and when the platform ends them.
-    const DEADLINE: Timestamp = Timestamp(u64::MAX);
-
     async fn takes(store: &MemoryStore<SystemClock>, request_id: &str) -> bool {
         let (random, policy) = (Randomness::seeded(1), Policy::new(1));
-        let invocation = Invocation::new(store, &SystemClock, &random, &policy, request_id).until(DEADLINE);
+        let deadline = SystemClock.now().after(Duration::from_secs(900));
+        let invocation = Invocation::new(store, &SystemClock, &random, &policy, request_id).until(deadline);
         invocation.take_lease(&Animation::new("film").unwrap()).await.unwrap()
     }
 
@@ -109,5 +120,14 @@ mod tests {
         assert!(takes(&store, "b").await && !takes(&store, "a").await);
         says(&store, "garbage").await;
         assert!(takes(&store, "a").await && !takes(&store, "b").await);
+    }
+
+    /// The holder's clock was an hour ahead, the holder died, and nobody would have built for an hour.
+    #[tokio::test]
+    async fn a_lease_of_a_clock_that_ran_ahead_holds_nobody_off() {
+        let store = MemoryStore::new(SystemClock);
+        let until = SystemClock.now().after(Duration::from_secs(3_600));
+        says(&store, &format!(r#"{{"assembler":"a","until":{}}}"#, until.0)).await;
+        assert!(takes(&store, "b").await && !takes(&store, "a").await);
     }
 }

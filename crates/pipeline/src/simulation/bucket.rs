@@ -330,8 +330,28 @@ impl Effect {
     }
 }
 
+/// How often S3's client sends a request that the bucket cannot bear, and its first pause, which doubles.
+const SENDINGS: u32 = 3;
+const RESENT_AFTER: Duration = Duration::from_secs(1);
+
 impl WorldStore {
+    /// Where the bucket has limits, the client repeats what it cannot bear, as that of `S3Store` does.
     async fn request(&self, effect: Effect) -> Result<Answer> {
+        let sendings = if lock(&self.grounds.limits).is_some() { SENDINGS } else { 1 };
+        let mut pause = RESENT_AFTER;
+        for _ in 1..sendings {
+            match self.send(effect.clone()).await {
+                Err(Error::Throttled { .. }) => {
+                    self.grounds.engine.sleep(self.grounds.random.up_to(pause)).await;
+                    pause *= 2;
+                }
+                answer => return answer,
+            }
+        }
+        self.send(effect).await
+    }
+
+    async fn send(&self, effect: Effect) -> Result<Answer> {
         let grounds = &self.grounds;
         grounds.requests[self.actor as usize].fetch_add(1, Ordering::Relaxed);
         self.fate.requests.fetch_add(1, Ordering::Relaxed);
@@ -571,12 +591,17 @@ impl Store for WorldStore {
 
     async fn upload(&self, key: &str, options: PutOptions) -> Result<WorldUpload> {
         self.request(Effect::Nothing(key.to_owned())).await?;
-        Ok(WorldUpload { store: self.clone(), key: key.to_owned(), options, body: BytesMut::new(), sent: 0 })
+        let (body, sent) = (BytesMut::new(), 0);
+        let part = if lock(&self.grounds.limits).is_some() { PART_OF_S3 } else { PART };
+        Ok(WorldUpload { store: self.clone(), key: key.to_owned(), options, body, sent, part })
     }
 }
 
 /// Bytes of a part; the simulated files are small.
 const PART: usize = 256;
+
+/// Bytes of a part where the bucket has S3's limits.
+const PART_OF_S3: usize = 8 * 1024 * 1024;
 
 /// An object being written to the simulated bucket.
 pub(super) struct WorldUpload {
@@ -585,14 +610,15 @@ pub(super) struct WorldUpload {
     options: PutOptions,
     body: BytesMut,
     sent: usize,
+    part: usize,
 }
 
 impl Upload for WorldUpload {
     async fn write(&mut self, bytes: Bytes) -> Result<()> {
         self.body.extend_from_slice(&bytes);
-        while self.body.len() - self.sent >= PART {
+        while self.body.len() - self.sent >= self.part {
             self.store.request(Effect::Nothing(self.key.clone())).await?;
-            self.sent += PART;
+            self.sent += self.part;
         }
         Ok(())
     }

@@ -52,16 +52,13 @@ impl Scale {
         Scale { frames, animations, concurrency, limits, push, draw_ms, upload_ms, seed }
     }
 
-    /// On AWS, as far as it is modelled: what is uploaded comes at 250 scripts a second.
-    pub fn on_aws(frames: u64, animations: u64, concurrency: usize, push: Duration) -> Self {
-        let upload_ms = frames * animations * 1_000 / UPLOADED_A_SECOND;
+    /// On AWS, as far as it is modelled: what is uploaded comes at so many scripts a second.
+    pub fn on_aws(frames: u64, animations: u64, uploaded: u64, concurrency: usize, push: Duration) -> Self {
+        let upload_ms = frames * animations * 1_000 / uploaded.max(1);
         let (limits, draw_ms) = (Some(Limits::S3), (800, 1_200));
         Scale { frames, animations, concurrency, limits, push, draw_ms, upload_ms, seed: 1 }
     }
 }
-
-/// Scripts that an upload brings in a second: some 10 connections at 40 ms a put.
-const UPLOADED_A_SECOND: u64 = 250;
 
 /// What Lambda adds to its places every 10 seconds.
 const RAMP: usize = 1_000;

@@ -147,7 +147,11 @@ fn schedule(
         let alone = choices.first().filter(|_| is_alone).map(|choice| state.actor(*choice));
         let Some(actor) = alone.or_else(|| order.next(&state, &choices, random)) else { break };
         let mine = choices.into_iter().filter(|choice| state.actor(*choice) == actor);
-        let (plain, awkward): (Vec<Choice>, Vec<Choice>) = mine.partition(|choice| is_plain(*choice));
+        let (plain, mut awkward): (Vec<Choice>, Vec<Choice>) = mine.partition(|choice| is_plain(*choice));
+        // Whoever wants a write to land last wants it to be on its way.
+        if lands_last && awkward.iter().any(|choice| is_late(*choice)) {
+            awkward.retain(|choice| is_late(*choice));
+        }
         let is_write = plain.iter().any(|choice| state.is_write(*choice));
         let is_awkward = !awkward.is_empty() && (plain.is_empty() || aim.is_met(is_write, writes, random));
         writes += u64::from(is_write);
@@ -158,6 +162,11 @@ fn schedule(
         state = state.after(world, memo, choice).map_err(|what| failed(what, &steps))?;
     }
     state.judge(world, memo).map_err(|what| failed(what, &steps))
+}
+
+/// Whether a write is on its way after it.
+fn is_late(choice: Choice) -> bool {
+    matches!(choice, Choice::Request { fate: Fate::KilledAndLate, .. })
 }
 
 /// Whether nothing goes wrong in it.

@@ -1,0 +1,177 @@
+//! The user: changes animations without end, knows what arrived, and says what is wrong with what came of it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use fastrand::Rng;
+use rayfold_pipeline::assemble::generation_of;
+use rayfold_pipeline::keys::Animation;
+use rayfold_pipeline::manifest::{Fault, FrameState, Manifest, Reason, Status};
+use rayfold_pipeline::store::{PutOptions, S3Store, Store};
+use rayfold_scene::parse_settings;
+
+use crate::stage::{locally, scene};
+
+/// How often the user asks again.
+const ASKS: usize = 5;
+
+/// How long an answer is waited for.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+pub(crate) const ANIMATIONS: [&str; 3] = ["one", "two", "deep/three"];
+const SCRIPTS: [&str; 4] = ["1.txt", "2.txt", "10.txt", "3.txt"];
+const SETTINGS: &str = "animation.json";
+
+/// What cannot be drawn, so that it must be named.
+const FAULTY: &str = "Screen 24 18\nSpere 6\nTrace\n";
+
+/// What cannot be understood.
+const FAULTY_SETTINGS: &str = "{\"fps\": ";
+
+/// Three frames.
+const SEVERAL: &str = "Screen 24 18\nBackground .1 .2 .3\nSphere 6 (1:2 3:8) 9 -9 .2 .2 .2 .7 .6 .5\n\
+                       Ilight 1 1 1 .2 -.3 -1\nFrames 3\nTrace\n";
+
+/// How functions say that they gave up a frame, or a set, for what the world did to them.
+const GIVEN_UP: [&str; 3] = ["in each of", "is no frame, though drawn", "frames were assembled in the"];
+
+/// What the user wants to be there, and which of it may not have arrived.
+#[derive(Default)]
+pub(crate) struct Wishes {
+    files: BTreeMap<String, String>,
+    unsure: BTreeSet<String>,
+    pub(crate) acts: u64,
+}
+
+/// How a request of the user's ended.
+#[derive(PartialEq, Eq)]
+enum Sent {
+    Done,
+    Refused,
+    /// It may still be on its way, behind what the user does next.
+    Unknown,
+}
+
+impl Wishes {
+    /// Changes something. What is answered is there; of what is not answered nobody knows.
+    pub(crate) async fn act(&mut self, random: &mut Rng, store: &S3Store) {
+        let animation = random.choice(ANIMATIONS).unwrap();
+        let is_settings = random.u32(0..10) == 0;
+        let file = if is_settings { SETTINGS } else { random.choice(SCRIPTS).unwrap() };
+        let key = format!("scripts/{animation}/{file}");
+        let text = match random.u32(0..12) {
+            0..=2 => None,
+            3 => Some(if is_settings { FAULTY_SETTINGS.to_owned() } else { FAULTY.to_owned() }),
+            4 if !is_settings => Some(SEVERAL.to_owned()),
+            _ if is_settings => Some(format!("{{\"frames\": {}, \"fps\": 5}}", random.u32(1..4))),
+            // Few contents, so that changes are often back to what was.
+            _ => Some(scene(f64::from(random.u32(1..4)) * 4.0)),
+        };
+        match text {
+            Some(text) => drop(self.files.insert(key.clone(), text)),
+            None => drop(self.files.remove(&key)),
+        }
+        self.acts += 1;
+        for _ in 0..ASKS {
+            match self.send(&key, store).await {
+                Sent::Done => return,
+                Sent::Refused => {}
+                Sent::Unknown => drop(self.unsure.insert(key.clone())),
+            }
+        }
+        self.unsure.insert(key);
+    }
+
+    async fn send(&self, key: &str, store: &S3Store) -> Sent {
+        let request = async {
+            match self.files.get(key) {
+                Some(text) => store.put(key, text.clone().into(), PutOptions::always()).await.is_ok(),
+                None => store.delete(key).await.is_ok(),
+            }
+        };
+        match tokio::time::timeout(PATIENCE, request).await {
+            Ok(true) => Sent::Done,
+            Ok(false) => Sent::Refused,
+            Err(_) => Sent::Unknown,
+        }
+    }
+
+    /// Says once more what may not have arrived; gives how much that was.
+    pub(crate) async fn make_sure(&mut self, store: &S3Store) -> usize {
+        for key in &self.unsure {
+            assert!(self.send(key, store).await == Sent::Done, "{key} cannot be sent in a calm world");
+        }
+        std::mem::take(&mut self.unsure).len()
+    }
+
+    /// The files of an animation.
+    pub(crate) fn of(&self, animation: &str) -> Vec<(&str, String)> {
+        let prefix = format!("scripts/{animation}/");
+        let mine =
+            self.files.iter().filter_map(|(key, text)| Some((key.strip_prefix(&prefix)?, text.clone())));
+        mine.collect()
+    }
+}
+
+/// How an animation of these files must end.
+fn expected(files: &[(&str, String)]) -> Status {
+    let scripts: Vec<&str> =
+        files.iter().filter(|(name, _)| *name != SETTINGS).map(|(_, text)| text.as_str()).collect();
+    let settings = files.iter().find(|(name, _)| *name == SETTINGS);
+    let settings = settings.map(|(name, text)| parse_settings(name, text.as_bytes()).settings);
+    let awaited = settings.flatten().and_then(|settings| settings.frames()).unwrap_or(0);
+    let frames: u64 = scripts.iter().map(|text| if *text == SEVERAL { 3 } else { 1 }).sum();
+    let is_faulty = settings == Some(None) || scripts.contains(&FAULTY);
+    match (scripts.is_empty(), frames < awaited, is_faulty) {
+        (true, _, _) => Status::Empty,
+        (false, true, _) => Status::Waiting,
+        (false, false, true) => Status::Failed,
+        (false, false, false) => Status::Done,
+    }
+}
+
+/// What is still wrong with an animation; nothing when it is as the files say.
+pub(crate) async fn wrong(store: &S3Store, name: &str, files: &[(&str, String)]) -> Option<String> {
+    let animation = Animation::new(name).unwrap();
+    let gif = store.get(&animation.gif()).await.ok();
+    let expected = expected(files);
+    let Some(Manifest { head, frames }) = manifest(store, &animation).await else {
+        let is_nothing = expected == Status::Empty && gif.is_none();
+        return (!is_nothing).then(|| format!("{name}: no manifest of {files:?}"));
+    };
+    if head.status != expected {
+        return Some(format!("{name}: {:?}, not {expected:?}: {frames:?}", head.status));
+    }
+    let generation = generation_of(gif.as_ref().map(|gif| &gif.info)).map(str::to_owned);
+    match (expected, gif) {
+        // While more is to come the last GIF stays.
+        (Status::Waiting, _) => None,
+        (Status::Done, Some(gif)) if gif.body == locally(files) => {
+            (generation.as_deref() != Some(head.generation.as_str())).then(|| format!("{name}: an old GIF"))
+        }
+        (Status::Done, gif) => {
+            Some(format!("{name}: {} GIF, not the local one", if gif.is_some() { "a" } else { "no" }))
+        }
+        (_, Some(_)) => Some(format!("{name}: a GIF of what is {expected:?}")),
+        (_, None) => None,
+    }
+}
+
+async fn manifest(store: &S3Store, animation: &Animation) -> Option<Manifest> {
+    let object = store.get(&animation.manifest()).await.ok()?;
+    Manifest::decode(animation, &object.body).ok()
+}
+
+/// What functions have given up of an animation for what the world did to them, by name.
+pub(crate) async fn given_up(store: &S3Store, name: &str, files: &[(&str, String)]) -> Vec<String> {
+    let Some(manifest) = manifest(store, &Animation::new(name).unwrap()).await else { return Vec::new() };
+    let is_good =
+        |script: &str| files.iter().any(|(file, text)| *file == format!("{script}.txt") && text != FAULTY);
+    let faults = manifest.frames.iter().filter_map(|frame| match &frame.state {
+        FrameState::Failed(fault) if is_good(frame.script.as_str()) => Some(fault),
+        FrameState::Failed(_) | FrameState::Pending | FrameState::Done { .. } => None,
+    });
+    let faults = faults.chain(&manifest.head.refusal);
+    let named = |fault: &Fault| fault.reason.as_ref().map(|reason: &Reason| reason.message.clone());
+    faults.filter_map(named).filter(|message| GIVEN_UP.iter().any(|how| message.contains(how))).collect()
+}
