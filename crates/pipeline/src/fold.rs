@@ -140,7 +140,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         animation: &Animation,
         known: &mut Option<Known>,
     ) -> Result<Option<Folded>> {
-        for _ in 0..=MOST_COMMITS {
+        for _ in 0..MOST_COMMITS {
             let observed = self.observe(animation, known.as_ref()).await?.manifest;
             if let Some(known) = known.as_ref().filter(|known| known.manifest.agrees_with(&observed)) {
                 return self.end(known).await.map(Some);
