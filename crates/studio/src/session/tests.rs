@@ -35,6 +35,11 @@ impl Desk {
         String::from_utf8(self.project.files[0].document.bytes()).unwrap()
     }
 
+    /// What the file holds.
+    pub(super) fn on_disk(&self) -> String {
+        fs::read_to_string(&self.path).unwrap()
+    }
+
     pub(super) fn state(&mut self) -> State {
         self.ask(Ask::Hover { x: -1.0, y: -1.0 }).tell.state.unwrap()
     }
@@ -206,7 +211,7 @@ fn touching_one_object_of_each_example_changes_its_line_alone() {
         let project = Project::open(&entry).unwrap();
         let text = String::from_utf8(project.files[0].document.bytes()).unwrap();
         let mut desk = Desk::new(&text);
-        let objects = desk.session.stage(&desk.project).objects;
+        let objects = desk.session.shown(&desk.project).stage.objects.clone();
         for line in objects.into_iter().take(12) {
             desk.ask(Ask::Nudge { lines: vec![line], by: [1.0, 0.0, 0.0] });
             desk.project.save(true);

@@ -6,6 +6,7 @@ import { actions } from "./actions";
 import { Button } from "./button";
 import type { Field, Inspected } from "./protocol";
 import { wish } from "./keys";
+import { NumberField } from "./number";
 import { ask, commands, gesture, lines, select, selection, state } from "./store";
 
 /** The gesture of the slider that is being moved. */
@@ -163,16 +164,7 @@ function NumberRow({ field, inspected, name, index, value, slider }: NumberProps
     <p class="number">
       <span aria-hidden="true">{name}</span>
       <KeyButton inspected={inspected} numbers={[at]} label={label} />
-      <input
-        type="number"
-        step="any"
-        aria-label={label}
-        value={value === undefined ? "" : round(value)}
-        placeholder="0"
-        onChange={(event) => {
-          if (event.currentTarget.value !== "") set(inspected.line, at, [event.currentTarget.valueAsNumber], null);
-        }}
-      />
+      <NumberField label={label} value={value === undefined ? undefined : round(value)} set={(asked) => set(inspected.line, at, [asked], null)} />
       {slider && (
         <input
           type="range"
