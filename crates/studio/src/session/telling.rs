@@ -18,6 +18,12 @@ use crate::view::Projection;
 
 impl Session {
     pub(super) fn answer(&mut self, project: &Project, mut tell: Tell, change: Change) -> Answer {
+        // An outline is that of a picture: with another one it is drawn anew, or goes while things move.
+        match change {
+            Change::Still if tell.outline.is_none() => self.outline(project, &mut tell),
+            Change::Moving if tell.outline.is_none() => tell.outline = Some(String::new()),
+            Change::Still | Change::Moving | Change::Nothing => {}
+        }
         let files: Vec<_> = project
             .files
             .iter()

@@ -92,6 +92,24 @@ fn a_drag_changes_one_line_and_one_undo_takes_it_back() {
 }
 
 #[test]
+fn an_outline_is_that_of_the_picture_also_in_another_size_and_with_other_numbers() {
+    let mut desk = Desk::new(TEXT);
+    desk.ask(Ask::Size { width: 160, height: 90 });
+    let small = desk.ask(Ask::Select { lines: vec![4] }).tell.outline.unwrap();
+    let large = desk.ask(Ask::Size { width: 320, height: 180 }).tell.outline.unwrap();
+    assert!(small.starts_with('M') && large.starts_with('M') && small != large);
+    let set = |gesture| Ask::Set { line: 4, first: 0, values: vec![0.5], gesture };
+    assert_eq!(desk.ask(set(Some(1))).tell.outline.as_deref(), Some(""), "while a slider moves");
+    let done = Ask::Set { line: 4, first: 0, values: vec![], gesture: None };
+    let thinner = desk.ask(done).tell.outline.unwrap();
+    assert!(thinner.starts_with('M') && thinner != large);
+    assert_ne!(
+        desk.ask(Ask::Text { line: 4, text: "Sphere 2 0 1 0 0 0 0 1 1 1".into() }).tell.outline,
+        Some(thinner)
+    );
+}
+
+#[test]
 fn what_is_pressed_without_moving_changes_nothing() {
     let mut desk = Desk::new(TEXT);
     let at = desk.seen(4);

@@ -158,7 +158,10 @@ export function Keys(): JSX.Element | null {
       class="keys"
       aria-labelledby="keys-title"
       ref={(dialog) => {
-        if (dialog && !dialog.open) dialog.showModal();
+        if (!dialog || dialog.open) return;
+        dialog.showModal();
+        // The focus goes to the button at its end.
+        dialog.scrollTop = 0;
       }}
       onClose={() => (help.value = false)}
     >
