@@ -29,7 +29,7 @@ export function Inspector(): JSX.Element {
   const fields = inspected?.material ? all.filter((field) => field.first < inspected.values.length - 1) : all;
   return (
     <section class="panel inspector" aria-labelledby="inspector-title">
-      <h2 id="inspector-title">{table ? [table.name, inspected?.subject, line?.name && `(${line.name})`].filter(Boolean).join(" ") : count > 0 ? `Line ${(selection.value.at(-1) ?? 0) + 1}` : "Nothing selected"}</h2>
+      <h2 id="inspector-title">{table ? [table.name, inspected?.subject, line?.name && `(${line.name})`].filter(Boolean).join(" ") : count > 0 ? "No command" : "Nothing selected"}</h2>
       {count > 0 && (
         <div class="buttons">
           <Button action={actions.duplicate} />
@@ -45,7 +45,7 @@ export function Inspector(): JSX.Element {
       {count > 1 && <p class="note">{count} lines are selected; moving, dropping and hiding concern all of them.</p>}
       {inspected && fields.map((field) => <FieldRow key={`${inspected.line}:${field.first}`} field={field} inspected={inspected} />)}
       {inspected?.material && <MaterialRow name={inspected.material} />}
-      {!inspected && <p class="note">{count > 0 ? "This line is no command; see the script." : "Click something in the picture or in the list."}</p>}
+      {!inspected && <p class="note">{count > 0 ? "What is selected has no numbers to set; see the script." : "Click something in the picture or in the list."}</p>}
     </section>
   );
 }

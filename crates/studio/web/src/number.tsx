@@ -33,7 +33,7 @@ export function NumberField({ label, value, least = -Number.MAX_VALUE, most = Nu
       type="number"
       step={whole ? 1 : "any"}
       aria-label={label}
-      placeholder="0"
+      placeholder={value === undefined ? "left out" : ""}
       onInput={() => (typing.current = true)}
       onKeyDown={(event) => event.key === "Escape" && restore()}
       onBlur={() => (typing.current = false)}
