@@ -105,7 +105,10 @@ function Row({ at, line }: { readonly at: number; readonly line: Line | undefine
     } else if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z") {
       sent.current = [];
       ask({ ask: event.shiftKey ? "redo" : "undo" });
-    } else return;
+    } else {
+      if (event.key === "Home") element.closest(".list")?.scrollTo({ left: 0 });
+      return;
+    }
     event.preventDefault();
   };
   const isSelected = selected.value.has(at);
