@@ -1,6 +1,6 @@
 //! A script as lines, and its history: every change is a splice of lines and has an inverse.
 //!
-//! Knows no file and no scene. Invariant: undoing all that was done gives the bytes that were there before.
+//! Knows no file and no scene; a step may carry the pace of the animation, which is no line. Invariant: undoing all that was done gives the bytes that were there before.
 
 use std::collections::VecDeque;
 
@@ -34,6 +34,8 @@ pub struct Document {
 struct Step {
     gesture: Option<u64>,
     inverses: Vec<Splice>,
+    /// The pace before it, if it has changed that.
+    fps: Option<f64>,
 }
 
 impl Splice {
@@ -88,7 +90,7 @@ impl Document {
             }
             _ => {
                 self.held += inverse.size();
-                self.done.push_back(Step { gesture, inverses: vec![inverse] });
+                self.done.push_back(Step { gesture, inverses: vec![inverse], fps: None });
             }
         }
         while self.held > HISTORY_BYTES && self.done.len() > 1 {
@@ -104,22 +106,28 @@ impl Document {
         }
         let inverse = self.splice(&splice);
         self.held = self.held + inverse.size() - self.undone.drain(..).map(|step| step.size()).sum::<usize>();
-        self.done.push_back(Step { gesture: None, inverses: vec![inverse] });
+        self.done.push_back(Step { gesture: None, inverses: vec![inverse], fps: None });
         vec![splice]
     }
 
-    /// Takes the last step back; the splices that this took, in their order.
-    pub fn undo(&mut self) -> Vec<Splice> {
+    /// The pace of the animation was changed, as a step of its own; `before` held until now.
+    pub fn paced(&mut self, before: f64) {
+        self.held -= self.undone.drain(..).map(|step| step.size()).sum::<usize>();
+        self.done.push_back(Step { gesture: None, inverses: Vec::new(), fps: Some(before) });
+    }
+
+    /// Takes the last step back; the splices that this took, in their order. Where it has changed the pace, `fps` is exchanged.
+    pub fn undo(&mut self, fps: &mut f64) -> Vec<Splice> {
         let Some(step) = self.done.pop_back() else { return Vec::new() };
-        let (splices, inverse) = self.take_back(step);
+        let (splices, inverse) = self.take_back(step, fps);
         self.undone.push(inverse);
         splices
     }
 
-    /// Makes again what was taken back last; the splices that this took, in their order.
-    pub fn redo(&mut self) -> Vec<Splice> {
+    /// Makes again what was taken back last; as [`Document::undo`].
+    pub fn redo(&mut self, fps: &mut f64) -> Vec<Splice> {
         let Some(step) = self.undone.pop() else { return Vec::new() };
-        let (splices, inverse) = self.take_back(step);
+        let (splices, inverse) = self.take_back(step, fps);
         self.done.push_back(inverse);
         splices
     }
@@ -134,11 +142,12 @@ impl Document {
         !self.undone.is_empty()
     }
 
-    fn take_back(&mut self, step: Step) -> (Vec<Splice>, Step) {
+    fn take_back(&mut self, step: Step, fps: &mut f64) -> (Vec<Splice>, Step) {
         self.held -= step.size();
         let splices: Vec<_> = step.inverses.into_iter().rev().collect();
         let inverses = splices.iter().map(|splice| self.splice(splice)).collect();
-        let inverse = Step { gesture: None, inverses };
+        let paced = step.fps.map(|before| std::mem::replace(fps, before));
+        let inverse = Step { gesture: None, inverses, fps: paced };
         self.held += inverse.size();
         (splices, inverse)
     }
@@ -194,12 +203,12 @@ mod tests {
         }
         document.apply(set(1, "f"), Some(8));
         assert_eq!(document.bytes(), b"a\nf\n");
-        document.undo();
+        document.undo(&mut 10.0);
         assert_eq!(document.bytes(), b"a\ne\n");
-        document.undo();
+        document.undo(&mut 10.0);
         assert_eq!(document.bytes(), b"a\nb\n");
         assert!(!document.can_undo());
-        document.redo();
+        document.redo(&mut 10.0);
         assert_eq!(document.bytes(), b"a\ne\n");
     }
 
@@ -208,7 +217,7 @@ mod tests {
         let mut document = Document::new(b"a\r\nb");
         document.apply(Splice { at: 9, removed: 0, inserted: vec![Line::new("c")] }, None);
         assert_eq!(document.bytes(), b"a\r\nb\r\nc\r\n");
-        document.undo();
+        document.undo(&mut 10.0);
         assert_eq!(document.bytes(), b"a\r\nb");
     }
 
@@ -258,8 +267,8 @@ mod tests {
                 };
                 for (at, removed, inserted, gesture, what) in edits {
                     let told = match what {
-                        0 => document.undo(),
-                        1 => document.redo(),
+                        0 => document.undo(&mut 10.0),
+                        1 => document.redo(&mut 10.0),
                         _ => {
                             let inserted = inserted.iter().map(|text| Line::new(text)).collect();
                             vec![document.apply(Splice { at, removed, inserted }, gesture)]
@@ -270,12 +279,12 @@ mod tests {
                 let edited = document.bytes();
                 let mut steps = 0;
                 while document.can_undo() {
-                    document.undo();
+                    document.undo(&mut 10.0);
                     steps += 1;
                 }
                 prop_assert_eq!(document.bytes(), text.as_bytes());
                 for _ in 0..steps {
-                    document.redo();
+                    document.redo(&mut 10.0);
                 }
                 prop_assert_eq!(document.bytes(), edited);
                 Ok(())

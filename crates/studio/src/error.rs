@@ -45,6 +45,9 @@ pub enum Error {
         /// What is wrong with it, and what would be right.
         problem: &'static str,
     },
+    /// What `animation.json` says is no settings.
+    #[error("{0}")]
+    Settings(String),
     /// No socket, no randomness.
     #[error("cannot start the server of the page")]
     Server(#[source] io::Error),

@@ -31,7 +31,7 @@ pub(crate) struct Outputs {
 /// What is rendered: scripts in order, and their pace.
 #[derive(Debug)]
 struct Job {
-    scripts: Vec<Script>,
+    scripts: Vec<Arc<Script>>,
     settings: AnimationSettings,
 }
 
@@ -41,17 +41,17 @@ impl Job {
             return Err(Error::Output(format!("{} has errors; mend them first", file.name)));
         }
         let scripts: Vec<_> = project.files.iter().filter_map(|file| file.script.clone()).collect();
-        let frames: usize = scripts.iter().map(Script::frame_count).sum();
-        match project.settings.frames() {
+        let frames: usize = scripts.iter().map(|script| script.frame_count()).sum();
+        match project.settings().frames() {
             Some(expected) if (frames as u64) < expected => Err(Error::Output(format!(
                 "animation.json says {expected} frames, but the scripts give {frames}"
             ))),
-            _ => Ok(Self { scripts, settings: project.settings }),
+            _ => Ok(Self { scripts, settings: project.settings() }),
         }
     }
 
     fn run(&self, cancel: &AtomicBool, told: &impl Fn(OutputState)) -> Result<Vec<u8>, Error> {
-        let of = self.scripts.iter().map(Script::frame_count).sum();
+        let of = self.scripts.iter().map(|script| script.frame_count()).sum();
         let failed = |error: &dyn std::error::Error| Error::Output(format!("cannot make the GIF: {error}"));
         let settings = Settings::new(self.settings.fps(), self.settings.loops());
         let mut gif = Bounded(Vec::new());
@@ -145,7 +145,7 @@ fn no_picture(error: &dyn std::error::Error) -> Error {
 /// When a script has errors, or the system has no thread.
 pub(crate) fn frames_zip(project: &Project, permit: impl Send + 'static) -> Result<Body, Error> {
     let job = Job::of(project)?;
-    let of: usize = job.scripts.iter().map(Script::frame_count).sum();
+    let of: usize = job.scripts.iter().map(|script| script.frame_count()).sum();
     let made = zip_of(move |zip| {
         let _permit = permit;
         let frames =

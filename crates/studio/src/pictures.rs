@@ -1,9 +1,10 @@
 //! Drawing what the page asks for, on a thread of its own: the newest request wins.
 //!
-//! A request that waits is replaced by the next one. One that is being drawn at full size is given up for a newer one;
+//! A request that waits is replaced by the next one. One that is being drawn at rest is given up for a newer one;
 //! while something moves it is drawn to the end, smaller where it would take too long, so that there always is a
-//! picture, and with one ray a pixel, whatever the script says. At rest a picture of several rays a pixel is shown after each
-//! pass over it. No more pictures are under way than the page keeps up with.
+//! picture, and with one ray a pixel, whatever the script says. At rest what takes long begins with sketches: few pixels with
+//! one ray each, then more; a picture of several rays a pixel is shown after each pass over it. No more pictures are under way
+//! than the page keeps up with.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -11,8 +12,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use image::RgbImage;
-use rayfold_scene::{Camera, Samples, Scene, Screen};
-use rayfold_tracer::{Drawing, RenderOptions};
+use rayfold_scene::{Camera, Samples, Scene, Screen, Script};
+use rayfold_tracer::{Drawing, Exposure, RenderError, RenderOptions};
 
 /// Pictures that the page has not shown yet, at most.
 const UNDER_WAY: u32 = 2;
@@ -20,21 +21,52 @@ const UNDER_WAY: u32 = 2;
 /// Seconds that a picture may take while something moves.
 const MOVING: f64 = 0.03;
 
-/// The least share of width and height that is drawn while something moves.
+/// Seconds that one ray a pixel may take at rest before there are sketches.
+const PATIENCE: f64 = 0.1;
+
+/// The least share of width and height that is drawn while something moves, and that of the first sketch.
 const LEAST: f64 = 0.125;
 
-/// Bytes before the pixels: the picture's number, width, height, and microseconds that it took; little-endian.
-pub(crate) const HEADER: usize = 16;
+/// How much wider and higher the next sketch is.
+const GROWTH: f64 = 2.0;
+
+/// Bytes before the pixels: the picture's number, width, height, microseconds that it took, and 1 for one that stays as it is,
+/// or 0 where a finer one follows; little-endian.
+pub(crate) const HEADER: usize = 20;
 
 /// A picture that is wanted.
 #[derive(Clone, Debug)]
 pub(crate) struct Wanted {
     /// What to draw; its screen is the size.
     pub(crate) scene: Scene,
+    /// What becomes of it while its shutter is open.
+    pub(crate) motion: Option<Motion>,
     /// Something is being dragged: better now than sharp.
     pub(crate) moving: bool,
     /// What the page calls it.
     pub(crate) number: u32,
+}
+
+/// A frame of a script, to be asked for at other moments.
+#[derive(Clone, Debug)]
+pub(crate) struct Motion {
+    /// Where it is in.
+    pub(crate) script: Arc<Script>,
+    /// Which it is, from 0.
+    pub(crate) frame: usize,
+    /// One looks through the free camera, which does not move.
+    pub(crate) is_free: bool,
+}
+
+impl Motion {
+    /// A scene of the frame, so many frames later.
+    fn after(&self, scene: &Scene, frames: f64) -> Scene {
+        match self.script.frame_after(self.frame, frames) {
+            Some(then) if self.is_free => Scene { screen: scene.screen, camera: scene.camera, ..then },
+            Some(then) => Scene { screen: scene.screen, ..then },
+            None => scene.clone(),
+        }
+    }
 }
 
 /// Where pictures are ordered.
@@ -119,37 +151,83 @@ impl Shared {
     }
 
     fn work(&self, send: &impl Fn(Vec<u8>) -> bool) {
-        // Seconds that a pixel took last.
-        let mut per_pixel = 0.0;
+        let mut pace = Pace::default();
         while let Some(wanted) = self.next() {
-            let mut scene = wanted.scene;
-            if wanted.moving {
-                scene.screen = smaller(scene.screen, &scene.camera, per_pixel);
-                scene.samples = Samples::default();
-            }
-            let start = Instant::now();
-            let options = RenderOptions { cancel: Some(&self.cancel), ..RenderOptions::default() };
-            let drawn = Drawing::new(&scene, &options).and_then(|drawing| {
-                drawing.draw_progressively(|image| {
-                    // What the page cannot show in time is left out: a finer one follows.
-                    if self.another() {
-                        send(packed(wanted.number, &image, start.elapsed()));
-                    }
-                })
-            });
-            let Ok(image) = drawn else {
-                // Given up for a newer one, or beyond what can be drawn.
-                self.change(|desk| desk.under_way = desk.under_way.saturating_sub(1));
-                continue;
+            let drawn = if wanted.moving {
+                self.sketch(&wanted, pace.share(&wanted.scene, MOVING), &mut pace)
+            } else {
+                self.at_rest(&wanted, &mut pace, send)
             };
-            let took = start.elapsed();
-            if wanted.moving {
-                per_pixel = took.as_secs_f64() / scene.screen.pixels() as f64;
-            }
-            if !send(packed(wanted.number, &image, took)) {
-                return;
+            match drawn {
+                Ok(picture) => {
+                    if !send(picture) {
+                        return;
+                    }
+                }
+                // Given up for a newer one, or beyond what can be drawn.
+                Err(_) => self.change(|desk| desk.under_way = desk.under_way.saturating_sub(1)),
             }
         }
+    }
+
+    /// Draws a picture as it is, after sketches of what takes long.
+    fn at_rest(
+        &self,
+        wanted: &Wanted,
+        pace: &mut Pace,
+        send: &impl Fn(Vec<u8>) -> bool,
+    ) -> Result<Vec<u8>, RenderError> {
+        let start = Instant::now();
+        let scene = &wanted.scene;
+        let is_sampled = scene.samples.most() > 1;
+        let mut share = pace.share(scene, PATIENCE);
+        // With one ray a pixel a sketch of the whole size is the picture.
+        while share < 1.0 || is_sampled {
+            let sketch = self.sketch(wanted, share, pace)?;
+            // What the page cannot show in time is left out: a finer one follows.
+            if self.another() {
+                send(sketch);
+            }
+            if share >= 1.0 {
+                break;
+            }
+            share = pace.share(scene, PATIENCE).max(GROWTH * share).min(1.0);
+        }
+        let after = |frames| match &wanted.motion {
+            Some(motion) => motion.after(scene, frames),
+            None => scene.clone(),
+        };
+        let exposure = match &wanted.motion {
+            Some(_) => Exposure::moving(scene, &after),
+            None => Exposure::still(scene),
+        };
+        let options = RenderOptions { cancel: Some(&self.cancel), ..RenderOptions::default() };
+        let drawing = Drawing::exposed(exposure, &options)?;
+        let begin = Instant::now();
+        let image = drawing.draw_progressively(|image| {
+            if self.another() {
+                send(packed(wanted.number, &image, start.elapsed(), false));
+            }
+        })?;
+        if !is_sampled {
+            pace.drawn(scene.screen, begin.elapsed());
+        }
+        Ok(packed(wanted.number, &image, start.elapsed(), true))
+    }
+
+    /// A picture with one ray a pixel, and with this share of its width and height.
+    fn sketch(&self, wanted: &Wanted, share: f64, pace: &mut Pace) -> Result<Vec<u8>, RenderError> {
+        let start = Instant::now();
+        let whole = &wanted.scene;
+        let scene =
+            Scene { screen: smaller(whole.screen, share), samples: Samples::default(), ..whole.clone() };
+        let options = RenderOptions { cancel: Some(&self.cancel), ..RenderOptions::default() };
+        let drawing = Drawing::new(&scene, &options)?;
+        pace.prepared(start.elapsed());
+        let begin = Instant::now();
+        let image = drawing.draw()?;
+        pace.drawn(scene.screen, begin.elapsed());
+        Ok(packed(wanted.number, &image, start.elapsed(), false))
     }
 
     /// Whether the page has room for a picture more; if so, that is under way.
@@ -163,34 +241,58 @@ impl Shared {
     }
 }
 
+/// How long pictures with one ray a pixel took last.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pace {
+    /// Seconds before the first pixel.
+    preparing: f64,
+    /// Seconds a pixel, once one was drawn.
+    per_pixel: Option<f64>,
+}
+
+impl Pace {
+    fn prepared(&mut self, took: Duration) {
+        self.preparing = took.as_secs_f64();
+    }
+
+    fn drawn(&mut self, screen: Screen, took: Duration) {
+        self.per_pixel = Some(took.as_secs_f64() / screen.pixels() as f64);
+    }
+
+    /// The share of width and height that is drawn in so many seconds. The pixels of an orthographic camera are world units, and
+    /// stay.
+    fn share(&self, scene: &Scene, seconds: f64) -> f64 {
+        if matches!(scene.camera, Camera::Orthographic) {
+            return 1.0;
+        }
+        let Some(per_pixel) = self.per_pixel else { return LEAST };
+        // Preparing takes as long for few pixels as for many.
+        let left = (seconds - self.preparing).max(seconds / 3.0);
+        (left / (per_pixel * scene.screen.pixels() as f64)).sqrt().clamp(LEAST, 1.0)
+    }
+}
+
 /// A picture as the page takes it.
-fn packed(number: u32, image: &RgbImage, took: Duration) -> Vec<u8> {
+fn packed(number: u32, image: &RgbImage, took: Duration, is_final: bool) -> Vec<u8> {
     let (width, height) = image.dimensions();
     let micros = u32::try_from(took.as_micros()).unwrap_or(u32::MAX);
     let mut bytes = Vec::with_capacity(HEADER + image.len() / 3 * 4);
-    for number in [number, width, height, micros] {
+    for number in [number, width, height, micros, u32::from(is_final)] {
         bytes.extend_from_slice(&number.to_le_bytes());
     }
     bytes.extend(image.as_raw().as_chunks::<3>().0.iter().flat_map(|&[r, g, b]| [r, g, b, 255]));
     bytes
 }
 
-/// A size that is drawn in time. The pixels of an orthographic camera are world units, and stay.
-fn smaller(screen: Screen, camera: &Camera, per_pixel: f64) -> Screen {
-    if matches!(camera, Camera::Orthographic) {
-        return screen;
-    }
-    let share = (MOVING / (per_pixel * screen.pixels() as f64)).sqrt();
-    if share >= 1.0 {
-        return screen;
-    }
-    let side = |side: u32| (f64::from(side) * share.max(LEAST)).round().max(1.0) as u32;
+/// A share of a size.
+fn smaller(screen: Screen, share: f64) -> Screen {
+    let side = |side: u32| (f64::from(side) * share).round().max(1.0) as u32;
     Screen::new(side(screen.width()), side(screen.height())).unwrap_or(screen)
 }
 
 #[cfg(test)]
 mod tests {
-    use rayfold_tracer::render;
+    use rayfold_tracer::{render, render_frame};
     use std::sync::mpsc;
 
     use super::*;
@@ -199,7 +301,31 @@ mod tests {
         let text = "Screen 64 48\nBackground 0 0.5 1\nSphere 10 30 20 -20  1 0 0  0 0 0\nTrace";
         let scene =
             rayfold_scene::parse("a", text.as_bytes(), &Default::default()).script.unwrap().frame(0).unwrap();
-        Wanted { scene, moving, number }
+        Wanted { scene, motion: None, moving, number }
+    }
+
+    /// A picture that may be drawn in any size.
+    fn pinhole(number: u32, text: &str) -> Wanted {
+        let text = format!("Screen 96 64\nLook 0 1 6  0 0 0  50\nIlight 1 1 1  1 -1 -1\n{text}\nTrace");
+        let parsed = rayfold_scene::parse("a", text.as_bytes(), &Default::default());
+        let script = Arc::new(parsed.script.unwrap());
+        let scene = script.frame(0).unwrap();
+        Wanted { scene, motion: Some(Motion { script, frame: 0, is_free: false }), moving: false, number }
+    }
+
+    fn is_final(picture: &[u8]) -> bool {
+        picture[16] == 1
+    }
+
+    /// All pictures up to the one that stays.
+    fn drawn(painter: &Painter, pictures: &mpsc::Receiver<Vec<u8>>, wanted: Wanted) -> Vec<Vec<u8>> {
+        painter.want(wanted);
+        let mut seen: Vec<Vec<u8>> = vec![];
+        while !seen.last().is_some_and(|picture| is_final(picture)) {
+            seen.push(pictures.recv_timeout(Duration::from_secs(20)).unwrap());
+            painter.shown();
+        }
+        seen
     }
 
     fn number(picture: &[u8]) -> u32 {
@@ -224,20 +350,34 @@ mod tests {
     fn at_rest_a_picture_gets_finer_and_ends_as_the_tracers() {
         let (sender, pictures) = mpsc::channel();
         let painter = Painter::start(move |picture| sender.send(picture).is_ok()).unwrap();
-        let mut request = wanted(9, false);
-        request.scene.samples = Samples::new(64, 1.0).unwrap();
+        let moves =
+            "Samples 64 1\nShutter 0.8\nFrames 5 5\nSphere 1 (1:-3 9:3) 0 0  0.2 0.1 0.1  0.7 0.5 0.3";
+        let request = pinhole(9, moves);
+        let script = Arc::clone(&request.motion.as_ref().unwrap().script);
+        let expected = render_frame(&script, 0, &RenderOptions::default()).unwrap().unwrap();
+        assert_ne!(expected, render(&request.scene, &RenderOptions::default()).unwrap(), "it moves");
+        let seen = drawn(&painter, &pictures, request);
+        let sizes: Vec<_> = seen.iter().map(|picture| picture.len() - HEADER).collect();
+        assert_eq!(sizes[0], 12 * 8 * 4, "the first one has few pixels, whatever the rest takes");
+        assert!(sizes.is_sorted() && seen.len() > 2, "{sizes:?}");
+        assert!(seen.iter().all(|picture| number(picture) == 9));
+        let (pixels, _) = seen.last().unwrap()[HEADER..].as_chunks::<4>();
+        assert!(pixels.iter().zip(expected.pixels()).all(|(a, b)| a[..3] == b.0));
+        painter.close();
+    }
+
+    #[test]
+    fn what_is_drawn_at_once_has_no_sketch_once_that_is_known() {
+        let (sender, pictures) = mpsc::channel();
+        let painter = Painter::start(move |picture| sender.send(picture).is_ok()).unwrap();
+        let ball = "Sphere 1  0 0 0  0.2 0.1 0.1  0.7 0.5 0.3";
+        let request = pinhole(1, ball);
         let expected = render(&request.scene, &RenderOptions::default()).unwrap();
-        painter.want(request);
-        let mut seen = vec![];
-        let is_last = |picture: &Vec<u8>| {
-            let (pixels, _) = picture[HEADER..].as_chunks::<4>();
-            pixels.iter().zip(expected.pixels()).all(|(a, b)| a[..3] == b.0)
-        };
-        while !seen.last().is_some_and(is_last) {
-            seen.push(pictures.recv_timeout(Duration::from_secs(20)).unwrap());
-            painter.shown();
-        }
-        assert!(seen.len() > 1 && seen.iter().all(|picture| number(picture) == 9), "{}", seen.len());
+        assert!(drawn(&painter, &pictures, request).len() > 1, "it is not known at first");
+        let again = drawn(&painter, &pictures, pinhole(2, ball));
+        assert_eq!(again.len(), 1);
+        let (pixels, _) = again[0][HEADER..].as_chunks::<4>();
+        assert!(pixels.iter().zip(expected.pixels()).all(|(a, b)| a[..3] == b.0));
         painter.close();
     }
 
@@ -260,22 +400,19 @@ mod tests {
 
     #[test]
     fn what_takes_too_long_is_drawn_smaller() {
-        let screen = Screen::new(1000, 500).unwrap();
-        let orbit = crate::view::Orbit {
-            target: glam::DVec3::ZERO,
-            distance: 1.0,
-            yaw: 0.0,
-            pitch: 0.0,
-            half_fov: 0.4,
-        };
-        let camera = Camera::Pinhole(orbit.camera(2.0).unwrap());
-        let size = |per_pixel| {
-            let screen = smaller(screen, &camera, per_pixel);
-            (screen.width(), screen.height())
-        };
-        assert_eq!(size(0.0), (1000, 500));
-        assert_eq!(size(MOVING / 500_000.0 * 4.0), (500, 250));
-        assert_eq!(size(1.0), (125, 63));
-        assert_eq!(smaller(screen, &Camera::Orthographic, 1.0), screen);
+        let mut scene = pinhole(1, "Sphere 1  0 0 0  0 0 0  1 1 1").scene;
+        scene.screen = Screen::new(1000, 500).unwrap();
+        let share = |preparing, per_pixel| Pace { preparing, per_pixel }.share(&scene, MOVING);
+        let whole = MOVING / 500_000.0;
+        assert_eq!(share(0.0, None), LEAST, "before anything is known");
+        assert_eq!(share(0.0, Some(0.0)), 1.0);
+        assert!((share(0.0, Some(4.0 * whole)) - 0.5).abs() < 1e-9);
+        assert!((share(0.5 * MOVING, Some(2.0 * whole)) - 0.5).abs() < 1e-9);
+        assert_eq!(share(9.0, Some(whole)), share(8.0, Some(whole)), "preparing is not to make it tiny");
+        assert_eq!(share(0.0, Some(1.0)), LEAST);
+        let size = |share| (smaller(scene.screen, share).width(), smaller(scene.screen, share).height());
+        assert_eq!([size(1.0), size(0.5), size(LEAST)], [(1000, 500), (500, 250), (125, 63)]);
+        let flat = Scene { camera: Camera::Orthographic, ..scene.clone() };
+        assert_eq!(Pace { preparing: 0.0, per_pixel: Some(1.0) }.share(&flat, MOVING), 1.0);
     }
 }

@@ -3,23 +3,23 @@
 //! Reads and writes what it was opened with and nothing else. A file is written whole or not at all, and never over
 //! what somebody else wrote meanwhile: then it is in [`Saved::Conflict`] until it is said whose text stays.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, Read, Write};
+use std::cell::{OnceCell, RefCell};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use rayfold_scene::{
-    AnimationSettings, Diagnostic, Limits, SETTINGS_FILE, Script, natural_cmp, parse, parse_settings,
-    script_name,
-};
+use rayfold_scene::{AnimationSettings, Diagnostic, Limits, Script, natural_cmp, parse, script_name};
 use serde::Serialize;
 
 use crate::document::{Document, Splice};
-use crate::error::Error;
+use crate::error::{Error, words};
+use crate::files::{TEXT, read, write_new, write_whole};
+use crate::frame::Frame;
 use crate::line::Line;
-
-/// Bytes of all scripts together.
-const TEXT: u64 = 256 << 20;
+use crate::settings::Settings;
+use crate::tracks::{Tracks, tracks};
 
 /// Bytes of a new script's name; file systems take 255, and hidden names beside it are longer.
 const NAME: usize = 200;
@@ -56,13 +56,19 @@ pub struct Opened {
     /// Its lines.
     pub document: Document,
     /// What the lines mean; what they meant last, where they have an error now.
-    pub script: Option<Script>,
+    pub script: Option<Arc<Script>>,
     /// What is wrong with them.
     pub diagnostics: Vec<Diagnostic>,
     /// What the file held when it was last read or written; `None` if it was not there.
     on_disk: Option<Vec<u8>>,
     changed: Option<Instant>,
     saved: Saved,
+    /// Why it could not be written last.
+    failure: String,
+    /// What was worked out of the lines, as long as they stay: the frame that was asked for last, with its index, and the numbers
+    /// that change.
+    frame: RefCell<Option<(usize, Arc<Frame>)>>,
+    tracks: OnceCell<Tracks>,
 }
 
 /// All that is open.
@@ -72,8 +78,7 @@ pub struct Project {
     pub name: String,
     /// In their order in the animation; never empty.
     pub files: Vec<Opened>,
-    /// What the folder says about the animation.
-    pub settings: AnimationSettings,
+    settings: Settings,
     /// The folder, where one was opened.
     folder: Option<PathBuf>,
 }
@@ -91,22 +96,17 @@ impl Project {
     /// Opens a folder of scripts, or one script; a script that is not there yet begins with an example.
     ///
     /// # Errors
-    /// When a file cannot be read, or the folder has no script.
+    /// When a file cannot be read, the folder has no script, or its `animation.json` is none.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let name = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
         let name = name.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let read = |source| Error::Read { path: path.to_path_buf(), source };
-        let mut settings = AnimationSettings::default();
         let mut paths = Vec::new();
         if path.is_dir() {
             for entry in fs::read_dir(path).map_err(read)? {
                 let entry = entry.map_err(read)?;
                 let name = entry.file_name().to_string_lossy().into_owned();
-                if name == SETTINGS_FILE {
-                    let text = fs::read(entry.path())
-                        .map_err(|source| Error::Read { path: entry.path(), source })?;
-                    settings = parse_settings(&name, &text).settings.unwrap_or_default();
-                } else if name.ends_with(".txt") && entry.path().is_file() {
+                if name.ends_with(".txt") && entry.path().is_file() {
                     paths.push((name, entry.path()));
                 }
             }
@@ -131,7 +131,51 @@ impl Project {
             })
             .collect::<Result<_, Error>>()?;
         let folder = path.is_dir().then(|| path.to_path_buf());
+        let settings = Settings::open(folder.as_deref())?;
         Ok(Self { name, files, settings, folder })
+    }
+
+    /// What is said of the whole animation.
+    pub fn settings(&self) -> AnimationSettings {
+        self.settings.now()
+    }
+
+    /// Sets the frames a second, as a step of a file that can be undone.
+    ///
+    /// # Errors
+    /// For a pace that an animation cannot have, and when `animation.json` cannot be written.
+    pub fn set_fps(&mut self, file: usize, fps: f64) -> Result<(), Error> {
+        let before = self.settings.now().fps();
+        self.settings.set_fps(fps)?;
+        if fps != before {
+            self.files[file].document.paced(before);
+        }
+        Ok(())
+    }
+
+    /// Looks whether somebody else has written `animation.json`; whether another pace holds now.
+    ///
+    /// # Errors
+    /// When it is none any more.
+    pub fn look_at_settings(&mut self) -> Result<bool, Error> {
+        self.settings.look()
+    }
+
+    /// Takes the last step of a file back, or makes it again; what was done to its lines.
+    ///
+    /// # Errors
+    /// When it has changed the pace, and `animation.json` cannot be written.
+    pub fn step(&mut self, file: usize, back: bool) -> Result<Vec<Splice>, Error> {
+        let mut fps = self.settings.now().fps();
+        let opened = &mut self.files[file];
+        let done = if back { opened.document.undo(&mut fps) } else { opened.document.redo(&mut fps) };
+        if !done.is_empty() {
+            opened.touched();
+        }
+        if fps != self.settings.now().fps() {
+            self.settings.set_fps(fps)?;
+        }
+        Ok(done)
     }
 
     /// Whether scripts can be added: a folder was opened, and what was opened may be written.
@@ -223,6 +267,9 @@ impl Opened {
             on_disk,
             changed: None,
             saved: Saved::Yes,
+            failure: String::new(),
+            frame: RefCell::default(),
+            tracks: OnceCell::new(),
         };
         file.parse();
         Ok(file)
@@ -253,20 +300,6 @@ impl Opened {
         done
     }
 
-    /// Takes the last step back.
-    pub fn undo(&mut self) -> Vec<Splice> {
-        let done = self.document.undo();
-        self.touched();
-        done
-    }
-
-    /// Makes it again.
-    pub fn redo(&mut self) -> Vec<Splice> {
-        let done = self.document.redo();
-        self.touched();
-        done
-    }
-
     /// Its text becomes another, as a step that can be undone; what was done to the lines.
     pub fn replace(&mut self, text: &[u8]) -> Vec<Splice> {
         let done = self.become_text(text);
@@ -284,18 +317,41 @@ impl Opened {
         let parsed = parse(&self.name, &self.document.bytes(), &limits);
         self.diagnostics = parsed.diagnostics;
         if parsed.script.is_some() {
-            self.script = parsed.script;
+            self.script = parsed.script.map(Arc::new);
+        }
+        self.frame = RefCell::default();
+        self.tracks = OnceCell::new();
+    }
+
+    /// A frame, counted from 0.
+    pub(crate) fn frame(&self, frame: usize) -> Arc<Frame> {
+        let mut kept = self.frame.borrow_mut();
+        match &*kept {
+            Some((of, known)) if *of == frame => Arc::clone(known),
+            _ => {
+                let new = Arc::new(Frame::new(self.script.as_deref(), self.document.lines(), frame));
+                *kept = Some((frame, Arc::clone(&new)));
+                new
+            }
         }
     }
 
+    /// The numbers that change.
+    pub(crate) fn tracks(&self) -> &Tracks {
+        self.tracks.get_or_init(|| tracks(self.document.lines()))
+    }
+
     /// Looks whether somebody else has written the file: their text is taken over as a step that can be undone, unless
-    /// there are changes that are not written yet. What was done to the lines.
+    /// there are changes that are not written yet, or the file has gone. What was done to the lines.
     pub fn look(&mut self) -> Option<Vec<Splice>> {
         let theirs = read(&self.path).ok()?;
         if theirs == self.on_disk {
-            return None;
+            // It had gone, and is there again.
+            let is_back = self.saved == Saved::Conflict && self.changed.is_none();
+            self.saved = if is_back { Saved::Yes } else { self.saved };
+            return is_back.then(Vec::new);
         }
-        if self.changed.is_some() {
+        if self.changed.is_some() || theirs.is_none() {
             let news = self.saved != Saved::Conflict;
             self.saved = Saved::Conflict;
             return news.then(Vec::new);
@@ -320,7 +376,7 @@ impl Opened {
     /// The lines become those that the file holds.
     fn take_over(&mut self, text: &[u8]) -> Vec<Splice> {
         let done = self.become_text(text);
-        self.changed = None;
+        (self.changed, self.saved) = (None, Saved::Yes);
         done
     }
 
@@ -337,6 +393,18 @@ impl Opened {
         let done = self.document.replace(splice);
         self.parse();
         done
+    }
+
+    /// It could not be written, and will be tried again after a while.
+    fn failed(&mut self, error: &Error) -> Saved {
+        self.failure = words(error);
+        self.changed = Some(Instant::now());
+        Saved::Failed
+    }
+
+    /// Why it could not be written, as long as that is so.
+    pub fn failure(&self) -> &str {
+        if self.saved == Saved::Failed { &self.failure } else { "" }
     }
 
     /// Writes the file, if nobody else has; whether it stands otherwise than before.
@@ -357,70 +425,12 @@ impl Opened {
                     (self.on_disk, self.changed) = (Some(text), None);
                     Saved::Yes
                 }
-                Err(_) => Saved::Failed,
+                Err(error) => self.failed(&error),
             },
-            Err(_) => Saved::Failed,
+            Err(error) => self.failed(&error),
         };
-        if self.saved == Saved::Failed {
-            // Tried again after a while.
-            self.changed = Some(Instant::now());
-        }
         before != self.saved()
     }
-}
-
-/// The bytes of a file; `None` if it is not there.
-fn read(path: &Path) -> Result<Option<Vec<u8>>, Error> {
-    let failed = |source| Error::Read { path: path.to_path_buf(), source };
-    let file = match File::open(path) {
-        Ok(file) => file,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(failed(error)),
-    };
-    let mut text = Vec::new();
-    file.take(TEXT + 1).read_to_end(&mut text).map_err(failed)?;
-    if text.len() as u64 > TEXT {
-        return Err(Error::TooLarge { path: path.to_path_buf(), limit: TEXT });
-    }
-    Ok(Some(text))
-}
-
-/// A hidden name beside a file's place.
-fn temporary(path: &Path) -> PathBuf {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!(".{name}.{}.part", std::process::id()))
-}
-
-/// Writes a file that is not there yet: whole or not at all, and never over another.
-fn write_new(path: &Path, text: &[u8]) -> io::Result<()> {
-    let temporary = temporary(path);
-    let mut file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
-    let written = (|| {
-        file.write_all(text)?;
-        file.sync_all()?;
-        // Unlike a rename it refuses a name that is taken.
-        fs::hard_link(&temporary, path)
-    })();
-    let _ = fs::remove_file(&temporary);
-    written
-}
-
-/// Writes a file under a hidden name beside its place, and then in its place.
-fn write_whole(path: &Path, text: &[u8]) -> Result<(), Error> {
-    let temporary = temporary(path);
-    let written = (|| {
-        let mut file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
-        file.write_all(text)?;
-        if let Ok(metadata) = fs::metadata(path) {
-            file.set_permissions(metadata.permissions())?;
-        }
-        file.sync_all()?;
-        fs::rename(&temporary, path)
-    })();
-    written.map_err(|source| {
-        let _ = fs::remove_file(&temporary);
-        Error::Write { path: path.to_path_buf(), source }
-    })
 }
 
 #[cfg(test)]
@@ -477,10 +487,55 @@ mod tests {
         assert_eq!((told[0].at, told[0].removed, told[0].inserted.len()), (1, 1, 2));
         assert_eq!(project.files[0].document.bytes(), b"a\nx\ny\nc\n");
         assert_eq!(project.files[0].saved(), Saved::Yes);
-        project.files[0].undo();
+        project.step(0, true).unwrap();
         assert_eq!(project.files[0].document.bytes(), b"a\nb\nc\n");
         project.save(true);
         assert_eq!(fs::read_to_string(&path).unwrap(), "a\nb\nc\n");
+    }
+
+    #[test]
+    fn a_file_that_has_gone_is_told_of_and_not_made_again_unasked() {
+        let (_folder, path, mut project) = one("a\nb\n");
+        fs::remove_file(&path).unwrap();
+        assert_eq!(project.files[0].look(), Some(Vec::new()));
+        assert_eq!(project.files[0].saved(), Saved::Conflict);
+        assert_eq!(project.files[0].look(), None, "once");
+        fs::write(&path, "a\nb\n").unwrap();
+        assert_eq!(project.files[0].look(), Some(Vec::new()));
+        assert_eq!(project.files[0].saved(), Saved::Yes, "it is back");
+        fs::remove_file(&path).unwrap();
+        project.files[0].look();
+        project.files[0].apply(set(0, "mine"), None);
+        assert!(!project.save(true) && !path.exists());
+        project.files[0].resolve(true);
+        project.save(true);
+        assert_eq!(
+            (fs::read_to_string(&path).unwrap().as_str(), project.files[0].saved()),
+            ("mine\nb\n", Saved::Yes)
+        );
+    }
+
+    #[test]
+    fn what_is_read_only_is_not_replaced_and_the_reason_is_told() {
+        let (_folder, path, mut project) = one("a\n");
+        let writable = fs::metadata(&path).unwrap().permissions();
+        let mut locked = writable.clone();
+        locked.set_readonly(true);
+        fs::set_permissions(&path, locked).unwrap();
+        project.files[0].apply(set(0, "mine"), None);
+        project.save(true);
+        assert_eq!(
+            (fs::read_to_string(&path).unwrap().as_str(), project.files[0].saved()),
+            ("a\n", Saved::Failed)
+        );
+        assert!(
+            project.files[0].failure().ends_with("the file is read-only"),
+            "{}",
+            project.files[0].failure()
+        );
+        fs::set_permissions(&path, writable).unwrap();
+        project.save(true);
+        assert_eq!((fs::read_to_string(&path).unwrap().as_str(), project.files[0].failure()), ("mine\n", ""));
     }
 
     #[test]

@@ -126,6 +126,8 @@ pub(crate) enum TimeWish {
     Paste,
     /// What happens between the keys of their tracks.
     Ease { keys: Vec<KeyPlace>, mode: String, cycle: bool },
+    /// How many frames a second are shown.
+    Pace { fps: f64 },
     /// How many frames the `Trace` is that is shown.
     Frames { count: u32 },
 }
@@ -288,6 +290,8 @@ pub(crate) struct State {
     pub(crate) file: usize,
     /// Whether the file holds what is shown.
     pub(crate) saved: Saved,
+    /// Why it cannot be written; empty where it can.
+    pub(crate) failure: String,
     /// Whether there is something to undo.
     pub(crate) can_undo: bool,
     /// Whether there is something to redo.

@@ -10,18 +10,22 @@ mod sight;
 mod telling;
 mod time;
 
+use std::collections::HashSet;
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
 
 use crate::document::Splice;
 use crate::edits;
+use crate::error::words;
 use crate::examples;
+use crate::frame::Frame;
 use crate::line::Line;
 use crate::materials;
 use crate::pictures::Wanted;
 use crate::project::{Place, Project};
 use crate::protocol::{Ask, FileState, Tell};
 use crate::resting;
-use crate::stage::Stage;
 use crate::tables::commands;
 use crate::tracks::{Copied, Tracks};
 use crate::values::changed;
@@ -154,10 +158,14 @@ impl Session {
         let saved = project.save(false);
         let place = self.place(project);
         let looked = if self.held.is_none() { project.files[place.file].look() } else { None };
-        if looked.is_none() && !saved {
+        let pace = project.look_at_settings();
+        if looked.is_none() && !saved && matches!(pace, Ok(false)) {
             return None;
         }
         let mut tell = Tell::default();
+        if let Err(error) = pace {
+            tell.notice = Some(words(&error));
+        }
         let change = match looked {
             Some(splices) if !splices.is_empty() => {
                 tell.notice = Some(format!("{} was changed on the disk", project.files[place.file].name));
@@ -272,8 +280,10 @@ impl Session {
                 Change::Still
             }
             Ask::Reorder { line, down } => {
-                let stage = self.stage(project);
-                if let Some((splices, at)) = edits::reorder(self.file_lines(project), &stage, line, down) {
+                let shown = self.shown(project);
+                if let Some((splices, at)) =
+                    edits::reorder(self.file_lines(project), &shown.stage, line, down)
+                {
                     self.edit(project, splices, None, tell);
                     self.select(project, vec![at]);
                 }
@@ -292,20 +302,20 @@ impl Session {
                 Change::Still
             }
             Ask::Drop { lines } => {
-                let stage = self.stage(project);
-                if let Some(scene) = self.sound_scene(project, &stage) {
+                let shown = self.shown(project);
+                if let Some(scene) = self.sound_scene(project) {
                     let (of, keying) = (self.file_lines(project), self.keying(project));
-                    let splices = resting::drop_down(of, &stage, &scene, &lines, keying);
+                    let splices = resting::drop_down(of, &shown.stage, &scene, &lines, keying);
                     self.edit(project, splices, None, tell);
                     self.outline(project, tell);
                 }
                 Change::Still
             }
             Ask::Ground { lines } => {
-                let stage = self.stage(project);
-                if let Some(scene) = self.sound_scene(project, &stage) {
+                let shown = self.shown(project);
+                if let Some(scene) = self.sound_scene(project) {
                     let (of, keying) = (self.file_lines(project), self.keying(project));
-                    let splices = resting::to_ground(of, &stage, &scene, &lines, keying);
+                    let splices = resting::to_ground(of, &shown.stage, &scene, &lines, keying);
                     self.edit(project, splices, None, tell);
                     self.outline(project, tell);
                 }
@@ -353,9 +363,10 @@ impl Session {
             }
             Ask::Undo | Ask::Redo => {
                 let file = self.place(project).file;
-                let opened = &mut project.files[file];
-                let splices = if matches!(ask, Ask::Undo) { opened.undo() } else { opened.redo() };
-                self.told(splices, tell);
+                match project.step(file, matches!(ask, Ask::Undo)) {
+                    Ok(splices) => self.told(splices, tell),
+                    Err(error) => tell.notice = Some(words(&error)),
+                }
                 self.select(project, self.selection.clone());
                 self.outline(project, tell);
                 Change::Still
@@ -390,17 +401,19 @@ impl Session {
         self.file_lines(project).get(at)
     }
 
-    fn stage(&self, project: &Project) -> Stage {
-        Stage::of(self.file_lines(project), self.place(project).frame, self.time(project))
+    /// The frame that is shown.
+    fn shown(&self, project: &Project) -> Arc<Frame> {
+        let place = self.place(project);
+        project.files[place.file].frame(place.frame)
     }
 
     fn select(&mut self, project: &Project, lines: Vec<usize>) {
         let count = self.file_lines(project).len();
-        self.selection.clear();
-        for line in lines.into_iter().filter(|&line| line < count) {
-            self.selection.retain(|&other| other != line);
-            self.selection.push(line);
-        }
+        // Of a line that is named twice the last place counts.
+        let mut named = HashSet::new();
+        let last = |line: &usize| *line < count && named.insert(*line);
+        self.selection = lines.into_iter().rev().filter(last).collect();
+        self.selection.reverse();
     }
 
     fn show(&mut self, project: &Project, frame: usize, tell: &mut Tell) {
@@ -418,6 +431,10 @@ impl Session {
 #[cfg(test)]
 #[path = "session/tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "session/random_tests.rs"]
+mod random_tests;
 
 #[cfg(test)]
 #[path = "session/time_tests.rs"]

@@ -1,11 +1,16 @@
 //! Where objects are seen: the outline of some of them in a picture, from the tracer's own hits.
+//!
+//! Rays go only to where these objects can be, and of a scene with many objects only those are asked that such rays can meet,
+//! by the boxes around them: a script may have a hundred thousand.
 
 use std::fmt::Write;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayfold_scene::Scene;
 use rayfold_tracer::probe::{Found, nearest_hits};
 use rayfold_tracer::{RenderError, RenderOptions, pixel_ray};
+
+use crate::view::{Bounds, Projection};
 
 /// Rays that an outline is made of, at most: a tenth of a second on one core for scenes of a few hundred objects.
 const RAYS: f64 = 60_000.0;
@@ -13,53 +18,171 @@ const RAYS: f64 = 60_000.0;
 /// The same, for one that need not be exact.
 const FEW_RAYS: f64 = 15_000.0;
 
-/// What a pixel of a picture shows, column and row from the upper left.
-///
-/// # Errors
-/// Those of the tracer.
-pub(crate) fn pick(scene: &Scene, column: f64, row: f64) -> Result<Option<Found>, RenderError> {
-    let j = f64::from(scene.screen.height()) - 1.0 - row;
-    let found = nearest_hits(scene, &[pixel_ray(scene, column, j)], &RenderOptions::default())?;
-    Ok(found.into_iter().next().flatten())
+/// Objects up to which all are asked, whatever lies in their way.
+const FEW: usize = 256;
+
+/// By how much boxes are widened, in parts of their coordinates: far more than rounding makes of them.
+const WIDER: f64 = 1e-9;
+
+/// Pixels around where objects end in a picture.
+const MARGIN: f64 = 2.0;
+
+/// A scene as it is seen, and a box around each of its objects.
+#[derive(Clone, Copy)]
+pub(crate) struct View<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) boxes: &'a [Bounds],
 }
 
-/// The edges of what is seen of some objects, as the path of an SVG in pixels of the picture.
-///
-/// # Errors
-/// Those of the tracer.
-pub(crate) fn outline(scene: &Scene, is_in: impl Fn(usize) -> bool) -> Result<String, RenderError> {
-    traced(scene, RAYS, is_in)
+impl View<'_> {
+    /// What a pixel shows, column and row from the upper left.
+    ///
+    /// # Errors
+    /// Those of the tracer.
+    pub(crate) fn pick(&self, column: f64, row: f64) -> Result<Option<Found>, RenderError> {
+        let scene = self.scene;
+        let (origin, direction) = pixel_ray(scene, column, f64::from(scene.screen.height()) - 1.0 - row);
+        let found = self.nearest(&[(origin, direction)], |bounds| meets(bounds, origin, direction))?;
+        Ok(found.into_iter().next().flatten())
+    }
+
+    /// The edges of what is seen of some objects, as the path of an SVG in pixels of the picture.
+    ///
+    /// # Errors
+    /// Those of the tracer.
+    pub(crate) fn outline(&self, is_in: impl Fn(usize) -> bool) -> Result<String, RenderError> {
+        self.traced(RAYS, is_in)
+    }
+
+    /// The same, in coarse steps.
+    ///
+    /// # Errors
+    /// Those of the tracer.
+    pub(crate) fn ghost(&self, is_in: impl Fn(usize) -> bool) -> Result<String, RenderError> {
+        self.traced(FEW_RAYS, is_in)
+    }
+
+    fn traced(&self, rays: f64, is_in: impl Fn(usize) -> bool) -> Result<String, RenderError> {
+        let scene = self.scene;
+        let own = self.boxes.iter().enumerate().filter(|(object, _)| is_in(*object));
+        let Some(around) = own.map(|(_, bounds)| *bounds).reduce(Bounds::with) else {
+            return Ok(String::new());
+        };
+        let size = DVec2::new(scene.screen.width().into(), scene.screen.height().into());
+        let Some((low, high)) = seen(scene, around, size) else { return Ok(String::new()) };
+        let room = high - low;
+        let stride = (room.x * room.y / rays).sqrt().ceil().max(1.0);
+        let (columns, rows) = ((room.x / stride).ceil() as usize, (room.y / stride).ceil() as usize);
+        let last = size.y - 1.0;
+        let ray = |column: f64, row: f64| {
+            let at = low + DVec2::new(column, row) * stride + 0.5 * (stride - 1.0);
+            pixel_ray(scene, at.x, last - at.y)
+        };
+        let rays: Vec<(DVec3, DVec3)> =
+            (0..rows * columns).map(|at| ray((at % columns) as f64, (at / columns) as f64)).collect();
+        let ends = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+            .map(|(x, y)| ray(x * columns as f64 - 0.5, y * rows as f64 - 0.5));
+        let sides = sides(&ends);
+        let found = self.nearest(&rays, |bounds| sides.iter().all(|side| side.lets_in(bounds)))?;
+        let inside: Vec<bool> =
+            found.iter().map(|found| found.is_some_and(|found| is_in(found.object))).collect();
+        Ok(edges(&inside, columns, rows, low, stride))
+    }
+
+    /// What rays meet first, where the objects whose boxes can be met are known.
+    fn nearest(
+        &self,
+        rays: &[(DVec3, DVec3)],
+        can_be_met: impl Fn(&Bounds) -> bool,
+    ) -> Result<Vec<Option<Found>>, RenderError> {
+        let options = RenderOptions::default();
+        if self.scene.objects.len() <= FEW {
+            return nearest_hits(self.scene, rays, &options);
+        }
+        let near: Vec<usize> =
+            self.boxes.iter().enumerate().filter(|(_, b)| can_be_met(b)).map(|(at, _)| at).collect();
+        let objects: Vec<_> = near.iter().map(|&at| self.scene.objects[at].clone()).collect();
+        let few = Scene { objects: objects.into(), ..self.scene.clone() };
+        let found = nearest_hits(&few, rays, &options)?;
+        let in_script = |found: Found| Found { object: near[found.object], ..found };
+        Ok(found.into_iter().map(|found| found.map(in_script)).collect())
+    }
 }
 
-/// The same, in coarse steps.
-///
-/// # Errors
-/// Those of the tracer.
-pub(crate) fn ghost(scene: &Scene, is_in: impl Fn(usize) -> bool) -> Result<String, RenderError> {
-    traced(scene, FEW_RAYS, is_in)
+/// The part of a picture in which a box can be seen; none if it cannot.
+fn seen(scene: &Scene, bounds: Bounds, size: DVec2) -> Option<(DVec2, DVec2)> {
+    let projection = Projection::new(scene);
+    let corner = |at: u8| {
+        let pick = |axis: usize| if at >> axis & 1 == 0 { bounds.low[axis] } else { bounds.high[axis] };
+        projection.point(DVec3::new(pick(0), pick(1), pick(2))).filter(|point| point.is_finite())
+    };
+    // What reaches behind the eye can be anywhere.
+    let corners: Option<Vec<DVec2>> = (0..8).map(corner).collect();
+    let (low, high) = match corners {
+        Some(corners) => (
+            corners.iter().copied().fold(DVec2::INFINITY, DVec2::min) - MARGIN,
+            corners.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max) + MARGIN,
+        ),
+        None => (DVec2::ZERO, size),
+    };
+    let (low, high) = (low.floor().max(DVec2::ZERO), high.ceil().min(size));
+    (low.x < high.x && low.y < high.y).then_some((low, high))
 }
 
-fn traced(scene: &Scene, rays: f64, is_in: impl Fn(usize) -> bool) -> Result<String, RenderError> {
-    let (width, height) = (scene.screen.width(), scene.screen.height());
-    let stride = (f64::from(width) * f64::from(height) / rays).sqrt().ceil().max(1.0);
-    let columns = (f64::from(width) / stride).ceil() as usize;
-    let rows = (f64::from(height) / stride).ceil() as usize;
-    let last = f64::from(height) - 1.0;
-    let rays: Vec<(DVec3, DVec3)> = (0..rows * columns)
-        .map(|at| {
-            let (row, column) = ((at / columns) as f64, (at % columns) as f64);
-            let middle = 0.5 * (stride - 1.0);
-            pixel_ray(scene, column * stride + middle, last - (row * stride + middle))
-        })
-        .collect();
-    let found = nearest_hits(scene, &rays, &RenderOptions::default())?;
-    let inside: Vec<bool> =
-        found.iter().map(|found| found.is_some_and(|found| is_in(found.object))).collect();
-    Ok(edges(&inside, columns, rows, stride))
+/// A box with what rounding may have taken from it.
+fn widened(bounds: &Bounds) -> (DVec3, DVec3) {
+    let by = WIDER * bounds.low.abs().max(bounds.high.abs());
+    (bounds.low - by, bounds.high + by)
+}
+
+/// Whether a ray can meet what is in a box.
+fn meets(bounds: &Bounds, origin: DVec3, direction: DVec3) -> bool {
+    let (low, high) = widened(bounds);
+    let (mut enters, mut leaves) = (0.0_f64, f64::INFINITY);
+    for axis in 0..3 {
+        if direction[axis] == 0.0 {
+            if origin[axis] < low[axis] || origin[axis] > high[axis] {
+                return false;
+            }
+            continue;
+        }
+        let at = [low[axis], high[axis]].map(|side| (side - origin[axis]) / direction[axis]);
+        enters = enters.max(at[0].min(at[1]));
+        leaves = leaves.min(at[0].max(at[1]));
+    }
+    enters <= leaves * (1.0 + WIDER)
+}
+
+/// A plane that has all rays on its one side.
+struct Side {
+    normal: DVec3,
+    height: f64,
+}
+
+impl Side {
+    fn lets_in(&self, bounds: &Bounds) -> bool {
+        let (low, high) = widened(bounds);
+        let furthest = DVec3::select(self.normal.cmpgt(DVec3::ZERO), high, low).dot(self.normal);
+        // That of what has no end may be no number.
+        furthest >= self.height || furthest.is_nan()
+    }
+}
+
+/// The planes between four rays around all others, in their order around them.
+fn sides(ends: &[(DVec3, DVec3); 4]) -> [Side; 4] {
+    let along = |(origin, direction): (DVec3, DVec3)| origin + direction;
+    let inner = ends.iter().map(|&end| along(end)).sum::<DVec3>() / 4.0;
+    [0, 1, 2, 3].map(|at| {
+        let (this, next) = (ends[at], ends[(at + 1) % 4]);
+        let normal = this.1.cross(along(next) - this.0);
+        let normal = if (inner - this.0).dot(normal) < 0.0 { -normal } else { normal };
+        let height = this.0.dot(normal);
+        Side { normal, height: height - WIDER * (height.abs() + normal.length()) }
+    })
 }
 
 /// The edges between cells that are inside and others: runs along rows, then along columns.
-fn edges(inside: &[bool], columns: usize, rows: usize, stride: f64) -> String {
+fn edges(inside: &[bool], columns: usize, rows: usize, low: DVec2, stride: f64) -> String {
     let cell = |column: usize, row: usize| {
         column
             .checked_sub(1)
@@ -79,14 +202,15 @@ fn edges(inside: &[bool], columns: usize, rows: usize, stride: f64) -> String {
                     at += 1;
                     continue;
                 }
-                let (from, line, length) =
-                    (start as f64 * stride, line as f64 * stride, (at - start) as f64 * stride);
-                // Writing to a text cannot fail.
-                let _ = if flat {
-                    write!(path, "M{from} {line}h{length}")
+                let length = (at - start) as f64 * stride;
+                let place = if flat {
+                    DVec2::new(start as f64, line as f64)
                 } else {
-                    write!(path, "M{line} {from}v{length}")
+                    DVec2::new(line as f64, start as f64)
                 };
+                let DVec2 { x, y } = low + stride * place;
+                // Writing to a text cannot fail.
+                let _ = write!(path, "M{x} {y}{}{length}", if flat { 'h' } else { 'v' });
             }
         }
     };
@@ -97,23 +221,34 @@ fn edges(inside: &[bool], columns: usize, rows: usize, stride: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
+    use crate::frame::boxes;
+
+    fn scene(text: &str) -> Scene {
+        let parsed = rayfold_scene::parse("a", text.as_bytes(), &Default::default());
+        parsed.script.unwrap_or_else(|| panic!("{:?}", parsed.diagnostics)).frame(0).unwrap()
+    }
 
     #[test]
     fn edges_surround_what_is_inside() {
         let inside = [false, true, false, false, true, true];
-        assert_eq!(edges(&inside, 3, 2, 2.0), "M2 0h2M4 2h2M2 4h4M2 0v4M4 0v2M6 2v2");
+        let path = edges(&inside, 3, 2, DVec2::ZERO, 2.0);
+        assert_eq!(path, "M2 0h2M4 2h2M2 4h4M2 0v4M4 0v2M6 2v2");
+        assert_eq!(edges(&[true], 1, 1, DVec2::new(5.0, 7.0), 2.0), "M5 7h2M5 9h2M5 7v2M7 7v2");
     }
 
     #[test]
     fn a_pixel_shows_the_object_that_the_picture_shows_there() {
-        let text =
-            "Screen 40 30\nSphere 8  20 15 -20  1 0 0  0 0 0\nBox 0 0 -60  10 10 -50  0 1 0  0 0 0\nTrace";
-        let scene =
-            rayfold_scene::parse("a", text.as_bytes(), &Default::default()).script.unwrap().frame(0).unwrap();
+        let scene = scene(
+            "Screen 40 30\nSphere 8  20 15 -20  1 0 0  0 0 0\nBox 0 0 -60  10 10 -50  0 1 0  0 0 0\nTrace",
+        );
+        let boxes = boxes(&scene);
+        let view = View { scene: &scene, boxes: &boxes };
         let image = rayfold_tracer::render(&scene, &RenderOptions::default()).unwrap();
         for (column, row, pixel) in image.enumerate_pixels() {
-            let found = pick(&scene, column.into(), row.into()).unwrap().map(|found| found.object);
+            let found = view.pick(column.into(), row.into()).unwrap().map(|found| found.object);
             let expected = match pixel.0 {
                 [255, 0, 0] => Some(0),
                 [0, 255, 0] => Some(1),
@@ -121,7 +256,69 @@ mod tests {
             };
             assert_eq!(found, expected, "{column} {row}");
         }
-        assert!(outline(&scene, |object| object == 1).unwrap().starts_with("M0 19h"));
-        assert_eq!(outline(&scene, |_| false).unwrap(), "");
+        assert!(view.outline(|object| object == 1).unwrap().starts_with("M0 19h"));
+        assert_eq!(view.outline(|_| false).unwrap(), "");
+    }
+
+    /// Of many objects few are asked, which is not to be seen: every pixel shows what the picture shows, and outlines are
+    /// those of the picture.
+    #[test]
+    fn of_many_objects_a_pixel_shows_what_the_picture_shows() {
+        let cameras =
+            ["Look 3 4 9  0 0 0  50", "Orthocamera", "Camera 0 0 0.5  0.2 0 -1  0 1 0  1  -1 -0.6  1 0.6"];
+        for camera in cameras {
+            let place = |i: u32| match camera {
+                "Orthocamera" => [i % 21 * 4, i / 21 * 3, 0].map(f64::from),
+                _ => [f64::from(i % 21) * 0.5 - 5.0, f64::from(i % 5) - 2.0, f64::from(i / 21) - 9.0],
+            };
+            let mut text = format!("Screen 80 48\n{camera}\n");
+            for i in 0..400 {
+                let [x, y, z] = place(i);
+                let (red, green) = (f64::from(i / 20) / 20.0, f64::from(i % 20) / 20.0);
+                let radius = if camera == "Orthocamera" { 2.5 } else { 0.4 };
+                text += &match i % 3 {
+                    0 => format!("Sphere {radius} {x} {y} {z}  {red} {green} 1  0 0 0\n"),
+                    1 => format!("Disc {radius} {x} {y} {z}  1 2 3  {red} {green} 1  0 0 0\n"),
+                    _ => format!(
+                        "Box {x} {y} {z} {} {} {}  {red} {green} 1  0 0 0\n",
+                        x + radius,
+                        y + 0.2,
+                        z + 0.3
+                    ),
+                };
+            }
+            text += "Plane 0 -9 0  0 1 0  0 0 0.5  0 0 0\nTrace";
+            let scene = scene(&text);
+            assert!(scene.objects.len() > FEW);
+            let boxes = boxes(&scene);
+            let view = View { scene: &scene, boxes: &boxes };
+            let image = rayfold_tracer::render(&scene, &RenderOptions::default()).unwrap();
+            let shown = |pixel: &[u8; 3]| match pixel {
+                [.., 0] => None,
+                [.., 128] => Some(400),
+                [red, green, _] => {
+                    let step = |level: u8| (f64::from(level) / 255.0 * 20.0).round() as usize;
+                    Some(step(*red) * 20 + step(*green))
+                }
+            };
+            let mut seen = BTreeSet::new();
+            for (column, row, pixel) in image.enumerate_pixels() {
+                let found = view.pick(column.into(), row.into()).unwrap().map(|found| found.object);
+                assert_eq!(found, shown(&pixel.0), "{camera}: {column} {row}");
+                seen.extend(found);
+            }
+            assert!(seen.len() > 50, "{}", seen.len());
+            for object in seen {
+                let inside: Vec<_> = image.pixels().map(|pixel| shown(&pixel.0) == Some(object)).collect();
+                let expected = edges(&inside, 80, 48, DVec2::ZERO, 1.0);
+                let told = view.outline(|other| other == object).unwrap();
+                assert_eq!(pieces(&told), pieces(&expected), "{camera}: {object}");
+            }
+        }
+    }
+
+    /// The parts of a path, whatever their order.
+    fn pieces(path: &str) -> BTreeSet<&str> {
+        path.split('M').skip(1).collect()
     }
 }

@@ -1,5 +1,6 @@
 //! What would be sent of a project: checked, counted, and drawn in part to see what it takes.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
@@ -23,7 +24,7 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// Scripts of a project that are in order, as they stand on the page.
 #[derive(Debug)]
 pub(super) struct Ready {
-    scripts: Vec<(ScriptName, Bytes, Script)>,
+    scripts: Vec<(ScriptName, Bytes, Arc<Script>)>,
     settings: AnimationSettings,
     frames: u64,
     size: Screen,
@@ -113,14 +114,14 @@ impl Ready {
             }
             frames += script.frame_count() as u64;
             let script_name = ScriptName::new(name).map_err(|error| refused(words(&error)))?;
-            scripts.push((script_name, file.document.bytes().into(), script.clone()));
+            scripts.push((script_name, file.document.bytes().into(), Arc::clone(script)));
         }
         let Some((size, _)) = size else { return Err(Refusal::new("nothing is rendered: expected a Trace")) };
-        match project.settings.frames() {
+        match project.settings().frames() {
             Some(expected) if frames < expected => Err(Refusal::new(format!(
                 "animation.json says {expected} frames, but the scripts give {frames}"
             ))),
-            _ => Ok(Self { scripts, settings: project.settings, frames, size }),
+            _ => Ok(Self { scripts, settings: project.settings(), frames, size }),
         }
     }
 

@@ -46,7 +46,8 @@ impl Session {
         if !matches!(role(command), Role::Object | Role::Light) {
             return;
         }
-        let stage = self.stage(project);
+        let shown = self.shown(project);
+        let stage = &shown.stage;
         let (mut ground, mut size) = (DVec3::ZERO, 1.0);
         if let Some(scene) = self.scene(project) {
             let projection = Projection::new(&scene);
@@ -72,7 +73,7 @@ impl Session {
         }
         let count = stage.objects.len() + stage.lights.len();
         let line = edits::new_line(command, ground, size, count);
-        let (splices, place) = edits::add(self.file_lines(project), &stage, line);
+        let (splices, place) = edits::add(self.file_lines(project), stage, line);
         self.edit(project, splices, None, tell);
         self.select(project, vec![place]);
         self.outline(project, tell);
@@ -80,9 +81,9 @@ impl Session {
 
     /// Lines become a group, which is selected then.
     pub(super) fn group(&mut self, project: &mut Project, lines: &[usize], tell: &mut Tell) {
-        let stage = self.stage(project);
-        let Some(scene) = self.sound_scene(project, &stage) else { return };
-        match groups::group(self.file_lines(project), &stage, &scene, lines) {
+        let shown = self.shown(project);
+        let Some(scene) = self.sound_scene(project) else { return };
+        match groups::group(self.file_lines(project), &shown.stage, &scene, lines) {
             Ok((splices, place)) => {
                 self.edit(project, splices, None, tell);
                 self.select(project, vec![place]);

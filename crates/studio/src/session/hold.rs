@@ -59,8 +59,8 @@ impl Session {
         let all = matches!(grip, Grip::Body | Grip::Axis { .. });
         let main = self.selection.last().copied();
         let lines = self.selection.iter().rev().copied().filter(|&line| all || Some(line) == main);
-        let stage = self.stage(project);
-        let lines = lines.filter(|&line| !stage.is_in_group(line) && !self.is_locked(project, line));
+        let shown = self.shown(project);
+        let lines = lines.filter(|&line| !shown.stage.is_in_group(line) && !self.is_locked(project, line));
         let lines = lines.filter_map(|line| Some((line, self.line(project, line)?.clone()))).collect();
         let keying = self.keying(project);
         self.held = Drag::new(grip, lines, grabbed, around, keying).map(|drag| Held::Drag(drag, at));

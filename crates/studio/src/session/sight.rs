@@ -1,5 +1,8 @@
 //! What is seen: the scene of the viewport, what lies under a point of it, and from where it is looked at.
 
+use std::collections::HashSet;
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
 use rayfold_scene::{Camera, Command, Pinhole, Scene, Screen};
 
@@ -8,10 +11,10 @@ use crate::document::Splice;
 use crate::edits;
 use crate::extent;
 use crate::line::Line;
+use crate::pictures::Motion;
 use crate::project::Project;
 use crate::protocol::{Navigation, Standpoint, Tell};
-use crate::silhouette;
-use crate::stage::Stage;
+use crate::silhouette::View;
 use crate::view::{Bounds, Orbit, Projection};
 
 /// Pixels of a picture, at most.
@@ -23,8 +26,7 @@ const GRID: i32 = 10;
 impl Session {
     /// What the viewport shows.
     pub(super) fn scene(&self, project: &Project) -> Option<Scene> {
-        let place = self.place(project);
-        let mut scene = project.files[place.file].script.as_ref()?.frame(place.frame)?;
+        let mut scene = self.shown(project).scene.clone()?;
         let (width, height) = (f64::from(self.size.0), f64::from(self.size.1));
         match (&self.free, &scene.camera) {
             (Some(orbit), _) => {
@@ -42,41 +44,49 @@ impl Session {
         Some(scene)
     }
 
+    /// What becomes of it while its shutter is open.
+    pub(super) fn motion(&self, project: &Project, scene: &Scene) -> Option<Motion> {
+        let place = self.place(project);
+        let script = project.files[place.file].script.as_ref().filter(|_| scene.shutter.open() > 0.0)?;
+        Some(Motion { script: Arc::clone(script), frame: place.frame, is_free: self.free.is_some() })
+    }
+
     /// The same, if its objects are those of the lines.
-    pub(super) fn sound_scene(&self, project: &Project, stage: &Stage) -> Option<Scene> {
+    pub(super) fn sound_scene(&self, project: &Project) -> Option<Scene> {
         let is_sound = project.files[self.place(project).file].is_sound();
-        self.scene(project).filter(|scene| is_sound && scene.objects.len() == stage.object_count())
+        let count = self.shown(project).stage.object_count();
+        self.scene(project).filter(|scene| is_sound && scene.objects.len() == count)
     }
 
     pub(super) fn bounds(&self, project: &Project) -> Bounds {
-        let place = self.place(project);
-        let script = project.files[place.file].script.as_ref();
-        let scene = script.and_then(|script| script.frame(place.frame));
+        let shown = self.shown(project);
         let lamps = || {
-            let (lines, time) = (self.file_lines(project), self.time(project));
-            let lights = self.stage(project).lights.into_iter().filter_map(|line| lines.get(line));
-            edits::places(lights.collect::<Vec<_>>(), time)
+            let lines = self.file_lines(project);
+            let lights = shown.stage.lights.iter().filter_map(|&line| lines.get(line));
+            edits::places(lights.collect::<Vec<_>>(), shown.time)
         };
-        scene
-            .and_then(|scene| extent::bounds(scene.objects.iter()))
-            .or_else(lamps)
-            .unwrap_or(Bounds { low: DVec3::splat(-1.0), high: DVec3::splat(1.0) })
+        shown.bounds().or_else(lamps).unwrap_or(Bounds { low: DVec3::splat(-1.0), high: DVec3::splat(1.0) })
     }
 
     /// Where what is selected is.
     fn selected_bounds(&self, project: &Project) -> Option<Bounds> {
-        let stage = self.stage(project);
-        let objects = self.sound_scene(project, &stage).and_then(|scene| {
+        let (shown, chosen) = (self.shown(project), self.chosen());
+        let objects = self.sound_scene(project).and_then(|scene| {
             let own = scene
                 .objects
                 .iter()
                 .enumerate()
-                .filter(|(at, _)| stage.line_of(*at).is_some_and(|line| self.selection.contains(&line)));
+                .filter(|(at, _)| shown.stage.line_of(*at).is_some_and(|line| chosen.contains(&line)));
             extent::bounds(own.map(|(_, object)| object))
         });
-        let lights = self.selection.iter().filter(|line| stage.lights.contains(line));
+        let lights = shown.stage.lights.iter().filter(|line| chosen.contains(*line));
         let lights = lights.filter_map(|&line| self.line(project, line));
-        objects.or_else(|| edits::places(lights.collect::<Vec<_>>(), self.time(project)))
+        objects.or_else(|| edits::places(lights.collect::<Vec<_>>(), shown.time))
+    }
+
+    /// What is selected, to be looked up.
+    pub(super) fn chosen(&self) -> HashSet<usize> {
+        self.selection.iter().copied().collect()
     }
 
     /// Where lights without a place are shown.
@@ -93,23 +103,27 @@ impl Session {
 
     /// The line of the object under a point of the picture, and where it was hit.
     pub(super) fn pick(&self, project: &Project, x: f64, y: f64) -> Option<(usize, DVec3)> {
-        let stage = self.stage(project);
-        let scene = self.sound_scene(project, &stage)?;
+        let shown = self.shown(project);
+        let scene = self.sound_scene(project)?;
         let (column, row) = (x.floor(), y.floor());
         let inside = (0.0..f64::from(scene.screen.width())).contains(&column)
             && (0.0..f64::from(scene.screen.height())).contains(&row);
-        let found = if inside { silhouette::pick(&scene, column, row).ok().flatten()? } else { return None };
+        let view = View { scene: &scene, boxes: shown.boxes() };
+        let found = if inside { view.pick(column, row).ok().flatten()? } else { return None };
         let (origin, direction) = Projection::new(&scene).ray(DVec2::new(column + 0.5, row + 0.5));
-        let line = stage.line_of(found.object)?;
+        let line = shown.stage.line_of(found.object)?;
         (!self.is_locked(project, line)).then(|| (line, origin + found.distance * direction))
     }
 
     /// The outline of some lines' objects.
-    fn outline_of(&self, project: &Project, stage: &Stage, is_in: impl Fn(usize) -> bool) -> Option<String> {
-        let scene = self.sound_scene(project, stage)?;
-        let is_any = stage.objects.iter().any(|&line| is_in(line));
-        let is_in = |object: usize| stage.line_of(object).is_some_and(&is_in);
-        if is_any { silhouette::outline(&scene, is_in).ok() } else { None }
+    fn outline_of(&self, project: &Project, is_in: impl Fn(usize) -> bool) -> Option<String> {
+        let shown = self.shown(project);
+        if !shown.stage.objects.iter().any(|&line| is_in(line)) {
+            return None;
+        }
+        let scene = self.sound_scene(project)?;
+        let view = View { scene: &scene, boxes: shown.boxes() };
+        view.outline(|object| shown.stage.line_of(object).is_some_and(&is_in)).ok()
     }
 
     /// What is under the pointer now, and its outline, if that is something else than before.
@@ -118,16 +132,15 @@ impl Session {
         tell.hovered = Some(line);
         if line != self.hovered {
             self.hovered = line;
-            let stage = self.stage(project);
             let path = line.filter(|line| !self.selection.contains(line));
-            let path = path.and_then(|line| self.outline_of(project, &stage, |other| other == line));
+            let path = path.and_then(|line| self.outline_of(project, |other| other == line));
             tell.hover_outline = Some(path.unwrap_or_default());
         }
     }
 
     pub(super) fn outline(&self, project: &Project, tell: &mut Tell) {
-        let stage = self.stage(project);
-        let path = self.outline_of(project, &stage, |line| self.selection.contains(&line));
+        let chosen = self.chosen();
+        let path = self.outline_of(project, |line| chosen.contains(&line));
         tell.outline = Some(path.unwrap_or_default());
         tell.ghosts = Some(self.ghosts(project));
     }
@@ -170,15 +183,11 @@ impl Session {
     }
 
     pub(super) fn keep_camera(&mut self, project: &mut Project, tell: &mut Tell) -> Change {
-        let place = self.place(project);
-        let Some(screen) =
-            project.files[place.file].script.as_ref().and_then(|script| script.frame(place.frame))
-        else {
-            return Change::Nothing;
-        };
-        let aspect = f64::from(screen.screen.width()) / f64::from(screen.screen.height());
+        let shown = self.shown(project);
+        let Some(scene) = &shown.scene else { return Change::Nothing };
+        let aspect = f64::from(scene.screen.width()) / f64::from(scene.screen.height());
         let Some(Ok(camera)) = self.free.map(|orbit| orbit.camera(aspect)) else { return Change::Nothing };
-        let stage = self.stage(project);
+        let stage = &shown.stage;
         let lines = self.file_lines(project);
         let numbers = camera_numbers(&camera, self.step(project));
         let old = stage.camera.filter(|&at| lines[at].command() == Some(Command::Camera));

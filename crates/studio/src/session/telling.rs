@@ -18,6 +18,12 @@ use crate::view::Projection;
 
 impl Session {
     pub(super) fn answer(&mut self, project: &Project, mut tell: Tell, change: Change) -> Answer {
+        // An outline is that of a picture: with another one it is drawn anew, or goes while things move.
+        match change {
+            Change::Still if tell.outline.is_none() => self.outline(project, &mut tell),
+            Change::Moving if tell.outline.is_none() => tell.outline = Some(String::new()),
+            Change::Still | Change::Moving | Change::Nothing => {}
+        }
         let files: Vec<_> = project
             .files
             .iter()
@@ -37,7 +43,8 @@ impl Session {
             (change, Some(scene)) => {
                 self.pictures = self.pictures.wrapping_add(1);
                 let moving = change == Change::Moving;
-                Some(Wanted { scene: scene.clone(), moving, number: self.pictures })
+                let motion = self.motion(project, scene);
+                Some(Wanted { scene: scene.clone(), motion, moving, number: self.pictures })
             }
         };
         if change != Change::Nothing {
@@ -56,19 +63,19 @@ impl Session {
         let mut shown = Vec::new();
         let mut grid = String::new();
         let (mut way, mut marks) = (String::new(), String::new());
-        let (stage, time) = (self.stage(project), self.time(project));
+        let now = self.shown(project);
         if let Some(scene) = scene {
             let projection = Projection::new(scene);
             let around = self.around(project);
             if !matches!(self.held, Some(Held::Turn(_)))
                 && let Some(&line) = self.selection.last()
-                && let Some(values) = lines.get(line).and_then(|text| Values::of(text, time))
-                && !stage.is_in_group(line)
+                && let Some(values) = lines.get(line).and_then(|text| Values::of(text, now.time))
+                && !now.stage.is_in_group(line)
                 && !self.is_locked(project, line)
             {
                 shown = handles(line, &values, &projection, around);
             }
-            (way, marks) = self.motion_path(project, &projection, &stage);
+            (way, marks) = self.motion_path(project, &projection, &now.stage);
             if self.free.is_some() {
                 grid = grid_path(&projection, self.bounds(project));
             }
@@ -89,11 +96,12 @@ impl Session {
         State {
             asked: self.asked,
             title: project.name.clone(),
-            fps: project.settings.fps(),
+            fps: project.settings().fps(),
             frame: self.frame.min(project.frame_count() - 1),
             frames: project.frame_count(),
             file: place.file,
             saved: file.saved(),
+            failure: file.failure().to_owned(),
             can_undo: file.document.can_undo(),
             can_redo: file.document.can_redo(),
             selection: self.selection.clone(),

@@ -35,6 +35,11 @@ impl Desk {
         String::from_utf8(self.project.files[0].document.bytes()).unwrap()
     }
 
+    /// What the file holds.
+    pub(super) fn on_disk(&self) -> String {
+        fs::read_to_string(&self.path).unwrap()
+    }
+
     pub(super) fn state(&mut self) -> State {
         self.ask(Ask::Hover { x: -1.0, y: -1.0 }).tell.state.unwrap()
     }
@@ -84,6 +89,24 @@ fn a_drag_changes_one_line_and_one_undo_takes_it_back() {
     assert!(!desk.state().can_undo);
     desk.ask(Ask::Redo);
     assert_eq!(desk.text(), text);
+}
+
+#[test]
+fn an_outline_is_that_of_the_picture_also_in_another_size_and_with_other_numbers() {
+    let mut desk = Desk::new(TEXT);
+    desk.ask(Ask::Size { width: 160, height: 90 });
+    let small = desk.ask(Ask::Select { lines: vec![4] }).tell.outline.unwrap();
+    let large = desk.ask(Ask::Size { width: 320, height: 180 }).tell.outline.unwrap();
+    assert!(small.starts_with('M') && large.starts_with('M') && small != large);
+    let set = |gesture| Ask::Set { line: 4, first: 0, values: vec![0.5], gesture };
+    assert_eq!(desk.ask(set(Some(1))).tell.outline.as_deref(), Some(""), "while a slider moves");
+    let done = Ask::Set { line: 4, first: 0, values: vec![], gesture: None };
+    let thinner = desk.ask(done).tell.outline.unwrap();
+    assert!(thinner.starts_with('M') && thinner != large);
+    assert_ne!(
+        desk.ask(Ask::Text { line: 4, text: "Sphere 2 0 1 0 0 0 0 1 1 1".into() }).tell.outline,
+        Some(thinner)
+    );
 }
 
 #[test]
@@ -206,7 +229,7 @@ fn touching_one_object_of_each_example_changes_its_line_alone() {
         let project = Project::open(&entry).unwrap();
         let text = String::from_utf8(project.files[0].document.bytes()).unwrap();
         let mut desk = Desk::new(&text);
-        let objects = desk.session.stage(&desk.project).objects;
+        let objects = desk.session.shown(&desk.project).stage.objects.clone();
         for line in objects.into_iter().take(12) {
             desk.ask(Ask::Nudge { lines: vec![line], by: [1.0, 0.0, 0.0] });
             desk.project.save(true);

@@ -9,10 +9,12 @@ use super::sight::picture_of;
 use super::{Change, Session};
 use crate::document::Splice;
 use crate::edits;
+use crate::error::words;
+use crate::frame::Frame;
 use crate::line::Line;
 use crate::project::Project;
 use crate::protocol::{Ghost, Inspected, Switch, Tell, TimeState, TimeWish};
-use crate::silhouette;
+use crate::silhouette::View;
 use crate::stage::Stage;
 use crate::tables::FieldTable;
 use crate::tracks::{self, KeyPlace, Tracks};
@@ -65,9 +67,7 @@ impl HeldKeys {
 impl Session {
     /// The time of the frame that is shown.
     pub(super) fn time(&self, project: &Project) -> f64 {
-        let place = self.place(project);
-        let script = project.files[place.file].script.as_ref();
-        script.and_then(|script| script.frame_number(place.frame)).unwrap_or(1.0)
+        self.shown(project).time
     }
 
     /// How a change is written that is made now.
@@ -135,8 +135,15 @@ impl Session {
                 let mode = Mode::ALL.iter().copied().find(|known| known.name() == mode);
                 set(mode.map(|mode| tracks::eased(lines, &keys, mode, cycle)).unwrap_or_default())
             }
+            TimeWish::Pace { fps } => {
+                let file = self.place(project).file;
+                if let Err(error) = project.set_fps(file, fps) {
+                    tell.notice = Some(words(&error));
+                }
+                return Change::Nothing;
+            }
             TimeWish::Frames { count } => {
-                edits::set_frames(lines, &self.stage(project), count.clamp(1, FRAMES))
+                edits::set_frames(lines, &self.shown(project).stage, count.clamp(1, FRAMES))
             }
         };
         self.edit(project, splices, None, tell);
@@ -164,12 +171,12 @@ impl Session {
 
     /// The tracks, if the page knows others.
     pub(super) fn new_tracks(&mut self, project: &Project) -> Option<Tracks> {
-        let tracks = tracks::tracks(self.file_lines(project));
-        if self.tracks.as_ref() == Some(&tracks) {
+        let tracks = project.files[self.place(project).file].tracks();
+        if self.tracks.as_ref() == Some(tracks) {
             return None;
         }
         self.tracks = Some(tracks.clone());
-        Some(tracks)
+        self.tracks.clone()
     }
 
     /// The parameters of a line, as they are now.
@@ -260,18 +267,21 @@ impl Session {
         let (first, last) = self.range(project);
         let step = (i64::from(last - first) / PARTS).max(1);
         let number = self.time(project) as i64;
-        let lines = file.document.lines();
+        let (lines, chosen) = (file.document.lines(), self.chosen());
         let one = |after: i64| {
             let time = number + after * step;
             if !(i64::from(first)..=i64::from(last)).contains(&time) {
                 return None;
             }
             let frame = usize::try_from(place.frame as i64 + after * step).ok()?;
-            let scene = picture_of(script.frame(frame)?, &now);
-            let stage = Stage::of(lines, frame, time as f64);
-            let is_in = |object| stage.line_of(object).is_some_and(|line| self.selection.contains(&line));
-            let is_drawn = stage.objects.iter().any(|line| self.selection.contains(line));
-            let path = if is_drawn { silhouette::ghost(&scene, is_in).ok()? } else { String::new() };
+            let then = Frame::new(Some(script), lines, frame);
+            if !then.stage.objects.iter().any(|line| chosen.contains(line)) {
+                return None;
+            }
+            let scene = picture_of(then.scene.clone()?, &now);
+            let view = View { scene: &scene, boxes: then.boxes() };
+            let is_in = |object| then.stage.line_of(object).is_some_and(|line| chosen.contains(&line));
+            let path = view.ghost(is_in).ok()?;
             (!path.is_empty()).then_some(Ghost { path, after: after as i32 })
         };
         (-GHOSTS..=GHOSTS).filter(|after| *after != 0).filter_map(one).collect()

@@ -1,8 +1,5 @@
 //! Keys, groups and locks, without a browser.
 
-use proptest::prelude::*;
-use proptest::test_runner::{Config, TestRunner};
-
 use super::tests::Desk;
 use super::*;
 use crate::handles::{Grip, Manner};
@@ -229,98 +226,15 @@ fn an_object_added_at_a_later_frame_comes_before_the_trace() {
     assert!(desk.project.files[0].is_sound(), "{}", desk.text());
 }
 
-/// A random wish; what it concerns need not be there.
-fn wishes() -> impl Strategy<Value = Ask> {
-    let line = || 0..18usize;
-    let keys = || {
-        let one = (line(), 0..8usize, 0..6u32)
-            .prop_map(|(at, number, frame)| key(at, number, f64::from(frame * 10 + 1)));
-        prop::collection::vec(one, 0..4)
-    };
-    let lines = || prop::collection::vec(line(), 0..4);
-    let step = || -3.0..3.0f64;
-    let mode =
-        prop_oneof![Just("linear"), Just("smooth"), Just("step"), Just("none")].prop_map(str::to_owned);
-    let switch = prop_oneof![Just(Switch::AutoKey), Just(Switch::Path), Just(Switch::Onion)];
-    let wish = prop_oneof![
-        (switch, any::<bool>()).prop_map(|(what, on)| TimeWish::Switch { what, on }),
-        lines().prop_map(|lines| TimeWish::Key { lines }),
-        (line(), prop::collection::vec(0..9usize, 0..3))
-            .prop_map(|(line, numbers)| TimeWish::Toggle { line, numbers }),
-        keys().prop_map(|keys| TimeWish::Grab { keys }),
-        (-20..20i32).prop_map(|by| TimeWish::Move { by: by.into() }),
-        keys().prop_map(|keys| TimeWish::Remove { keys }),
-        keys().prop_map(|keys| TimeWish::Copy { keys }),
-        Just(TimeWish::Paste),
-        (keys(), mode, any::<bool>()).prop_map(|(keys, mode, cycle)| TimeWish::Ease { keys, mode, cycle }),
-        (1..80u32).prop_map(|count| TimeWish::Frames { count }),
-    ];
-    let point = || (0.0..64.0f64, 0.0..36.0f64);
-    prop_oneof![
-        6 => wish.prop_map(|wish| Ask::Time { wish }),
-        2 => (0..60usize, any::<bool>()).prop_map(|(frame, moving)| Ask::Frame { frame, moving }),
-        2 => (line(), 0..9usize, prop::collection::vec(step(), 0..3), prop::option::of(0..3u64))
-            .prop_map(|(line, first, values, gesture)| Ask::Set { line, first, values, gesture }),
-        2 => (point(), any::<bool>()).prop_map(|((x, y), extend)| Ask::Press { x, y, extend, grip: None, line: None }),
-        3 => (point(), any::<[bool; 3]>()).prop_map(|((x, y), [upright, snap, whole])| Ask::Drag {
-            x, y, manner: Manner { upright, snap, whole },
-        }),
-        2 => Just(Ask::Release),
-        2 => lines().prop_map(|lines| Ask::Select { lines }),
-        1 => (lines(), [step(), step(), step()]).prop_map(|(lines, by)| Ask::Nudge { lines, by }),
-        1 => lines().prop_map(|lines| Ask::Group { lines }),
-        1 => line().prop_map(|line| Ask::Ungroup { line }),
-        1 => lines().prop_map(|lines| Ask::Duplicate { lines }),
-        1 => lines().prop_map(|lines| Ask::Remove { lines }),
-        1 => lines().prop_map(|lines| Ask::Hide { lines }),
-        1 => lines().prop_map(|lines| Ask::Lock { lines }),
-        1 => lines().prop_map(|lines| Ask::Ground { lines }),
-        1 => lines().prop_map(|lines| Ask::Drop { lines }),
-        1 => (lines(), Just("gold".to_owned())).prop_map(|(lines, preset)| Ask::Preset { lines, preset }),
-        1 => (lines(), Just("grey".to_owned())).prop_map(|(lines, material)| Ask::Surface { lines, material }),
-        1 => (line(), any::<bool>()).prop_map(|(line, down)| Ask::Reorder { line, down }),
-        1 => Just(Ask::Add { command: "Torus".into(), at: None }),
-        3 => Just(Ask::Undo),
-        1 => Just(Ask::Redo),
-    ]
-}
-
-/// Edits of all kinds, of keys too: what the page was told is what the script says, and undoing all gives its first bytes.
 #[test]
-fn ten_thousand_wishes_and_undos_end_in_the_same_bytes() {
-    let mut runner = TestRunner::new(Config { cases: 20, max_shrink_iters: 200, ..Config::default() });
-    runner
-        .run(&prop::collection::vec(wishes(), 500), |asks| {
-            let mut desk = small();
-            let mut page: Vec<String> =
-                TEXT.split('\n').map(|line| line.trim_end_matches('\r').to_owned()).collect();
-            let mut hear = |desk: &Desk, answer: Answer| {
-                for told in answer.tell.splices {
-                    let lines = told.lines.into_iter().map(|line| line.text);
-                    page.splice(told.at..told.at + told.removed, lines);
-                }
-                let lines: Vec<_> = desk.project.files[0].document.lines().iter().map(Line::text).collect();
-                prop_assert_eq!(&page, &lines, "what is told is what was done");
-                Ok(())
-            };
-            for ask in asks {
-                let answer = desk.ask(ask);
-                hear(&desk, answer)?;
-            }
-            desk.ask(Ask::Release);
-            let edited = desk.text();
-            let mut steps = 0;
-            while desk.project.files[0].document.can_undo() {
-                let answer = desk.ask(Ask::Undo);
-                hear(&desk, answer)?;
-                steps += 1;
-            }
-            prop_assert_eq!(desk.text(), TEXT);
-            for _ in 0..steps {
-                desk.ask(Ask::Redo);
-            }
-            prop_assert_eq!(desk.text(), edited);
-            Ok(())
-        })
-        .unwrap();
+fn the_pace_is_set_and_undone() {
+    let mut desk = small();
+    time(&mut desk, TimeWish::Pace { fps: 24.0 });
+    assert_eq!((desk.state().fps, desk.state().can_undo), (24.0, true));
+    let answer = time(&mut desk, TimeWish::Pace { fps: 0.0 });
+    assert!(answer.tell.notice.unwrap().contains("0.01"), "what would be right");
+    desk.ask(Ask::Undo);
+    assert_eq!((desk.state().fps, desk.state().can_undo), (10.0, false));
+    desk.ask(Ask::Redo);
+    assert_eq!(desk.state().fps, 24.0);
 }

@@ -129,7 +129,7 @@ export function Notices(): JSX.Element {
       )}
       {now?.saved === "conflict" && (
         <p>
-          {file} was changed by another program meanwhile.{" "}
+          {file} was changed or deleted by another program meanwhile.{" "}
           <button type="button" onClick={() => ask({ ask: "resolve", "keep-mine": true })}>
             Keep what is here
           </button>
@@ -138,6 +138,7 @@ export function Notices(): JSX.Element {
           </button>
         </p>
       )}
+      {now?.failure && <p>{now.failure}. What you change stays here, and is written as soon as that is possible.</p>}
       {notice.value && (
         <p>
           {notice.value}{" "}
@@ -157,7 +158,10 @@ export function Keys(): JSX.Element | null {
       class="keys"
       aria-labelledby="keys-title"
       ref={(dialog) => {
-        if (dialog && !dialog.open) dialog.showModal();
+        if (!dialog || dialog.open) return;
+        dialog.showModal();
+        // The focus goes to the button at its end.
+        dialog.scrollTop = 0;
       }}
       onClose={() => (help.value = false)}
     >

@@ -6,6 +6,7 @@ import { actions } from "./actions";
 import { Button } from "./button";
 import type { Field, Inspected } from "./protocol";
 import { wish } from "./keys";
+import { NumberField } from "./number";
 import { ask, commands, gesture, lines, select, selection, state } from "./store";
 
 /** The gesture of the slider that is being moved. */
@@ -28,7 +29,7 @@ export function Inspector(): JSX.Element {
   const fields = inspected?.material ? all.filter((field) => field.first < inspected.values.length - 1) : all;
   return (
     <section class="panel inspector" aria-labelledby="inspector-title">
-      <h2 id="inspector-title">{table ? [table.name, inspected?.subject, line?.name && `(${line.name})`].filter(Boolean).join(" ") : "Nothing selected"}</h2>
+      <h2 id="inspector-title">{table ? [table.name, inspected?.subject, line?.name && `(${line.name})`].filter(Boolean).join(" ") : count > 0 ? "No command" : "Nothing selected"}</h2>
       {count > 0 && (
         <div class="buttons">
           <Button action={actions.duplicate} />
@@ -44,7 +45,7 @@ export function Inspector(): JSX.Element {
       {count > 1 && <p class="note">{count} lines are selected; moving, dropping and hiding concern all of them.</p>}
       {inspected && fields.map((field) => <FieldRow key={`${inspected.line}:${field.first}`} field={field} inspected={inspected} />)}
       {inspected?.material && <MaterialRow name={inspected.material} />}
-      {!inspected && <p class="note">Click something in the picture or in the list.</p>}
+      {!inspected && <p class="note">{count > 0 ? "What is selected has no numbers to set; see the script." : "Click something in the picture or in the list."}</p>}
     </section>
   );
 }
@@ -163,16 +164,7 @@ function NumberRow({ field, inspected, name, index, value, slider }: NumberProps
     <p class="number">
       <span aria-hidden="true">{name}</span>
       <KeyButton inspected={inspected} numbers={[at]} label={label} />
-      <input
-        type="number"
-        step="any"
-        aria-label={label}
-        value={value === undefined ? "" : round(value)}
-        placeholder="0"
-        onChange={(event) => {
-          if (event.currentTarget.value !== "") set(inspected.line, at, [event.currentTarget.valueAsNumber], null);
-        }}
-      />
+      <NumberField label={label} value={value === undefined ? undefined : round(value)} set={(asked) => set(inspected.line, at, [asked], null)} />
       {slider && (
         <input
           type="range"

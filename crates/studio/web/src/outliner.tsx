@@ -33,6 +33,11 @@ const renaming = signal<number | null>(null);
 /** Where a range of rows begins that is selected with the shift key. */
 const anchor = signal(0);
 
+/** Gives a new field the focus; the same function each time, so that it is done once. */
+const focused = (input: HTMLInputElement | null): void => {
+  input?.focus();
+  input?.select();
+};
 
 export function Outliner(): JSX.Element {
   const rows = listed.value;
@@ -125,8 +130,8 @@ function Row({ at, row, line, rows }: RowProps): JSX.Element {
       <input
         class="rename"
         aria-label={`Name of ${line.command ?? ""}`}
-        value={line.name ?? ""}
-        ref={(input) => input?.focus()}
+        defaultValue={line.name ?? ""}
+        ref={focused}
         onBlur={rename}
         onKeyDown={(event) => {
           event.stopPropagation();

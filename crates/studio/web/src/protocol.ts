@@ -126,6 +126,7 @@ export type TimeWish =
   | { readonly do: "move"; readonly by: number }
   | { readonly do: "paste" }
   | { readonly do: "ease"; readonly keys: readonly KeyPlace[]; readonly mode: Mode; readonly cycle: boolean }
+  | { readonly do: "pace"; readonly fps: number }
   | { readonly do: "frames"; readonly count: number };
 
 export interface State {
@@ -137,6 +138,8 @@ export interface State {
   readonly frames: number;
   readonly file: number;
   readonly saved: "yes" | "soon" | "conflict" | "failed";
+  /** Why it cannot be written. */
+  readonly failure: string;
   readonly canUndo: boolean;
   readonly canRedo: boolean;
   readonly selection: readonly number[];
@@ -224,5 +227,5 @@ export type Ask =
   | { readonly ask: "time"; readonly wish: TimeWish }
   | { readonly ask: "resolve"; readonly "keep-mine": boolean };
 
-/** Bytes before the pixels of a picture: number, width, height, microseconds; little-endian. */
-export const PICTURE_HEADER = 16;
+/** Bytes before the pixels of a picture: number, width, height, microseconds, 1 if it stays as it is; little-endian. */
+export const PICTURE_HEADER = 20;

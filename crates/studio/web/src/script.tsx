@@ -71,10 +71,10 @@ function Row({ at, line }: { readonly at: number; readonly line: Line | undefine
   useEffect(() => {
     const element = input.current;
     if (!element) return;
-    // What was typed since is not overwritten by its own echo.
+    // What was typed since is overwritten neither by its own echo nor by what stood there before.
     const echo = sent.current.indexOf(text);
     if (echo >= 0) sent.current.splice(0, echo + 1);
-    else if (element.value !== text) element.value = text;
+    else if (sent.current.length === 0 && element.value !== text) element.value = text;
     if (caret?.line === at) {
       element.focus();
       element.setSelectionRange(caret.column, caret.column);
@@ -103,8 +103,12 @@ function Row({ at, line }: { readonly at: number; readonly line: Line | undefine
       ask({ ask: "remove", lines: [at] });
       go(at - 1, before.length);
     } else if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z") {
+      sent.current = [];
       ask({ ask: event.shiftKey ? "redo" : "undo" });
-    } else return;
+    } else {
+      if (event.key === "Home") element.closest(".list")?.scrollTo({ left: 0 });
+      return;
+    }
     event.preventDefault();
   };
   const isSelected = selected.value.has(at);

@@ -8,8 +8,9 @@ import { actions, step } from "./actions";
 import { Button } from "./button";
 import { chosenKeys, chosenNames, chosenTracks, dragKeys, ease, grabKeys, keysOf, looping, nameOf, releaseKeys, removeKeys, wish } from "./keys";
 import { List } from "./list";
+import { NumberField } from "./number";
 import type { KeyPlace, Line, Mode, TimeState, Track } from "./protocol";
-import { ask, files, lines, playing, select, selected, selection, state, tracks } from "./store";
+import { ask, canCreate, files, lines, playing, select, selected, selection, state, tracks } from "./store";
 
 const ROW = 26;
 /** Rows that are seen at once. */
@@ -84,8 +85,12 @@ function Player({ frame, frames, fps }: { readonly frame: number; readonly frame
         onChange={(event) => ask({ ask: "frame", frame: event.currentTarget.valueAsNumber - 1, moving: false })}
       />
       <output>
-        frame {frame + 1} of {frames}, {fps} a second
+        frame {frame + 1} of {frames}
       </output>
+      <label title={canCreate.value ? "Kept in animation.json" : "As long as the studio runs; rayfold render takes it as --fps"}>
+        Frames a second{" "}
+        <NumberField label="Frames a second" value={fps} least={0.01} most={1000} set={(asked) => wish({ do: "pace", fps: asked })} />
+      </label>
     </div>
   );
 }
@@ -106,16 +111,7 @@ function Tools({ time, frames }: { readonly time: TimeState; readonly frames: nu
       {isOne && (
         <label>
           Frames{" "}
-          <input
-            type="number"
-            min={1}
-            max={1_000_000}
-            value={count}
-            onChange={(event) => {
-              const asked = event.currentTarget.valueAsNumber;
-              if (asked >= 1) wish({ do: "frames", count: Math.round(asked) });
-            }}
-          />
+          <NumberField label="Frames" value={count} least={1} most={1_000_000} whole set={(asked) => wish({ do: "frames", count: asked })} />
         </label>
       )}
       {isOne ? (

@@ -57,6 +57,7 @@ export function Viewport(): JSX.Element {
       context.putImageData(new ImageData(pixels, width, height), 0, 0);
       ask({ ask: "shown" });
       target.dataset["picture"] = String(number);
+      target.dataset["final"] = String(head.getUint32(16, true) === 1);
       target.dispatchEvent(new CustomEvent("picture", { detail: number }));
     });
     return () => {
@@ -155,7 +156,7 @@ export function Viewport(): JSX.Element {
       }}
     >
       <div class={picture ? "stage" : "stage empty"} style={shown}>
-        <canvas ref={canvas} style={shown} />
+        <canvas ref={canvas} style={shown} data-wanted={picture?.[0]} />
         <svg viewBox={`0 0 ${width} ${height}`} style={shown} aria-hidden={picture ? "false" : "true"}>
           {now?.grid && <path class="grid" d={now.grid} />}
           {ghosts.value.map((ghost) => (

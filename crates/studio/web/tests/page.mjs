@@ -5,12 +5,11 @@ import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
 import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { request } from "node:http";
-import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
 
-import { drag, isDrawn, open, over, program, row, scenes, shot, until } from "./stage.mjs";
+import { audit, drag, isDrawn, open, over, program, row, scenes, shot, until } from "./stage.mjs";
 
 test("the viewport's pixels are the tracer's, also after a drag", async (t) => {
   const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
@@ -30,8 +29,8 @@ test("moving one object of each example by an arrow key changes one line of one 
   for (const name of readdirSync(scenes).filter((name) => !name.includes("."))) {
     await t.test(name, async (t) => {
       const from = join(scenes, name);
+      // Whatever its pictures take: it is moved while they get finer.
       const studio = await open(t, { from, name });
-      await studio.settled();
       await (await row(studio.page, ".item.object")).click();
       await studio.page.locator(".viewport").focus();
       await studio.page.keyboard.press("ArrowRight");
@@ -46,6 +45,34 @@ test("moving one object of each example by an arrow key changes one line of one 
       studio.check();
     });
   }
+});
+
+test("the viewport shows each example as the tracer draws it", async (t) => {
+  for (const name of readdirSync(scenes).filter((name) => !name.includes("."))) {
+    await t.test(name, async (t) => {
+      // A small window, as some of them take many rays a pixel.
+      const studio = await open(t, { from: join(scenes, name), name, size: [820, 380] });
+      await studio.settled();
+      await isDrawn(studio.page, studio.path);
+      studio.check();
+    });
+  }
+});
+
+test("what takes long is there at once, with few pixels, and then becomes the picture", async (t) => {
+  const text = readFileSync(join(scenes, "lamp/lamp.txt"), "utf8").replace(/^Samples.*$/m, "Samples 4096 0");
+  const studio = await open(t, { text });
+  const shown = () => studio.page.locator("canvas").evaluate(({ width, dataset }) => ({ width, final: dataset.final }));
+  const first = await shown();
+  assert.equal(first.final, "false");
+  await until(async () => (await shown()).width > 300, 120_000);
+  // It can be worked with meanwhile.
+  await (await row(studio.page, ".item.object")).click();
+  await studio.page.locator(".viewport").focus();
+  await studio.page.keyboard.press("ArrowRight");
+  await until(async () => (await studio.saved()) !== text);
+  assert.equal((await shown()).final, "false");
+  studio.check();
 });
 
 test("five objects from an empty page without a number, and the GIF is that of the command line", async (t) => {
@@ -101,6 +128,51 @@ test("the script and the picture follow each other, and faults are told where th
   await studio.settled();
   await studio.saved();
   await isDrawn(page, studio.path);
+  studio.check();
+});
+
+test("what is typed stays, whatever is told meanwhile", async (t) => {
+  const text = Array.from({ length: 3000 }, (_, at) => `# ${at}`).join("\n") + `\n${readFileSync(join(scenes, "hello/frame01.txt"), "utf8")}`;
+  const studio = await open(t, { text });
+  const { page } = studio;
+  const typed = "Sphere 0.25  1 2 3  0.1 0.1 0.1  0.5 0.5 0.5   # typed, not pasted";
+  const line = page.getByLabel("Line 2", { exact: true });
+  await line.click();
+  await line.press("Control+a");
+  await line.pressSequentially(typed);
+  assert.equal(await line.inputValue(), typed);
+  await until(async () => (await studio.saved()).split("\n")[1] === typed);
+  // Numbers, and names, while the script changes elsewhere.
+  await (await row(page, ".item.object")).click();
+  const radius = page.getByRole("spinbutton", { name: "radius" });
+  await radius.focus();
+  await page.keyboard.press("Control+a");
+  await page.keyboard.type("1.2");
+  writeFileSync(studio.path, (await studio.saved()).replace("# 7\n", "# seven\n"));
+  await page.getByText("was changed on the disk").waitFor();
+  assert.equal(await radius.inputValue(), "1.2");
+  await page.keyboard.type("5");
+  await page.keyboard.press("Enter");
+  await until(async () => (await studio.saved()).split("\n")[1].startsWith("Sphere 1.25 "));
+  await page.getByRole("listbox").focus();
+  await page.keyboard.press("F2");
+  const name = page.getByLabel("Name of Sphere");
+  await name.waitFor();
+  await page.keyboard.press("Control+a");
+  await page.keyboard.type("half a na");
+  writeFileSync(studio.path, (await studio.saved()).replace("# 8\n", "# eight\n"));
+  await until(async () => (await page.locator(".code input").evaluateAll((all) => all.map((i) => i.value))).includes("# eight"));
+  await page.keyboard.type("me");
+  await page.keyboard.press("Enter");
+  await until(async () => (await studio.saved()).split("\n")[1].endsWith("# half a name"));
+  // What is no number is told, and what holds comes back.
+  await radius.fill("1e400").catch(() => {});
+  await radius.focus();
+  await page.keyboard.press("Control+a");
+  await page.keyboard.type("1e400");
+  await page.keyboard.press("Enter");
+  await page.getByText("radius: expected a number").waitFor();
+  assert.equal(await radius.inputValue(), "1.25");
   studio.check();
 });
 
@@ -175,7 +247,6 @@ test("an empty, a broken and a huge script open and stay usable", async (t) => {
 });
 
 test("axe finds nothing, light and dark, and the keyboard reaches all", async (t) => {
-  const source = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
   for (const scheme of ["light", "dark"]) {
     await t.test(scheme, async (t) => {
       const studio = await open(t, { from: join(scenes, "hello"), name: "hello", scheme });
@@ -185,13 +256,7 @@ test("axe finds nothing, light and dark, and the keyboard reaches all", async (t
       await page.getByRole("spinbutton", { name: "radius" }).waitFor();
       await studio.settled();
       await shot(page, scheme);
-      const audit = async () => {
-        await page.evaluate(source);
-        const found = await page.evaluate(() => window.axe.run(document, { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"] }));
-        const told = found.violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.html).slice(0, 3).join(" | ")}`);
-        assert.deepEqual(told, []);
-      };
-      await audit();
+      assert.deepEqual(await audit(page), []);
       const handle = page.locator("[data-grip=length]");
       await handle.focus();
       const before = await page.getByRole("spinbutton", { name: "radius" }).inputValue();
@@ -201,7 +266,7 @@ test("axe finds nothing, light and dark, and the keyboard reaches all", async (t
       await page.keyboard.press("?");
       await page.getByRole("dialog").waitFor();
       await shot(page, `keys-${scheme}`);
-      await audit();
+      assert.deepEqual(await audit(page), []);
       studio.check();
     });
   }

@@ -23,14 +23,14 @@ before(async () => {
 after(() => browser?.close());
 
 /** A page of a server that serves a copy of `from`, or a new script with `text`. */
-export async function open(t, { from, text, name = "scene.txt", scheme = "light", blank = text === "", args = [], env = {} }) {
+export async function open(t, { from, text, name = "scene.txt", scheme = "light", size = [1400, 900], blank = text === "", args = [], env = {} }) {
   const folder = mkdtempSync(join(tmpdir(), "rayfold-studio-"));
   const path = join(folder, name);
   if (from) cpSync(from, path, { recursive: true });
   if (text !== undefined) writeFileSync(path, text);
   const { server, ended, said } = start(program, ["studio", path, "--no-open", ...args], env);
   const address = (await said((text) => text.includes("\n"))).trim();
-  const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, colorScheme: scheme });
+  const context = await browser.newContext({ viewport: { width: size[0], height: size[1] }, colorScheme: scheme });
   const page = await context.newPage();
   const faults = [];
   const outside = [];
@@ -48,12 +48,12 @@ export async function open(t, { from, text, name = "scene.txt", scheme = "light"
   await page.goto(address);
   const drawn = () => page.locator("canvas").getAttribute("data-picture");
   if (!blank) await until(async () => (await drawn()) !== null);
-  /** Waits until the picture that was ordered last is on the canvas. */
+  /** Waits until the picture that was ordered last is on the canvas, as it will stay. */
   const settled = async () => {
     let last = "";
     await until(async () => {
-      const now = `${await drawn()}`;
-      const same = now === last;
+      const now = await page.locator("canvas").evaluate(({ dataset }) => `${dataset.picture} ${dataset.wanted} ${dataset.final}`);
+      const same = now === last && /^(\d+) \1 true$/.test(now);
       last = now;
       await page.waitForTimeout(150);
       return same;
@@ -131,9 +131,15 @@ export async function shot(page, name) {
   if (shots) await page.screenshot({ path: join(shots, `studio-${name}.png`) });
 }
 
-/** What axe finds wrong with a page. */
+/** What axe finds wrong with a page, in light and in dark colours; it is left in those that it was in. */
 export async function audit(page) {
   await page.evaluate(readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8"));
-  const found = await page.evaluate(() => window.axe.run(document, { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"] }));
-  return found.violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.html).slice(0, 3).join(" | ")}`);
+  const was = await page.evaluate(() => (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
+  const wrong = [];
+  for (const colorScheme of [was === "dark" ? "light" : "dark", was]) {
+    await page.emulateMedia({ colorScheme });
+    const found = await page.evaluate(() => window.axe.run(document, { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"] }));
+    for (const { id, nodes } of found.violations) wrong.push(`${colorScheme}: ${id}: ${nodes.map((n) => n.html).slice(0, 3).join(" | ")}`);
+  }
+  return wrong;
 }
