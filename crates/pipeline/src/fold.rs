@@ -4,7 +4,7 @@
 //! 1. Read the manifest, of a large one the beginning; leave if it covers the fact and is someone else's.
 //! 2. Pause, the longer the more frames are to come, and look again, until a pause has passed in which no one wrote: with
 //!    many finishers one listing serves all. A large animation's listing is many requests, so of those who have seen no one
-//!    write few list, by lot; the others pause anew, and are the likelier to list the longer that goes on ([`chance`]).
+//!    write few list, by lot; the others pause anew, and are the likelier to list the longer that goes on (`chance`).
 //! 3. List, reconcile, and where the manifest differs put it on the condition that it is still the one that was read.
 //! 4. **List again**, and commit again until a listing agrees with what was committed: the first listing may be older
 //!    than a quick change and change back.

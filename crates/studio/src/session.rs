@@ -4,6 +4,7 @@
 //! Knows no socket and no thread: wishes come in, values go out, so that tests need neither.
 
 mod editing;
+mod held_keys;
 mod hold;
 mod loading;
 mod sight;

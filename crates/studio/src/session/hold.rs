@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::time::HeldKeys;
+use super::held_keys::HeldKeys;
 use super::{Change, Session};
 use crate::edits;
 use crate::handles::{Drag, Grip, Manner};

@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use rayfold_scene::{Command, Mode};
 
+use super::held_keys::HeldKeys;
 use super::hold::Held;
 use super::sight::picture_of;
 use super::{Change, Session};
-use crate::document::Splice;
 use crate::edits;
 use crate::error::words;
 use crate::frame::Frame;
@@ -17,7 +17,7 @@ use crate::protocol::{Ghost, Inspected, Switch, Tell, TimeState, TimeWish};
 use crate::silhouette::View;
 use crate::stage::Stage;
 use crate::tables::FieldTable;
-use crate::tracks::{self, KeyPlace, Tracks};
+use crate::tracks::{self, Tracks};
 use crate::values::{Keying, Values, curve};
 use crate::view::Projection;
 
@@ -32,37 +32,6 @@ const GHOSTS: i64 = 2;
 
 /// Parts that the frames are divided into by ghosts.
 const PARTS: i64 = 12;
-
-/// Keys that are being dragged: their lines as they were.
-#[derive(Debug)]
-pub(super) struct HeldKeys {
-    numbers: Vec<usize>,
-    lines: Vec<Line>,
-    /// Their lines are places in `lines`.
-    keys: Vec<KeyPlace>,
-    gesture: u64,
-}
-
-impl HeldKeys {
-    fn new(lines: &[Line], keys: &[KeyPlace], gesture: u64) -> Self {
-        let mut numbers: Vec<_> = keys.iter().map(|key| key.line).filter(|&at| at < lines.len()).collect();
-        numbers.sort_unstable();
-        numbers.dedup();
-        let place = |key: &KeyPlace| Some(KeyPlace { line: numbers.binary_search(&key.line).ok()?, ..*key });
-        let keys = keys.iter().filter_map(place).collect();
-        let lines = numbers.iter().map(|&at| lines[at].clone()).collect();
-        Self { numbers, lines, keys, gesture }
-    }
-
-    /// The lines, where the keys are so many frames later.
-    fn moved(&self, by: f64) -> Vec<Splice> {
-        let mut lines = self.lines.clone();
-        for (at, line) in tracks::moved(&self.lines, &self.keys, by) {
-            lines[at] = line;
-        }
-        self.numbers.iter().zip(lines).map(|(&at, line)| edits::set(at, line)).collect()
-    }
-}
 
 impl Session {
     /// The time of the frame that is shown.
