@@ -31,7 +31,7 @@ use crate::backends::Backend;
 
 pub(crate) use everything::scaled;
 pub use figures::{Figure, Size};
-pub(crate) use nasty::{is_wrong_at, one_of_each};
+pub(crate) use nasty::{exact_at, is_wrong_at, one_of_each};
 pub use report::{Report, Run};
 
 use figures::Figures;

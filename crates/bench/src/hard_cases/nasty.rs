@@ -153,8 +153,13 @@ fn judge(scene: &Scene, images: &[RgbImage], samples: usize, seed: u64) -> Resul
 /// Whether a pixel's colour is wrong; its row counts from the top.
 pub(crate) fn is_wrong_at(scene: &Scene, (x, y): (u32, u32), color: [u8; 3]) -> bool {
     let (i, j) = (f64::from(x), f64::from(scene.screen.height() - 1 - y));
-    let exact = shown(scene, i, j);
+    let exact = exact_at(scene, (x, y));
     is_off(color, (exact, exact)) && is_off(color, around(scene, (i, j), exact))
+}
+
+/// The oracle's colour of a pixel, as levels before rounding.
+pub(crate) fn exact_at(scene: &Scene, (x, y): (u32, u32)) -> DVec3 {
+    shown(scene, f64::from(x), f64::from(scene.screen.height() - 1 - y))
 }
 
 /// Whether a colour is none between these two.

@@ -19,7 +19,7 @@ use rayfold_tracer::{RenderOptions, reference, render};
 use rayon::prelude::*;
 
 use self::relations::{Other, RELATIONS, Relation};
-use crate::hard_cases::{SEED, is_wrong_at, random_scene};
+use crate::hard_cases::{SEED, exact_at, is_wrong_at, random_scene};
 
 /// What to draw.
 #[derive(Debug, clap::Args)]
@@ -144,7 +144,15 @@ fn judged(
         };
         if !is_explained {
             found.unexplained += 1;
-            eprintln!("seed {seed}, {}, pixel ({x}, {y}): {:?} and {:?}", relation.name, pixel.0, its.0);
+            let right = |scene| exact_at(scene, (x, y)).round().to_array();
+            eprintln!(
+                "seed {seed}, {}, pixel ({x}, {y}): {:?} where {:?} is right, and {:?} where {:?} is",
+                relation.name,
+                pixel.0,
+                right(scene),
+                its.0,
+                right(other)
+            );
         }
     }
     if found.unexplained > 0 {
