@@ -25,7 +25,11 @@ export function NumberField({ label, value, least = -Number.MAX_VALUE, most = Nu
     if (input.current) input.current.value = text;
   };
   useEffect(() => {
-    if (!typing.current && input.current && input.current.value !== text) input.current.value = text;
+    const field = input.current;
+    if (typing.current || !field || field.value === text) return;
+    field.value = text;
+    // What was selected is no longer: what is typed next is to take its place, as it would have.
+    if (document.activeElement === field) field.select();
   });
   return (
     <input

@@ -234,6 +234,7 @@ test("the pace is that of playing and of the GIF, kept where the folder's is", a
   await film.page.locator(".viewport").focus();
   await film.page.keyboard.press("Control+z");
   await until(() => settings() === '{ "loop": 3,\n  "fps": 10 }\n');
+  await until(async () => (await film.page.getByRole("spinbutton", { name: "Frames a second" }).inputValue()) === "10");
   const field = await set(film.page, "0");
   await film.page.getByText("Frames a second: expected a number from 0.01 to 1000").waitFor();
   assert.equal(await field.inputValue(), "10");
