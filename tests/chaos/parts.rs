@@ -15,7 +15,7 @@ use rayfold_local::invoker::{Chaos, Fate, Fates, Invoker, Settings};
 use rayfold_local::observation::{Observation, Outcome, Seen};
 use rayfold_local::routes::Routes;
 use rayfold_local::{Functions, S3Server, StoreKind, Webhook, any_port};
-use rayfold_pipeline::store::{Connection, Notification, S3Store};
+use rayfold_pipeline::store::{Connection, S3Store};
 
 use crate::tally::noting;
 
@@ -190,14 +190,7 @@ async fn be_store(folder: &Path, webhook: &str) {
     let connection = server.connection();
     let store = S3Store::at(&connection, BUCKET);
     store.create_bucket().await.unwrap();
-    let notifications: Vec<Notification> = Routes::shared()
-        .iter()
-        .map(|route| Notification {
-            prefix: route.prefix.clone(),
-            events: route.events.clone(),
-            queue_arn: server.queue_arn().to_owned(),
-        })
-        .collect();
+    let notifications = Routes::shared().notifications(server.queue_arn());
     store.notify(&notifications).await.unwrap();
     let Connection { endpoint, region, access_key, secret_key, .. } = connection;
     say_and_stay(&format!("{endpoint} {region} {access_key} {secret_key}")).await;

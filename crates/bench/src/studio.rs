@@ -146,7 +146,8 @@ fn report(runs: &[Run], quietest: &Run) -> String {
         "# The studio\n\n\
          Written by `rayfold-bench studio`; all figures are in [studio.csv](studio.csv). The first frame of `scenes/hello` \
          at {} x {}, in headless Chromium on the machine that draws; one of its balls is dragged on a circle, by 125 \
-         moves of the pointer a second, of which the browser hands on one a frame of its own. The browser is asked by its \
+         moves of the pointer a second. Each picture is sent as the part that differs from the one before; looking around \
+         changes all of it, and is not measured here. The browser is asked by its \
          debugging protocol without the Network domain, which would copy every picture.\n\n\
          *Pointer to canvas* is from the time of the pointer's event to the end of `putImageData` of the first picture that \
          was ordered with it or after it; what the browser takes to show its canvas comes on top. *First picture* is from \

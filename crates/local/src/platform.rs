@@ -72,14 +72,7 @@ impl Platform {
         let store = S3Store::at(&server.connection(), &plan.bucket);
         let failed = |source| Error::Bucket { bucket: plan.bucket.clone(), source };
         store.create_bucket().await.map_err(failed)?;
-        let notifications: Vec<Notification> = Routes::shared()
-            .iter()
-            .map(|route| Notification {
-                prefix: route.prefix.clone(),
-                events: route.events.clone(),
-                queue_arn: server.queue_arn().to_owned(),
-            })
-            .collect();
+        let notifications = Routes::shared().notifications(server.queue_arn());
         notify(&store, &notifications).await.map_err(failed)?;
         let mut settings = Settings::new(plan.functions.clone(), server.address(), webhook, secret);
         settings.environment = server.environment();

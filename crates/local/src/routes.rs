@@ -10,6 +10,7 @@
 
 use std::fmt;
 
+use rayfold_pipeline::store::Notification;
 use serde::Deserialize;
 
 const SHARED: &str = include_str!("../../../infra/terraform/routes.json");
@@ -78,6 +79,16 @@ impl Routes {
     /// One by one.
     pub fn iter(&self) -> impl Iterator<Item = &Route> {
         self.routes.iter()
+    }
+
+    /// What a store is to tell to this queue, so that it wakes them.
+    pub fn notifications(&self, queue_arn: &str) -> Vec<Notification> {
+        let to_queue = |route: &Route| Notification {
+            prefix: route.prefix.clone(),
+            events: route.events.clone(),
+            queue_arn: queue_arn.to_owned(),
+        };
+        self.iter().map(to_queue).collect()
     }
 
     /// What an event on a key (as it is, not form-encoded) wakes. AWS writes event names without the `s3:`.

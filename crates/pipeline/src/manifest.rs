@@ -7,6 +7,7 @@
 //! and the first line tells where.
 
 use std::collections::BTreeSet;
+use std::fmt;
 use std::num::NonZeroU64;
 
 use rayfold_scene::{AnimationSettings, Diagnostic, SETTINGS_FILE, parse_settings};
@@ -98,6 +99,20 @@ pub enum Status {
     Refused,
     /// All frames are drawn: there is a GIF of this generation, or there will be.
     Done,
+}
+
+/// The word that stands for it in the manifest.
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Empty => "empty",
+            Self::Waiting => "waiting",
+            Self::Rendering => "rendering",
+            Self::Failed => "failed",
+            Self::Refused => "refused",
+            Self::Done => "done",
+        })
+    }
 }
 
 /// A frame of the animation.

@@ -20,6 +20,9 @@ use crate::view::Projection;
 /// How long arrows are, in pixels of the picture.
 const ARROW: f64 = 72.0;
 
+/// Where the handle of a plane is along its two axes, in arrows.
+const PLANE: f64 = 0.35;
+
 /// A surface that is seen more slanted than this sine is not dragged along: a pixel would be miles.
 const SLANTED: f64 = 0.12;
 
@@ -35,6 +38,11 @@ pub(crate) enum Grip {
     /// All of them, along an axis: 0 is x.
     Axis {
         /// Which.
+        axis: usize,
+    },
+    /// All of them, along the plane across an axis: 0 is that of y and z.
+    Plane {
+        /// Across which.
         axis: usize,
     },
     /// The position whose numbers begin here.
@@ -109,6 +117,14 @@ pub(crate) fn handles(number: usize, values: &Values, projection: &Projection, a
                 &format!("along {name}: place"),
                 straight(),
             );
+        }
+        let (_, _, w) = projection.axes();
+        for (axis, names) in ["y and z", "x and z", "x and y"].into_iter().enumerate() {
+            // Seen edge on, a plane is a line.
+            if w[axis].abs() > SLANTED {
+                let to = middle + PLANE * arrow * (DVec3::ONE - DVec3::AXES[axis]);
+                add(Grip::Plane { axis }, middle, to, &format!("along {names}: place"), straight());
+            }
         }
     }
     let mut lengths = 0;
@@ -224,7 +240,7 @@ impl Drag {
         let positions: Vec<_> = values.positions().collect();
         let grabbed = match grip {
             Grip::Body => grabbed.unwrap_or(anchor),
-            Grip::Axis { .. } => middle(&positions),
+            Grip::Axis { .. } | Grip::Plane { .. } => middle(&positions),
             Grip::Point { first } => values.vector(first)?,
             Grip::Length { .. } | Grip::Direction { .. } | Grip::Turn { .. } | Grip::Scale { .. } => anchor,
         };
@@ -268,6 +284,12 @@ impl Drag {
                     return self.start();
                 };
                 moved([0, 1, 2].map(|other| other == axis), by).collect()
+            }
+            Grip::Plane { axis } => {
+                let Some(by) = between(projection, self.grabbed, DVec3::AXES[axis], from, to) else {
+                    return self.start();
+                };
+                moved([0, 1, 2].map(|other| other != axis), by).collect()
             }
             Grip::Point { first } => {
                 let (normal, axes) = self.plane(projection, manner);
@@ -484,6 +506,23 @@ mod tests {
                 y > 1.2 && text.starts_with("Sphere 1  0 ") && text.ends_with(" 0  .1 .1 .1  1 1 1 # ball"),
                 "{text}"
             );
+        }
+    }
+
+    #[test]
+    fn a_square_moves_along_its_plane_and_is_not_there_edge_on() {
+        let scene = scene();
+        let projection = Projection::new(&scene);
+        let all = handles(0, &Line::new(BALL), &projection, DVec3::ZERO);
+        let planes: Vec<_> = all.iter().filter(|handle| matches!(handle.grip, Grip::Plane { .. })).collect();
+        assert!((1..3).contains(&planes.len()), "{planes:?}");
+        for handle in planes {
+            let Grip::Plane { axis } = handle.grip else { unreachable!() };
+            let text = drag(handle.grip, BALL, handle.at.into(), DVec2::new(17.0, -11.0), Manner::default());
+            let place = text.split_whitespace().skip(2).take(3).map(|word| word.parse::<f64>().unwrap());
+            let old = BALL.split_whitespace().skip(2).take(3).map(|word| word.parse::<f64>().unwrap());
+            let moved: Vec<_> = place.zip(old).map(|(new, old)| new != old).collect();
+            assert_eq!(moved, [0, 1, 2].map(|other| other != axis), "{text}");
         }
     }
 

@@ -23,6 +23,7 @@ mod handles;
 mod line;
 mod materials;
 mod output;
+mod packing;
 mod page;
 mod pictures;
 mod pipe;

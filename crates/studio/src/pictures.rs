@@ -4,19 +4,24 @@
 //! while something moves it is drawn to the end, smaller where it would take too long, so that there always is a
 //! picture, and with one ray a pixel, whatever the script says. At rest what takes long begins with sketches: few pixels with
 //! one ray each, then more; a picture of several rays a pixel is shown after each pass over it. No more pictures are under way
-//! than the page keeps up with.
+//! than the page keeps up with: one while something moves, since a picture that waits behind another is old when it is shown.
 
+use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use image::RgbImage;
 use rayfold_scene::{Camera, Samples, Scene, Screen, Script};
 use rayfold_tracer::{Drawing, Exposure, RenderError, RenderOptions};
 
-/// Pictures that the page has not shown yet, at most.
-const UNDER_WAY: u32 = 2;
+use crate::packing::{Packer, Picture};
+
+/// Pictures that the page has not shown yet, at most, while something moves.
+const MOVING_UNDER_WAY: u32 = 1;
+
+/// The same at rest, where sketches go before the picture that counts.
+const RESTING_UNDER_WAY: u32 = 2;
 
 /// Seconds that a picture may take while something moves.
 const MOVING: f64 = 0.03;
@@ -29,10 +34,6 @@ const LEAST: f64 = 0.125;
 
 /// How much wider and higher the next sketch is.
 const GROWTH: f64 = 2.0;
-
-/// Bytes before the pixels: the picture's number, width, height, microseconds that it took, and 1 for one that stays as it is,
-/// or 0 where a finer one follows; little-endian.
-pub(crate) const HEADER: usize = 20;
 
 /// A picture that is wanted.
 #[derive(Clone, Debug)]
@@ -91,8 +92,8 @@ struct Desk {
 }
 
 impl Painter {
-    /// Starts the thread, which ends when the painter is closed; `send` gets each picture with its header, and says
-    /// whether there is still somebody to take it.
+    /// Starts the thread, which ends when the painter is closed; `send` gets each picture as the page takes it, after the one
+    /// before, and says whether there is still somebody to take it.
     ///
     /// # Errors
     /// When the system has no thread.
@@ -138,9 +139,11 @@ impl Shared {
             if desk.closed {
                 return None;
             }
-            if desk.under_way < UNDER_WAY
-                && let Some(wanted) = desk.wanted.take()
-            {
+            let under_way = desk.under_way;
+            let has_room = |wanted: &mut Wanted| {
+                under_way < if wanted.moving { MOVING_UNDER_WAY } else { RESTING_UNDER_WAY }
+            };
+            if let Some(wanted) = desk.wanted.take_if(has_room) {
                 desk.under_way += 1;
                 desk.at_rest = !wanted.moving;
                 self.cancel.store(false, Ordering::Relaxed);
@@ -152,11 +155,13 @@ impl Shared {
 
     fn work(&self, send: &impl Fn(Vec<u8>) -> bool) {
         let mut pace = Pace::default();
+        let packer = RefCell::new(Packer::default());
+        let send = |picture| send(packer.borrow_mut().pack(picture));
         while let Some(wanted) = self.next() {
             let drawn = if wanted.moving {
                 self.sketch(&wanted, pace.share(&wanted.scene, MOVING), &mut pace)
             } else {
-                self.at_rest(&wanted, &mut pace, send)
+                self.at_rest(&wanted, &mut pace, &send)
             };
             match drawn {
                 Ok(picture) => {
@@ -175,8 +180,8 @@ impl Shared {
         &self,
         wanted: &Wanted,
         pace: &mut Pace,
-        send: &impl Fn(Vec<u8>) -> bool,
-    ) -> Result<Vec<u8>, RenderError> {
+        send: &impl Fn(Picture) -> bool,
+    ) -> Result<Picture, RenderError> {
         let start = Instant::now();
         let scene = &wanted.scene;
         let is_sampled = scene.samples.most() > 1;
@@ -206,17 +211,17 @@ impl Shared {
         let begin = Instant::now();
         let image = drawing.draw_progressively(|image| {
             if self.another() {
-                send(packed(wanted.number, &image, start.elapsed(), false));
+                send(Picture { number: wanted.number, image, took: start.elapsed(), is_final: false });
             }
         })?;
         if !is_sampled {
             pace.drawn(scene.screen, begin.elapsed());
         }
-        Ok(packed(wanted.number, &image, start.elapsed(), true))
+        Ok(Picture { number: wanted.number, image, took: start.elapsed(), is_final: true })
     }
 
     /// A picture with one ray a pixel, and with this share of its width and height.
-    fn sketch(&self, wanted: &Wanted, share: f64, pace: &mut Pace) -> Result<Vec<u8>, RenderError> {
+    fn sketch(&self, wanted: &Wanted, share: f64, pace: &mut Pace) -> Result<Picture, RenderError> {
         let start = Instant::now();
         let whole = &wanted.scene;
         let scene =
@@ -227,14 +232,14 @@ impl Shared {
         let begin = Instant::now();
         let image = drawing.draw()?;
         pace.drawn(scene.screen, begin.elapsed());
-        Ok(packed(wanted.number, &image, start.elapsed(), false))
+        Ok(Picture { number: wanted.number, image, took: start.elapsed(), is_final: false })
     }
 
     /// Whether the page has room for a picture more; if so, that is under way.
     fn another(&self) -> bool {
         let mut is_free = false;
         self.change(|desk| {
-            is_free = desk.under_way < UNDER_WAY;
+            is_free = desk.under_way < RESTING_UNDER_WAY;
             desk.under_way += u32::from(is_free);
         });
         is_free
@@ -272,18 +277,6 @@ impl Pace {
     }
 }
 
-/// A picture as the page takes it.
-fn packed(number: u32, image: &RgbImage, took: Duration, is_final: bool) -> Vec<u8> {
-    let (width, height) = image.dimensions();
-    let micros = u32::try_from(took.as_micros()).unwrap_or(u32::MAX);
-    let mut bytes = Vec::with_capacity(HEADER + image.len() / 3 * 4);
-    for number in [number, width, height, micros, u32::from(is_final)] {
-        bytes.extend_from_slice(&number.to_le_bytes());
-    }
-    bytes.extend(image.as_raw().as_chunks::<3>().0.iter().flat_map(|&[r, g, b]| [r, g, b, 255]));
-    bytes
-}
-
 /// A share of a size.
 fn smaller(screen: Screen, share: f64) -> Screen {
     let side = |side: u32| (f64::from(side) * share).round().max(1.0) as u32;
@@ -296,6 +289,8 @@ mod tests {
     use std::sync::mpsc;
 
     use super::*;
+    use crate::packing::HEADER;
+    use crate::packing::tests::Shown;
 
     fn wanted(number: u32, moving: bool) -> Wanted {
         let text = "Screen 64 48\nBackground 0 0.5 1\nSphere 10 30 20 -20  1 0 0  0 0 0\nTrace";
@@ -328,8 +323,12 @@ mod tests {
         seen
     }
 
+    fn number_at(picture: &[u8], at: usize) -> u32 {
+        u32::from_le_bytes(picture[at..][..4].try_into().unwrap())
+    }
+
     fn number(picture: &[u8]) -> u32 {
-        u32::from_le_bytes(picture[..4].try_into().unwrap())
+        number_at(picture, 0)
     }
 
     #[test]
@@ -341,8 +340,9 @@ mod tests {
         painter.want(request);
         let picture = pictures.recv_timeout(Duration::from_secs(20)).unwrap();
         assert_eq!((number(&picture), picture.len()), (7, HEADER + 64 * 48 * 4));
-        let (pixels, _) = picture[HEADER..].as_chunks::<4>();
-        assert!(pixels.iter().zip(expected.pixels()).all(|(a, b)| a[..3] == b.0 && a[3] == 255));
+        let mut shown = Shown::default();
+        shown.put(&picture);
+        assert_eq!(shown.0, expected);
         painter.close();
     }
 
@@ -357,12 +357,13 @@ mod tests {
         let expected = render_frame(&script, 0, &RenderOptions::default()).unwrap().unwrap();
         assert_ne!(expected, render(&request.scene, &RenderOptions::default()).unwrap(), "it moves");
         let seen = drawn(&painter, &pictures, request);
-        let sizes: Vec<_> = seen.iter().map(|picture| picture.len() - HEADER).collect();
-        assert_eq!(sizes[0], 12 * 8 * 4, "the first one has few pixels, whatever the rest takes");
+        let sizes: Vec<_> = seen.iter().map(|picture| [4, 8].map(|at| number_at(picture, at))).collect();
+        assert_eq!(sizes[0], [12, 8], "the first one has few pixels, whatever the rest takes");
         assert!(sizes.is_sorted() && seen.len() > 2, "{sizes:?}");
         assert!(seen.iter().all(|picture| number(picture) == 9));
-        let (pixels, _) = seen.last().unwrap()[HEADER..].as_chunks::<4>();
-        assert!(pixels.iter().zip(expected.pixels()).all(|(a, b)| a[..3] == b.0));
+        let mut shown = Shown::default();
+        seen.iter().for_each(|picture| shown.put(picture));
+        assert_eq!(shown.0, expected);
         painter.close();
     }
 
@@ -373,23 +374,23 @@ mod tests {
         let ball = "Sphere 1  0 0 0  0.2 0.1 0.1  0.7 0.5 0.3";
         let request = pinhole(1, ball);
         let expected = render(&request.scene, &RenderOptions::default()).unwrap();
-        assert!(drawn(&painter, &pictures, request).len() > 1, "it is not known at first");
+        let first = drawn(&painter, &pictures, request);
+        assert!(first.len() > 1, "it is not known at first");
         let again = drawn(&painter, &pictures, pinhole(2, ball));
         assert_eq!(again.len(), 1);
-        let (pixels, _) = again[0][HEADER..].as_chunks::<4>();
-        assert!(pixels.iter().zip(expected.pixels()).all(|(a, b)| a[..3] == b.0));
+        let mut shown = Shown::default();
+        first.iter().chain(&again).for_each(|picture| shown.put(picture));
+        assert_eq!(shown.0, expected);
         painter.close();
     }
 
     #[test]
-    fn the_newest_request_wins_and_no_more_than_two_are_under_way() {
+    fn the_newest_request_wins_and_no_more_than_one_is_under_way_while_something_moves() {
         let (sender, pictures) = mpsc::channel();
         let painter = Painter::start(move |picture| sender.send(picture).is_ok()).unwrap();
-        for request in 1..=2 {
-            painter.want(wanted(request, true));
-            assert_eq!(number(&pictures.recv_timeout(Duration::from_secs(20)).unwrap()), request);
-        }
-        for request in 3..=50 {
+        painter.want(wanted(1, true));
+        assert_eq!(number(&pictures.recv_timeout(Duration::from_secs(20)).unwrap()), 1);
+        for request in 2..=50 {
             painter.want(wanted(request, true));
         }
         assert!(pictures.recv_timeout(Duration::from_millis(200)).is_err(), "the page has shown none yet");

@@ -95,7 +95,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
                     console.note(format_args!(
                         "this GIF is {} old and shows older scripts: {animation} is {} ({})",
                         Age(age),
-                        report::word(manifest.head.status),
+                        manifest.head.status,
                         report::count(manifest)
                     ));
                 }
@@ -114,7 +114,7 @@ fn not_there(watch: &Watch<'_>, manifest: &Manifest, console: &Console) -> anyho
     let head = &manifest.head;
     let why = match head.status {
         Status::Done => "its GIF is being assembled",
-        other => report::word(other),
+        other => &other.to_string(),
     };
     let last = match (watch.gif(), watch.gif_age()) {
         (Some(gif), Some(age)) => {
@@ -186,7 +186,7 @@ async fn fetch_frames(
         };
         anyhow::bail!(
             "{animation} is {} ({}): {} is not drawn{rest}",
-            report::word(manifest.head.status),
+            manifest.head.status,
             report::count(manifest),
             frame_name(first)
         );

@@ -6,18 +6,6 @@ use rayfold_pipeline::manifest::{Manifest, Status};
 use crate::console::Console;
 use crate::wording::number;
 
-/// A status as a word.
-pub(crate) fn word(status: Status) -> &'static str {
-    match status {
-        Status::Empty => "empty",
-        Status::Waiting => "waiting",
-        Status::Rendering => "rendering",
-        Status::Failed => "failed",
-        Status::Refused => "refused",
-        Status::Done => "done",
-    }
-}
-
 /// `48 of 50 frames, 2 failed`.
 pub(crate) fn count(manifest: &Manifest) -> String {
     let head = &manifest.head;

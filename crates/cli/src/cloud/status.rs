@@ -184,7 +184,7 @@ fn table(watches: &[Watch<'_>], with_age: bool) -> String {
             let _ = writeln!(text, "{name:width$}  {status:9}  {why}");
             continue;
         };
-        let status = report::word(manifest.head.status);
+        let status = manifest.head.status;
         let age = watch.gif_age().filter(|_| with_age).map(|age| format!(", {} old", Age(age)));
         let gif = match watch.gif() {
             Some(gif) if watch.is_current() => format!("GIF of {}", Size(gif.size)),

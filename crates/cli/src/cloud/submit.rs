@@ -123,7 +123,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
             report::show_faults(&manifest, console);
             anyhow::bail!(
                 "{animation} is {} ({}); rayfold retry {animation} tries again what is not the scripts' fault",
-                report::word(manifest.head.status),
+                manifest.head.status,
                 report::count(&manifest)
             );
         }

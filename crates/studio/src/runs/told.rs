@@ -147,7 +147,7 @@ pub(super) fn summary<S: Store, C: Clock>(watch: &Watch<'_, S, C>) -> Summary {
     };
     if let Some(manifest) = watch.manifest() {
         let head = &manifest.head;
-        summary.status = word(head.status);
+        summary.status = head.status.to_string();
         (summary.done, summary.failed) = (head.done, head.failed);
         // Frames of scripts that have not been uploaded yet are awaited too.
         summary.total = head.total + head.missing() - head.pending;
@@ -248,17 +248,6 @@ impl RunTell {
         };
         *last = Some((state, frames));
         Some(tell)
-    }
-}
-
-fn word(status: Status) -> &'static str {
-    match status {
-        Status::Empty => "empty",
-        Status::Waiting => "waiting",
-        Status::Rendering => "rendering",
-        Status::Failed => "failed",
-        Status::Refused => "refused",
-        Status::Done => "done",
     }
 }
 

@@ -56,7 +56,7 @@ impl Session {
                 (Grip::Body, Some(point))
             }
         };
-        let all = matches!(grip, Grip::Body | Grip::Axis { .. });
+        let all = matches!(grip, Grip::Body | Grip::Axis { .. } | Grip::Plane { .. });
         let main = self.selection.last().copied();
         let lines = self.selection.iter().rev().copied().filter(|&line| all || Some(line) == main);
         let shown = self.shown(project);

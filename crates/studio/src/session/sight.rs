@@ -23,6 +23,15 @@ pub(super) const PIXELS: u64 = 8 << 20;
 /// Lines of the grid in each direction from the middle.
 const GRID: i32 = 10;
 
+/// Pieces of the horizon all around.
+const HORIZON: i32 = 72;
+
+/// How far away the horizon is, in widths of the grid from its middle.
+const FAR: f64 = 1e6;
+
+/// What lies so many pixels away is not in the picture.
+const BEYOND: f64 = 1e5;
+
 impl Session {
     /// What the viewport shows.
     pub(super) fn scene(&self, project: &Project) -> Option<Scene> {
@@ -233,7 +242,7 @@ fn camera_numbers(camera: &Pinhole, step: f64) -> Vec<f64> {
     numbers
 }
 
-/// Lines on the height 0 around a scene.
+/// Lines on the height 0 around a scene, and the horizon.
 pub(super) fn grid_path(projection: &Projection, bounds: Bounds) -> String {
     let step = 10f64.powf((bounds.radius() / 4.0).log10().round());
     let reach = step * f64::from(GRID);
@@ -251,6 +260,15 @@ pub(super) fn grid_path(projection: &Projection, bounds: Bounds) -> String {
                     path.push_str(&format!("M{:.1} {:.1}L{:.1} {:.1}", a.x, a.y, b.x, b.y));
                 }
             }
+        }
+    }
+    for turn in 0..HORIZON {
+        let far = |turn: i32| {
+            let (sin, cos) = (f64::from(turn) / f64::from(HORIZON) * std::f64::consts::TAU).sin_cos();
+            at(FAR * reach * cos, FAR * reach * sin).filter(|seen| seen.abs().max_element() < BEYOND)
+        };
+        if let (Some(a), Some(b)) = (far(turn), far(turn + 1)) {
+            path.push_str(&format!("M{:.1} {:.1}L{:.1} {:.1}", a.x, a.y, b.x, b.y));
         }
     }
     path

@@ -210,8 +210,10 @@ fn handles_lead_to_the_numbers_of_the_line() {
     let handles = desk.ask(Ask::Select { lines: vec![5] }).tell.state.unwrap().handles;
     let grips: Vec<_> = handles.iter().map(|handle| handle.grip).collect();
     let axes = [0, 1, 2].map(|axis| Grip::Axis { axis });
-    assert_eq!(grips, [axes.as_slice(), &[Grip::Point { first: 0 }, Grip::Point { first: 3 }]].concat());
-    let Handle { at, .. } = handles[4];
+    let planes = [1, 2].map(|axis| Grip::Plane { axis });
+    let points = [0, 3].map(|first| Grip::Point { first });
+    assert_eq!(grips, [axes.as_slice(), &planes, &points].concat(), "that of y and z is seen edge on");
+    let Handle { at, .. } = *handles.last().unwrap();
     let (grip, line) = (Some(Grip::Point { first: 3 }), Some(5));
     desk.ask(Ask::Press { x: at[0], y: at[1], extend: false, grip, line });
     desk.ask(Ask::Drag { x: at[0], y: at[1] - 12.0, manner: Manner { upright: true, ..Manner::default() } });

@@ -1,6 +1,6 @@
 // The page: its panels, and its connection.
 
-import { render } from "preact";
+import { options, render } from "preact";
 
 import { listen } from "./actions";
 import { Bar, Keys, Notices, Palette } from "./chrome";
@@ -43,6 +43,8 @@ function Studio() {
   );
 }
 
+// Once a frame of the browser: more often nobody sees it, and the picture would wait for it.
+options.debounceRendering = (update) => requestAnimationFrame(update);
 render(<Studio />, document.body);
 listen();
 connect();

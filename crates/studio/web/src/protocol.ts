@@ -37,7 +37,7 @@ export interface Line {
 
 export type Grip =
   | { readonly what: "body" }
-  | { readonly what: "axis"; readonly axis: number }
+  | { readonly what: "axis" | "plane"; readonly axis: number }
   | { readonly what: "point" | "length" | "direction" | "scale"; readonly first: number }
   | { readonly what: "turn"; readonly first: number; readonly axis: number };
 
@@ -227,5 +227,8 @@ export type Ask =
   | { readonly ask: "time"; readonly wish: TimeWish }
   | { readonly ask: "resolve"; readonly "keep-mine": boolean };
 
-/** Bytes before the pixels of a picture: number, width, height, microseconds, 1 if it stays as it is; little-endian. */
-export const PICTURE_HEADER = 20;
+/**
+ * Bytes before the pixels of a picture: number, width, height, microseconds, 1 if it stays as it is; then left, top, width and
+ * height of the part that differs from the picture before, whose pixels follow; little-endian.
+ */
+export const PICTURE_HEADER = 36;

@@ -18,7 +18,16 @@ const WHEEL = 0.0012;
 /** Milliseconds after the wheel's last turn at which the picture rests. */
 const REST = 160;
 
-type Held = "drag" | "pan";
+/** Moves that are told at once, and not once a frame: where the browser has them, what is dragged follows sooner. */
+const RAW = "onpointerrawupdate" in window;
+
+/** What the pointer does while its button is down. */
+interface Hold {
+  readonly what: "drag" | "pan";
+  last: Point;
+  /** Where the picture is: asking for it at each move would lay out the page anew. */
+  readonly box: DOMRect | undefined;
+}
 
 /** Width and height of the panel, in the window's pixels. */
 const room = signal<Point>([1, 1]);
@@ -33,7 +42,8 @@ function rest(): void {
 export function Viewport(): JSX.Element {
   const panel = useRef<HTMLDivElement>(null);
   const canvas = useRef<HTMLCanvasElement>(null);
-  const held = useRef<{ readonly what: Held; last: Point } | null>(null);
+  const held = useRef<Hold | null>(null);
+  const raw = useRef<(event: PointerEvent) => void>(() => {});
 
   useEffect(() => {
     const element = panel.current;
@@ -45,22 +55,27 @@ export function Viewport(): JSX.Element {
       const pixels = (length: number): number => Math.max(1, Math.round(length * devicePixelRatio));
       ask({ ask: "size", width: pixels(box.width), height: pixels(box.height) });
     };
+    const moved = (event: Event): void => raw.current(event as PointerEvent);
+    element.addEventListener("pointerrawupdate", moved);
     const observer = new ResizeObserver(size);
     observer.observe(element);
     addEventListener("resize", size);
     onPicture((picture) => {
       const head = new DataView(picture, 0, PICTURE_HEADER);
-      const [number, width, height] = [head.getUint32(0, true), head.getUint32(4, true), head.getUint32(8, true)];
+      const field = (at: number): number => head.getUint32(4 * at, true);
+      const [number, width, height, isFinal] = [field(0), field(1), field(2), field(4) === 1];
+      const [left, top, across, down] = [field(5), field(6), field(7), field(8)];
       const target = context.canvas;
       if (target.width !== width || target.height !== height) [target.width, target.height] = [width, height];
-      const pixels = new Uint8ClampedArray(picture, PICTURE_HEADER);
-      context.putImageData(new ImageData(pixels, width, height), 0, 0);
+      // Nothing follows where the picture is the one before.
+      if (across > 0) context.putImageData(new ImageData(new Uint8ClampedArray(picture, PICTURE_HEADER), across, down), left, top);
       ask({ ask: "shown" });
       target.dataset["picture"] = String(number);
-      target.dataset["final"] = String(head.getUint32(16, true) === 1);
+      target.dataset["final"] = String(isFinal);
       target.dispatchEvent(new CustomEvent("picture", { detail: number }));
     });
     return () => {
+      element.removeEventListener("pointerrawupdate", moved);
       observer.disconnect();
       removeEventListener("resize", size);
     };
@@ -70,7 +85,7 @@ export function Viewport(): JSX.Element {
   const picture = now?.picture ?? null;
   const [, width, height] = picture ?? [0, 1, 1];
   const at = (event: MouseEvent): Point => {
-    const box = canvas.current?.getBoundingClientRect();
+    const box = held.current?.box ?? canvas.current?.getBoundingClientRect();
     if (!box) return [0, 0];
     return [((event.clientX - box.left) / box.width) * width, ((event.clientY - box.top) / box.height) * height];
   };
@@ -82,21 +97,25 @@ export function Viewport(): JSX.Element {
     panel.current?.setPointerCapture(event.pointerId);
     panel.current?.focus({ preventScroll: true });
     const [x, y] = at(event);
-    if (event.button > 0) {
-      held.current = { what: "pan", last: [x, y] };
-      return;
-    }
-    held.current = { what: "drag", last: [x, y] };
+    const box = canvas.current?.getBoundingClientRect();
+    held.current = { what: event.button > 0 ? "pan" : "drag", last: [x, y], box };
+    if (event.button > 0) return;
     const extend = event.shiftKey;
     ask({ ask: "press", x, y, extend, grip: handle?.grip ?? null, line: handle?.line ?? null });
   };
+  const drag = (event: PointerEvent): void => {
+    if (held.current?.what !== "drag") return;
+    const [x, y] = at(event);
+    ask({ ask: "drag", x, y, upright: event.shiftKey, snap: event.ctrlKey || event.metaKey, whole: event.altKey });
+  };
+  raw.current = drag;
   const move = (event: PointerEvent): void => {
     const [x, y] = at(event);
     const holding = held.current;
     if (!holding) {
       hover(x, y);
     } else if (holding.what === "drag") {
-      ask({ ask: "drag", x, y, upright: event.shiftKey, snap: event.ctrlKey || event.metaKey, whole: event.altKey });
+      if (!RAW) drag(event);
     } else {
       const [left, top] = holding.last;
       holding.last = [x, y];
@@ -191,7 +210,7 @@ interface HandleProps {
 
 function HandleShape({ handle, unit, press, keyed }: HandleProps): JSX.Element {
   const { grip, at, from, label, way } = handle;
-  const which = grip.what === "axis" || grip.what === "turn" ? `${grip.what}-${"xyz"[grip.axis] ?? ""}` : grip.what;
+  const which = "axis" in grip ? `${grip.what}-${"xyz"[grip.axis] ?? ""}` : grip.what;
   return (
     <g
       class={`handle ${which}`}
@@ -206,7 +225,11 @@ function HandleShape({ handle, unit, press, keyed }: HandleProps): JSX.Element {
       {way && <path class="ring" d={way} />}
       <line x1={from[0]} y1={from[1]} x2={at[0]} y2={at[1]} />
       <circle class="reach" cx={at[0]} cy={at[1]} r={14 * unit} />
-      <circle class="dot" cx={at[0]} cy={at[1]} r={6 * unit} />
+      {grip.what === "plane" ? (
+        <rect class="dot" x={at[0] - 5 * unit} y={at[1] - 5 * unit} width={10 * unit} height={10 * unit} />
+      ) : (
+        <circle class="dot" cx={at[0]} cy={at[1]} r={6 * unit} />
+      )}
     </g>
   );
 }

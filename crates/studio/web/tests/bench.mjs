@@ -19,7 +19,7 @@ const [script, runs = "5", seconds = "5"] = process.argv.slice(2);
 /** Width and height of the picture. */
 const SIZE = [960, 540];
 
-/** Between two moves of the pointer, in milliseconds: those of a usual mouse. The browser hands on one a frame. */
+/** Between two moves of the pointer, in milliseconds: those of a usual mouse. */
 const MOVE_MS = 8;
 
 /** Once round the circle on which the object is dragged, in milliseconds, and the circle's radius in pixels. */
@@ -36,7 +36,7 @@ const PROBE = `(() => {
   const probe = { first: null, sizes: {}, pictures: 0, waits: [], sent: 0, asked: [], recording: false };
   window.probe = probe;
   let pointer = 0;
-  addEventListener("pointermove", (event) => (pointer = event.timeStamp), true);
+  for (const moved of ["pointermove", "pointerrawupdate"]) addEventListener(moved, (event) => (pointer = event.timeStamp), true);
   const Socket = window.WebSocket;
   window.WebSocket = class extends Socket {
     constructor(...args) {

@@ -1,0 +1,161 @@
+//! Pictures as the page takes them: a header, and the part that differs from the picture before.
+//!
+//! What is dragged changes some of a picture, and the browser takes longer to receive a whole one than the tracer to draw it.
+//! Invariant: a page that puts each part where its header says, and begins anew where the size is another, shows each picture
+//! to the last byte.
+
+use std::time::Duration;
+
+use image::RgbImage;
+
+/// Bytes before the pixels: the picture's number, width, height, microseconds that it took, 1 for one that stays as it is or 0
+/// where a finer one follows; then left, top, width and height of the part whose pixels follow. Little-endian.
+pub(crate) const HEADER: usize = 36;
+
+/// A picture that was drawn.
+#[derive(Debug)]
+pub(crate) struct Picture {
+    /// What the page calls it.
+    pub(crate) number: u32,
+    pub(crate) image: RgbImage,
+    pub(crate) took: Duration,
+    /// It stays as it is.
+    pub(crate) is_final: bool,
+}
+
+/// Packs pictures that are shown one after the other, each of them.
+#[derive(Debug, Default)]
+pub(crate) struct Packer {
+    before: RgbImage,
+}
+
+/// A part of a picture, in pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Part {
+    left: u32,
+    top: u32,
+    width: u32,
+    height: u32,
+}
+
+impl Packer {
+    /// The picture's header, and its part that differs from the picture before, four bytes a pixel: red, green, blue, 255.
+    pub(crate) fn pack(&mut self, picture: Picture) -> Vec<u8> {
+        let Picture { number, image, took, is_final } = picture;
+        let part = differing(&self.before, &image);
+        let micros = u32::try_from(took.as_micros()).unwrap_or(u32::MAX);
+        let (across, down) = (part.width as usize, part.height as usize);
+        let mut bytes = Vec::with_capacity(HEADER + across * down * 4);
+        let size = [number, image.width(), image.height(), micros, u32::from(is_final)];
+        for number in size.into_iter().chain([part.left, part.top, part.width, part.height]) {
+            bytes.extend_from_slice(&number.to_le_bytes());
+        }
+        for row in rows(&image).skip(part.top as usize).take(down) {
+            let pixels = &row[part.left as usize..][..across];
+            bytes.extend(pixels.iter().flat_map(|&[r, g, b]| [r, g, b, 255]));
+        }
+        self.before = image;
+        bytes
+    }
+}
+
+/// The least part outside of which two pictures are equal: all of the second where their sizes differ.
+fn differing(before: &RgbImage, now: &RgbImage) -> Part {
+    let (width, height) = now.dimensions();
+    if before.dimensions() != (width, height) {
+        return Part { left: 0, top: 0, width, height };
+    }
+    let differ = |(a, b): (&[[u8; 3]], &[[u8; 3]])| a != b;
+    let pairs = || rows(before).zip(rows(now));
+    let Some(top) = pairs().position(differ) else { return Part::default() };
+    let below = pairs().rev().position(differ).unwrap_or(0);
+    let down = height as usize - below - top;
+    let (mut left, mut right) = (width as usize, 0);
+    for (old, new) in pairs().skip(top).take(down) {
+        let differ = |(a, b)| a != b;
+        // Only what lies outside of the part so far can widen it.
+        left = old[..left].iter().zip(&new[..left]).position(differ).unwrap_or(left);
+        let more = old[right..].iter().zip(&new[right..]).rposition(differ);
+        right = more.map_or(right, |more| right + more + 1);
+    }
+    Part { left: left as u32, top: top as u32, width: (right - left) as u32, height: down as u32 }
+}
+
+/// A picture's rows of pixels, from above.
+fn rows(image: &RgbImage) -> impl DoubleEndedIterator<Item = &[[u8; 3]]> + ExactSizeIterator {
+    image.as_raw().as_chunks::<3>().0.chunks_exact(image.width().max(1) as usize)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use image::Rgb;
+
+    use super::*;
+
+    /// What a page shows.
+    #[derive(Debug, Default)]
+    pub(crate) struct Shown(pub(crate) RgbImage);
+
+    impl Shown {
+        /// Puts the part where it belongs.
+        pub(crate) fn put(&mut self, packed: &[u8]) {
+            let (head, pixels) = packed.split_at(HEADER);
+            let head: Vec<u32> = head.as_chunks().0.iter().map(|&bytes| u32::from_le_bytes(bytes)).collect();
+            let &[_, width, height, _, _, left, top, across, down] = head.as_slice() else { unreachable!() };
+            assert_eq!(pixels.len() as u32, 4 * across * down);
+            if self.0.dimensions() != (width, height) {
+                self.0 = RgbImage::new(width, height);
+            }
+            for (at, &[r, g, b, a]) in pixels.as_chunks().0.iter().enumerate() {
+                assert_eq!(a, 255);
+                let at = at as u32;
+                self.0.put_pixel(left + at % across, top + at / across, Rgb([r, g, b]));
+            }
+        }
+    }
+
+    fn pack(packer: &mut Packer, image: &RgbImage) -> Vec<u8> {
+        let (number, took) = (1, Duration::ZERO);
+        packer.pack(Picture { number, image: image.clone(), took, is_final: true })
+    }
+
+    #[test]
+    fn parts_make_the_whole_picture_whatever_changes() {
+        let seed = std::hash::BuildHasher::hash_one(&std::hash::RandomState::new(), 0);
+        println!("seed {seed}");
+        let mut state = seed | 1;
+        let mut below = |limit: u32| {
+            // Marsaglia, Xorshift RNGs (2003).
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 33) as u32 % limit
+        };
+        let (mut packer, mut shown) = (Packer::default(), Shown::default());
+        let mut image = RgbImage::new(1, 1);
+        for _ in 0..3000 {
+            if below(20) == 0 {
+                image = RgbImage::new(1 + below(17), 1 + below(13));
+            }
+            for _ in 0..below(4) {
+                let (x, y) = (below(image.width()), below(image.height()));
+                image.put_pixel(x, y, Rgb([below(3) as u8, below(3) as u8, below(3) as u8]));
+            }
+            shown.put(&pack(&mut packer, &image));
+            assert!(shown.0 == image);
+        }
+    }
+
+    #[test]
+    fn no_more_is_sent_than_differs() {
+        let mut packer = Packer::default();
+        let mut image = RgbImage::new(100, 50);
+        assert_eq!(pack(&mut packer, &image).len(), HEADER + 100 * 50 * 4, "the first one is whole");
+        assert_eq!(pack(&mut packer, &image).len(), HEADER, "the same again is nothing");
+        image.put_pixel(20, 7, Rgb([1, 2, 3]));
+        image.put_pixel(29, 11, Rgb([1, 2, 3]));
+        assert_eq!(pack(&mut packer, &image).len(), HEADER + 10 * 5 * 4);
+        let turned = RgbImage::new(50, 100);
+        assert_eq!(pack(&mut packer, &turned).len(), HEADER + 100 * 50 * 4, "another size is whole");
+    }
+}
