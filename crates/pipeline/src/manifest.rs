@@ -446,6 +446,14 @@ mod tests {
     use super::*;
     use crate::reconcile::{Results, ScriptFound, Scripts, reconcile};
 
+    #[test]
+    fn a_status_is_shown_as_it_is_written() {
+        use Status::{Done, Empty, Failed, Refused, Rendering, Waiting};
+        for status in [Empty, Waiting, Rendering, Failed, Refused, Done] {
+            assert_eq!(serde_json::to_value(status).unwrap(), status.to_string());
+        }
+    }
+
     fn manifest(names: &[&str], removed_at: Option<u64>) -> Manifest {
         let found = names.iter().map(|name| ScriptFound {
             name: ScriptName::new(name).unwrap(),

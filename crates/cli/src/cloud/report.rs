@@ -1,7 +1,7 @@
 //! What a manifest says, for people.
 
 use rayfold_client::{Obstacle, obstacles};
-use rayfold_pipeline::manifest::{Manifest, Status};
+use rayfold_pipeline::manifest::Manifest;
 
 use crate::console::Console;
 use crate::wording::number;

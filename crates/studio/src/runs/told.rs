@@ -3,7 +3,7 @@
 use rayfold_client::{Watch, obstacles};
 use rayfold_pipeline::Clock;
 use rayfold_pipeline::keys::{Part, ScriptName};
-use rayfold_pipeline::manifest::{Frame, FrameState, Manifest, Reason, Status};
+use rayfold_pipeline::manifest::{Frame, FrameState, Manifest, Reason};
 use rayfold_pipeline::store::Store;
 use rayfold_scene::Diagnostic;
 use serde::Serialize;
@@ -20,7 +20,7 @@ pub(super) struct Summary {
     /// Its name, which is its address.
     pub(super) run: String,
     /// A word: that of the manifest, or why there is none.
-    pub(super) status: &'static str,
+    pub(super) status: String,
     /// Frames drawn.
     pub(super) done: u64,
     /// Frames that cannot be drawn.
@@ -137,7 +137,7 @@ pub(super) fn summary<S: Store, C: Clock>(watch: &Watch<'_, S, C>) -> Summary {
     });
     let mut summary = Summary {
         run: watch.animation().to_string(),
-        status: if watch.is_unreadable() { "unreadable" } else { "new" },
+        status: if watch.is_unreadable() { "unreadable" } else { "new" }.to_owned(),
         done: 0,
         failed: 0,
         total: 0,
@@ -258,7 +258,7 @@ mod tests {
     fn state(done: u64) -> RunState {
         let summary = Summary {
             run: "film".into(),
-            status: "rendering",
+            status: "rendering".into(),
             done,
             failed: 0,
             total: 3,
