@@ -1,12 +1,13 @@
 // Examples, files of one's own and new names, in a real browser: `node --test`, with RAYFOLD (the program) and CHROMIUM.
 
 import assert from "node:assert/strict";
+import { spawnSync } from "node:child_process";
 import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
 
-import { audit, open, scenes, shot, until } from "./stage.mjs";
+import { audit, open, program, scenes, shot, until } from "./stage.mjs";
 
 const text = "Screen 320 180\nCamera 0 1 8  0 0 -1  0 1 0  1  -.8 -.45  .8 .45\nIlight 1 1 1 1 -1 -1\nSphere 1 0 1 0 .1 .1 .1 .8 .2 .2\nTrace\n";
 
@@ -86,4 +87,25 @@ test("all frames and all scripts come as zip files", async (t) => {
     assert.ok(bytes.includes(first), first);
   }
   check();
+});
+
+test("a GIF that is being made can be given up, and is made anew", async (t) => {
+  const film = (size, samples, frames) =>
+    `Screen ${size}\nSamples ${samples}\nFrames ${frames}\nLook 0 2 8  0 1 0  40\nIlight 1 1 1  1 -2 -1\nSphere 1  (1:-2 ${frames}:2) 1 0  .1 .1 .1  .5 .6 .7  .4 .4 .4\nTrace\n`;
+  const studio = await open(t, { text: film("1600 1200", 1024, 300) });
+  const { page, path, folder } = studio;
+  await page.getByRole("button", { name: "Render GIF" }).click();
+  await page.getByRole("progressbar", { name: "Frames drawn" }).waitFor();
+  assert.deepEqual(await audit(page), []);
+  await page.getByRole("button", { name: "Cancel" }).click();
+  await page.getByRole("button", { name: "Render GIF" }).waitFor();
+  assert.equal(await page.getByRole("link", { name: /Download GIF/ }).count(), 0, "half of one is none");
+  writeFileSync(path, film("96 64", 4, 5));
+  await page.getByText("frame 1 of 5").waitFor();
+  await page.getByRole("button", { name: "Render GIF" }).click();
+  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name: /Download GIF/ }).click()]);
+  const run = spawnSync(program, ["render", path, "-o", join(folder, "expected.gif")]);
+  assert.equal(run.status, 0, String(run.stderr));
+  assert.ok(readFileSync(await download.path()).equals(readFileSync(join(folder, "expected.gif"))), "the same bytes");
+  studio.check();
 });

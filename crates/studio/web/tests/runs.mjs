@@ -124,6 +124,7 @@ test("a run goes on without its page, and gives the GIF of the command line", as
   await again.getByRole("link", { name: "All runs" }).click();
   await again.getByText("done: 50 of 50 frames").waitFor();
   await again.getByRole("link", { name: "hello", exact: true }).waitFor();
+  assert.deepEqual(await audit(again), []);
   await again.getByRole("button", { name: "Back to the scene" }).click();
   await until(async () => !(await again.locator("dialog").isVisible()));
   const all = heard.join("\n");
