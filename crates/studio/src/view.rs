@@ -101,6 +101,17 @@ impl Orbit {
         DVec3::new(-sin * self.yaw.sin(), cos, -sin * self.yaw.cos())
     }
 
+    /// From where it stands at something else.
+    pub(crate) fn aimed(self, target: DVec3) -> Self {
+        let back = self.eye() - target;
+        let distance = back.length();
+        if !(distance.is_normal()) {
+            return self;
+        }
+        let pitch = (back.y / distance).clamp(-1.0, 1.0).asin();
+        Self { target, distance, yaw: back.x.atan2(back.z), pitch, ..self }
+    }
+
     /// Where it stands.
     pub(crate) fn eye(&self) -> DVec3 {
         self.target + self.distance * self.backward()

@@ -43,8 +43,14 @@ impl Session {
 
     pub(super) fn add(&mut self, project: &mut Project, name: &str, at: Option<DVec2>, tell: &mut Tell) {
         let Some(command) = Command::from_name(name) else { return };
-        if !matches!(role(command), Role::Object | Role::Light) {
-            return;
+        match role(command) {
+            Role::Object | Role::Light => {}
+            Role::Camera => {
+                self.aim(project, at);
+                self.keep_camera(project, tell);
+                return;
+            }
+            Role::Use | Role::Group | Role::Material | Role::Setting => return,
         }
         let shown = self.shown(project);
         let stage = &shown.stage;

@@ -191,6 +191,15 @@ impl Session {
         };
     }
 
+    /// Looks from here at what is seen there, if that is something.
+    pub(super) fn aim(&mut self, project: &Project, at: Option<DVec2>) {
+        let target = at.and_then(|at| self.pick(project, at.x, at.y)).map(|(_, point)| point);
+        self.free = self.orbit(project).map(|orbit| match target {
+            Some(target) => orbit.aimed(target),
+            None => orbit,
+        });
+    }
+
     pub(super) fn keep_camera(&mut self, project: &mut Project, tell: &mut Tell) -> Change {
         let shown = self.shown(project);
         let Some(scene) = &shown.scene else { return Change::Nothing };

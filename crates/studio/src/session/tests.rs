@@ -7,6 +7,7 @@ use super::sight::PIXELS;
 use super::*;
 use crate::handles::{Grip, Handle, Manner};
 use crate::protocol::{Source, State};
+use crate::view::Projection;
 
 /// A page and the script that it has open.
 pub(super) struct Desk {
@@ -129,6 +130,22 @@ fn a_drag_beside_all_objects_turns_a_free_camera_and_leaves_the_script() {
     assert!(!desk.state().free && text.lines().nth(2) != TEXT.lines().nth(2));
     assert_eq!(text.lines().count(), TEXT.lines().count());
     assert!(desk.project.files[0].is_sound(), "{text}");
+}
+
+#[test]
+fn a_camera_of_the_palette_looks_from_here_at_what_it_falls_on() {
+    let mut desk = Desk::new(TEXT);
+    let before = desk.seen(4);
+    let (_, point) = desk.session.pick(&desk.project, before.x, before.y).unwrap();
+    desk.ask(Ask::Add { command: "Camera".into(), at: Some(before.into()) });
+    let text = desk.text();
+    assert_eq!(text.lines().count(), TEXT.lines().count(), "{text}");
+    let scene = desk.session.scene(&desk.project).unwrap();
+    let after = Projection::new(&scene).point(point).unwrap();
+    let middle = 0.5 * DVec2::new(f64::from(scene.screen.width()), f64::from(scene.screen.height()));
+    assert!(after.distance(middle) < 1.5 && before.distance(middle) > 5.0, "{before} to {after}");
+    desk.ask(Ask::Undo);
+    assert_eq!(desk.text(), TEXT);
 }
 
 #[test]

@@ -98,18 +98,22 @@ export function Palette(): JSX.Element {
       <h2 id="palette-title">Add</h2>
       <div class="buttons">
         {tables.value
-          .filter((table) => table.role === "object" || table.role === "light")
+          .filter((table) => table.role === "object" || table.role === "light" || table.name === "Camera")
           .map((table) => (
             <button
               type="button"
               key={table.name}
               class={table.role}
               draggable
-              title={`${table.name}: click, or drag it into the picture`}
+              title={
+                table.role === "camera"
+                  ? "The script's camera: click to see as you do now, or drag it onto what it is to look at from here"
+                  : `${table.name}: click, or drag it into the picture`
+              }
               onDragStart={(event) => event.dataTransfer?.setData("text/plain", table.name)}
               onClick={() => ask({ ask: "add", command: table.name, at: null })}
             >
-              {table.name}
+              {table.role === "camera" ? "Camera here" : table.name}
             </button>
           ))}
       </div>
