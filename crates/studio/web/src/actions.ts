@@ -12,6 +12,8 @@ export interface Action {
 }
 
 const any = (): boolean => selection.value.length > 0;
+const one = (): boolean => selection.value.length === 1;
+const reorder = (down: boolean) => (): void => ask({ ask: "reorder", line: selection.value.at(-1) ?? -1, down });
 const nudge = (x: number, y: number, z: number) => (): void =>
   ask({ ask: "nudge", lines: selection.value, by: [x, y, z] });
 
@@ -44,6 +46,8 @@ export const actions = {
     run: () => ask({ ask: "ungroup", line: selection.value.at(-1) ?? -1 }),
     enabled: () => selection.value.length === 1 && lines.value[selection.value[0] ?? -1]?.role === "use",
   },
+  earlier: { title: "Move up the list, in the list", keys: ["Alt+ArrowUp"], run: reorder(false), enabled: one },
+  later: { title: "Move down the list, in the list", keys: ["Alt+ArrowDown"], run: reorder(true), enabled: one },
   lock: { title: "Lock or unlock, in the picture", keys: ["l"], run: () => ask({ ask: "lock", lines: selection.value }), enabled: any },
   ground: { title: "Stand on the ground", keys: ["g"], run: () => ask({ ask: "ground", lines: selection.value }), enabled: any },
   drop: { title: "Drop onto what is below", keys: ["d"], run: () => ask({ ask: "drop", lines: selection.value }), enabled: any },

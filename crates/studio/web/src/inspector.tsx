@@ -36,6 +36,8 @@ export function Inspector(): JSX.Element {
           {actions.ungroup.enabled() ? <Button action={actions.ungroup} label="Ungroup" /> : <Button action={actions.group} label="Group" />}
           <Button action={actions.hide} label="Hide" />
           <Button action={actions.lock} label={selection.value.every((at) => state.value?.locked.includes(at)) ? "Unlock" : "Lock"} />
+          <Button action={actions.earlier} label="Up the list" />
+          <Button action={actions.later} label="Down the list" />
           <Button action={actions.ground} label="To the ground" />
           <Button action={actions.drop} label="Drop" />
           <Button action={actions.key} label="Key" />

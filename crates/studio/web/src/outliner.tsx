@@ -53,7 +53,7 @@ export function Outliner(): JSX.Element {
     const main = selection.value.at(-1) ?? null;
     const active = main === null ? -1 : listed.value.indexOf(main);
     if (event.altKey && main !== null && (event.key === "ArrowUp" || event.key === "ArrowDown")) {
-      ask({ ask: "reorder", line: main, down: event.key === "ArrowDown" });
+      (event.key === "ArrowDown" ? actions.later : actions.earlier).run();
     } else if (event.key === "ArrowDown") go(active + 1, event.shiftKey);
     else if (event.key === "ArrowUp") go(active < 0 ? 0 : active - 1, event.shiftKey);
     else if (event.key === "Home") go(0, false);

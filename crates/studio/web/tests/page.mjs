@@ -176,6 +176,20 @@ test("what is typed stays, whatever is told meanwhile", async (t) => {
   studio.check();
 });
 
+test("lines change their order by buttons and by keys, and nothing else", async (t) => {
+  const ball = (x, name) => `Sphere 1  ${x} 0 0  .1 .1 .1  1 1 1  # ${name}`;
+  const text = `Screen 96 64\nLook 0 1 9  0 0 0  40\n${ball(-2, "left")}\n${ball(2, "right")}\nTrace\n`;
+  const studio = await open(t, { text });
+  const { page } = studio;
+  await page.locator(".item", { hasText: "left" }).click();
+  await page.getByRole("button", { name: "Down the list" }).click();
+  await until(() => readFileSync(studio.path, "utf8") === `Screen 96 64\nLook 0 1 9  0 0 0  40\n${ball(2, "right")}\n${ball(-2, "left")}\nTrace\n`);
+  await page.getByRole("listbox").focus();
+  await page.keyboard.press("Alt+ArrowUp");
+  await until(() => readFileSync(studio.path, "utf8") === text);
+  studio.check();
+});
+
 test("what another program writes meanwhile is never overwritten", async (t) => {
   const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
   const { page, path } = studio;
