@@ -266,31 +266,25 @@ impl Drag {
                 Some((*number, line))
             })
         };
+        // Everything goes as the pointer does on a plane, along these axes.
+        let along = |normal: DVec3, axes| match between(projection, self.grabbed, normal, from, to) {
+            Some(by) => moved(axes, by).collect(),
+            None => self.start(),
+        };
         match self.grip {
             Grip::Body => {
                 let (normal, axes) = self.plane(projection, manner);
-                let Some(by) = between(projection, self.grabbed, normal, from, to) else {
-                    return self.start();
-                };
-                moved(axes, by).collect()
+                along(normal, axes)
             }
             Grip::Axis { axis } => {
-                let along = DVec3::AXES[axis];
+                let axis_way = DVec3::AXES[axis];
                 let (_, _, w) = projection.axes();
                 // The plane through the axis that faces the eye.
-                let normal = along.cross(w).cross(along);
+                let normal = axis_way.cross(w).cross(axis_way);
                 let Some(normal) = normal.try_normalize() else { return self.start() };
-                let Some(by) = between(projection, self.grabbed, normal, from, to) else {
-                    return self.start();
-                };
-                moved([0, 1, 2].map(|other| other == axis), by).collect()
+                along(normal, [0, 1, 2].map(|other| other == axis))
             }
-            Grip::Plane { axis } => {
-                let Some(by) = between(projection, self.grabbed, DVec3::AXES[axis], from, to) else {
-                    return self.start();
-                };
-                moved([0, 1, 2].map(|other| other != axis), by).collect()
-            }
+            Grip::Plane { axis } => along(DVec3::AXES[axis], [0, 1, 2].map(|other| other != axis)),
             Grip::Point { first } => {
                 let (normal, axes) = self.plane(projection, manner);
                 let Some(by) = between(projection, self.grabbed, normal, from, to) else {
