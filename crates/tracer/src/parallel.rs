@@ -3,6 +3,7 @@
 //! Knows nothing of what is drawn: it hands each worker rows that are its own and looks at the cancel flag between
 //! them. Which worker draws a band cannot be seen in the picture.
 
+use core::ops::Range;
 use std::sync::atomic::Ordering;
 
 use image::RgbImage;
@@ -22,38 +23,58 @@ pub(crate) fn map<T: Sync, U: Send>(items: &[T], f: impl Fn(&T) -> U + Send + Sy
     if items.len() < SHARED { items.iter().map(f).collect() } else { items.par_iter().map(f).collect() }
 }
 
-/// Draws an image in bands of `rows` rows; `draw` gets memory that `scratch` makes for a worker, the first row of its
-/// band, counted from the top, and the band's bytes.
+/// Draws these rows of an image, counted from the top, in bands of `side` rows, of which the first begins at the top of the
+/// image; `draw` gets memory that `scratch` makes for a worker, the first row of its band, and the band's bytes.
 pub(crate) fn bands<T>(
     screen: Screen,
-    rows: u32,
+    rows: Range<u32>,
+    side: u32,
     options: &RenderOptions,
     scratch: impl Fn() -> T + Send + Sync,
     draw: impl Fn(&mut T, u32, &mut [u8]) + Sync,
 ) -> Result<RgbImage, RenderError> {
     let mut rows_drawn = Ok(());
-    let image = image(screen, |buffer| {
-        let band = (screen.width() as usize).saturating_mul(rows as usize).saturating_mul(CHANNELS);
+    let whole = whole_bands(&rows, side, screen.height());
+    let image = image((screen.width(), whole.end - whole.start), |buffer| {
+        let band = (screen.width() as usize).saturating_mul(side as usize).saturating_mul(CHANNELS);
         rows_drawn =
             buffer.par_chunks_mut(band).enumerate().try_for_each_init(scratch, |scratch, (index, band)| {
                 if options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
                     return Err(RenderError::Cancelled);
                 }
-                draw(scratch, index as u32 * rows, band);
+                draw(scratch, whole.start + index as u32 * side, band);
                 Ok(())
             });
     })?;
-    rows_drawn.map(|()| image)
+    rows_drawn.map(|()| cut(image, rows.start - whole.start..rows.end - whole.start))
 }
 
-/// An image whose bytes `draw` fills.
+/// The rows of the bands of `side` rows that have any of these, of an image of so many rows.
+pub(crate) fn whole_bands(rows: &Range<u32>, side: u32, height: u32) -> Range<u32> {
+    rows.start / side * side..(rows.end.div_ceil(side).saturating_mul(side)).min(height)
+}
+
+/// Some rows of an image, in its memory.
+fn cut(image: RgbImage, rows: Range<u32>) -> RgbImage {
+    let width = image.width();
+    let place = |row: u32| row as usize * width as usize * CHANNELS;
+    let mut bytes = image.into_raw();
+    bytes.truncate(place(rows.end));
+    bytes.drain(..place(rows.start));
+    // There are just as many bytes as these rows have.
+    RgbImage::from_raw(width, rows.end - rows.start, bytes).unwrap_or_default()
+}
+
+/// An image of so many columns and rows, whose bytes `draw` fills.
 ///
 /// # Errors
 /// When it cannot be held in memory.
-pub(crate) fn image(screen: Screen, draw: impl FnOnce(&mut [u8])) -> Result<RgbImage, RenderError> {
-    let (width, height) = (screen.width(), screen.height());
+pub(crate) fn image(
+    (width, height): (u32, u32),
+    draw: impl FnOnce(&mut [u8]),
+) -> Result<RgbImage, RenderError> {
     let too_large = || RenderError::TooLarge { width, height };
-    let pixels = usize::try_from(screen.pixels()).map_err(|_| too_large())?;
+    let pixels = usize::try_from(u64::from(width) * u64::from(height)).map_err(|_| too_large())?;
     let bytes = pixels.checked_mul(CHANNELS).ok_or_else(too_large)?;
     let mut buffer = Vec::new();
     buffer.try_reserve_exact(bytes).map_err(|_| too_large())?;

@@ -50,10 +50,14 @@ pub(super) fn telescopes(backends: &[Backend], size: Size, figures: &mut Figures
     judge_kinds(&[("needles through a telescope", telescope)], FEW, backends, size, figures)
 }
 
-/// Rays through the edges of rectangles, and parallel rays that go far.
+/// Rays through the edges of rectangles, parallel rays that go far, and floors that reach far beyond what stands on them.
 pub(super) fn edges(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
-    let kinds: &[Kind] =
-        &[("edges of rectangles", rectangles), ("far triangles in parallel rays", far_parallel)];
+    let kinds: &[Kind] = &[
+        ("edges of rectangles", rectangles),
+        ("far triangles in parallel rays", far_parallel),
+        ("steep planes in parallel rays", steep_parallel),
+        ("floors without an end", endless_floor),
+    ];
     judge_kinds(kinds, FEW, backends, size, figures)
 }
 
@@ -338,4 +342,48 @@ fn far_parallel(rng: &mut Rng) -> Result<Scene> {
     scene.lights = vec![light(0.8, [0.2, 0.3, -1.0])?].into();
     scene.objects = objects.into();
     Ok(scene)
+}
+
+/// Triangles that lean away from parallel rays, over any distance; some of their planes meet the rows that rays run in.
+fn steep_parallel(rng: &mut Rng) -> Result<Scene> {
+    let away = power(rng, 0.0, 13.0);
+    let mut objects: Vec<Object> = Vec::new();
+    for _ in 0..rng.usize(1..6) {
+        let level = rng.bool();
+        let mut corner = || {
+            let y = if rng.usize(0..3) == 0 { 0.0 } else { within(rng, -5.0, 30.0) };
+            DVec3::new(within(rng, -5.0, 40.0), y, -away * within(rng, 0.1, 1.0))
+        };
+        let (a, b, mut c) = (corner(), corner(), corner());
+        if level {
+            c = DVec3::new(c.x, 0.0, 0.0);
+        }
+        objects.push(Triangle::new([a, b, c], matte(rng)?)?.into());
+    }
+    let mut scene = Scene::new(Screen::new(36, 27)?, Camera::Orthographic);
+    scene.lights = vec![light(0.8, [0.2, 0.3, -1.0])?, light(0.8, direction(rng).to_array())?].into();
+    scene.objects = objects.into();
+    Ok(scene)
+}
+
+/// Rectangles and triangles at height 0 that reach up to 1e20 far, and small things on them.
+fn endless_floor(rng: &mut Rng) -> Result<Scene> {
+    let far = power(rng, 1.0, 20.0);
+    let mut objects: Vec<Object> = Vec::new();
+    if rng.bool() {
+        let corner = DVec3::new(far * within(rng, 0.1, 1.0), 0.0, far * within(rng, 0.1, 1.0));
+        objects.push(Cuboid::new([-corner, corner], matte(rng)?)?.into());
+    } else {
+        let mut corner = |x: f64, z: f64| {
+            DVec3::new(x * far * within(rng, 0.5, 1.0), 0.0, z * far * within(rng, 0.5, 1.0))
+        };
+        let corners = [corner(-1.0, 1.0), corner(1.0, 1.0), corner(0.0, -1.0)];
+        objects.push(Triangle::new(corners, matte(rng)?)?.into());
+    }
+    for _ in 0..rng.usize(0..4) {
+        let (radius, x, z) = (within(rng, 0.1, 0.8), within(rng, -2.0, 2.0), within(rng, -3.0, 2.0));
+        objects.push(Sphere::new(radius, DVec3::new(x, radius, z), matte(rng)?)?.into());
+    }
+    let towards = upwards(rng);
+    picture(rng, objects, towards)
 }

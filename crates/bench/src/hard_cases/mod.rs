@@ -298,7 +298,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         number: "39",
-        title: "edges of rectangles, and parallel rays that go far",
+        title: "edges of rectangles, parallel rays that go far, floors that reach to 1e20",
         asked: "at most 0.01 % of the pixels other than the oracle's",
         run: chosen::edges,
     },

@@ -125,12 +125,18 @@ pub(super) fn packet_shape<S: Simd, E: Real>() -> (usize, usize) {
     }
 }
 
-/// `from` and on, a number a lane, the lanes counted modulo `modulus`.
+/// `from` and on, a number a lane.
 #[inline(always)]
-pub(super) fn lanes<S: Simd, E: Real>(simd: S, from: usize, modulus: usize) -> Lanes<S, E> {
-    let mut numbers = [E::narrow(0.0); 16];
+pub(super) fn count_from<S: Simd, E: Real>(simd: S, from: usize) -> Lanes<S, E> {
+    Lanes::<S, E>::from_slice(simd, &E::COUNT[..Lanes::<S, E>::LEN]) + E::narrow(from as f64)
+}
+
+/// The number of a lane modulo `width`, which is a power of two.
+#[inline(always)]
+pub(super) fn lanes_modulo<S: Simd, E: Real>(simd: S, width: usize) -> Lanes<S, E> {
+    let mut numbers = E::COUNT;
     for (lane, number) in numbers.iter_mut().enumerate() {
-        *number = E::narrow((from + lane % modulus) as f64);
+        *number = E::COUNT[lane & (width - 1)];
     }
     Lanes::<S, E>::from_slice(simd, &numbers[..Lanes::<S, E>::LEN])
 }

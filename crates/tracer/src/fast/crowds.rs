@@ -21,6 +21,9 @@ const NEIGHBOURS: usize = 64;
 /// How many times neighbours of a crowd cover the place that they lie in, at least. Those of a mesh cover it a few times.
 const COVERED: f32 = 16.0;
 
+/// One object in so many is sorted to see whether there may be a crowd.
+const SAMPLED: u32 = 16;
+
 /// Bits of a place on the curve along each axis.
 const BITS: u32 = 10;
 
@@ -39,13 +42,19 @@ impl Crowds {
         if boxes.len() < FEW {
             return None;
         }
-        let middles: Vec<Vec3A> = boxes.iter().map(|of| 0.5 * of.min + 0.5 * of.max).collect();
+        let place = |at: u32| {
+            let of = &boxes[at as usize];
+            0.5 * of.min + 0.5 * of.max
+        };
+        if !may_have_crowds(boxes, &place) {
+            return None;
+        }
         let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-        sort(&middles, &mut order);
+        sort(&place, &mut order, FEW);
         let mut ranges: Vec<Range<usize>> = Vec::new();
         for from in (0..order.len()).step_by(NEIGHBOURS) {
             let end = (from + NEIGHBOURS).min(order.len());
-            if is_crowd(order[from..end].iter().map(|&at| &boxes[at as usize])) {
+            if Together::of(order[from..end].iter().map(|&at| &boxes[at as usize])).covers(COVERED) {
                 match ranges.last_mut() {
                     Some(last) if last.end == from => last.end = end,
                     Some(_) | None => ranges.push(from..end),
@@ -57,26 +66,58 @@ impl Crowds {
     }
 }
 
-/// Whether boxes cover the place that they lie in many times.
-fn is_crowd<'a>(boxes: impl Iterator<Item = &'a Aabb>) -> bool {
-    let length = |of: &Aabb| of.diagonal().element_sum();
-    let (mut whole, mut area, mut extent) = (Aabb::empty(), 0.0, 0.0);
-    for of in boxes {
-        whole = whole.union(of);
-        area += of.half_area();
-        extent += length(of);
+/// Whether some objects, picked without regard to their order, stand so close that all of them may be a crowd. Neighbours
+/// among the picked lie at most as many times further apart, along a line, as there are others between them.
+fn may_have_crowds(boxes: &[Aabb], place: &(impl Fn(u32) -> Vec3A + Sync)) -> bool {
+    // Fibonacci hashing (Knuth, The Art of Computer Programming, 6.4).
+    let is_picked = |at: &u32| at.wrapping_mul(0x9e37_79b9) < u32::MAX / SAMPLED;
+    let mut picked: Vec<u32> = (0..boxes.len() as u32).filter(is_picked).collect();
+    sort(place, &mut picked, FEW / SAMPLED as usize);
+    let least = COVERED / SAMPLED as f32;
+    picked.chunks(NEIGHBOURS).any(|chunk| {
+        let chunk = Together::of(chunk.iter().map(|&at| &boxes[at as usize]));
+        chunk.covers(least) || chunk.is_long()
+    })
+}
+
+/// Boxes taken together.
+struct Together {
+    whole: Aabb,
+    area: f32,
+    length: f32,
+}
+
+impl Together {
+    fn of<'a>(boxes: impl Iterator<Item = &'a Aabb>) -> Self {
+        let nothing = Self { whole: Aabb::empty(), area: 0.0, length: 0.0 };
+        boxes.fold(nothing, |sum, of| Self {
+            whole: sum.whole.union(of),
+            area: sum.area + of.half_area(),
+            length: sum.length + length(of),
+        })
     }
-    // Boxes along a line have no area.
-    if whole.half_area() > 0.0 {
-        area >= COVERED * whole.half_area()
-    } else {
-        extent >= COVERED * length(&whole)
+
+    /// Whether they cover the place that they lie in so many times.
+    fn covers(&self, times: f32) -> bool {
+        let place = self.whole.half_area();
+        // Boxes along a line have no area.
+        if place > 0.0 { self.area >= times * place } else { self.length >= times * length(&self.whole) }
+    }
+
+    /// Whether they are many times as long as the place that they lie in, or have no size at all: what has no area covers
+    /// nothing.
+    fn is_long(&self) -> bool {
+        self.length == 0.0 || self.length >= COVERED * length(&self.whole)
     }
 }
 
-/// Sorts objects along the curve; those in one place of it along a finer one, if they are many.
-fn sort(middles: &[Vec3A], order: &mut [u32]) {
-    let place = |at: u32| middles[at as usize];
+/// The lengths of a box along the axes, added up.
+fn length(of: &Aabb) -> f32 {
+    of.diagonal().element_sum()
+}
+
+/// Sorts objects along the curve; those in one place of it along a finer one, if they are not `few`.
+fn sort(place: &(impl Fn(u32) -> Vec3A + Sync), order: &mut [u32], few: usize) {
     let (low, high) = order.iter().fold((Vec3A::INFINITY, Vec3A::NEG_INFINITY), |(low, high), &at| {
         (low.min(place(at)), high.max(place(at)))
     });
@@ -99,8 +140,8 @@ fn sort(middles: &[Vec3A], order: &mut [u32]) {
     }
     let mut from = 0;
     for same in places.chunk_by(|a, b| a >> INDEX == b >> INDEX) {
-        if same.len() >= FEW {
-            sort(middles, &mut order[from..from + same.len()]);
+        if same.len() >= few {
+            sort(place, &mut order[from..from + same.len()], few);
         }
         from += same.len();
     }

@@ -5,7 +5,7 @@ use fearless_simd::prelude::*;
 
 use super::band::{Band, Tile};
 use super::bodies::Bodies;
-use super::bounce::{Hits, Queue, lanes, packet_shape, weigh};
+use super::bounce::{Hits, Queue, count_from, lanes_modulo, packet_shape, weigh};
 use super::candidates::Candidates;
 use super::features::Features;
 use super::packet::{Nearest, Ray};
@@ -22,8 +22,8 @@ fn each_packet<S: Simd, E: Real>(
     mut each: impl FnMut(usize, Lanes<S, E>, Lanes<S, E>),
 ) {
     let (width, height) = packet_shape::<S, E>();
-    let columns = lanes::<S, E>(simd, 0, width);
-    let rows = (lanes::<S, E>(simd, 0, usize::MAX) - columns) * E::narrow(1.0 / width as f64);
+    let columns = lanes_modulo::<S, E>(simd, width);
+    let rows = (count_from::<S, E>(simd, 0) - columns) * E::narrow(1.0 / width as f64);
     let right = constant::<S, E>(simd, f64::from(tile.left + tile.width - 1));
     let bottom = constant::<S, E>(simd, f64::from(tile.top + tile.height - 1));
     let last_row = constant::<S, E>(simd, f64::from(band.size.1 - 1));
@@ -97,7 +97,7 @@ pub(super) fn aim_along_axis<S: Simd, E: Real>(
                     rays.origin(simd, i, j).store(&mut queue.origin, at);
                     rays.direction(simd).store(&mut queue.direction, at);
                     Vec3::<S, E>::splat(simd, [one; 3]).store(&mut queue.weight, at);
-                    lanes::<S, E>(simd, at, usize::MAX).store_slice(&mut queue.pixel.0[at..end]);
+                    count_from::<S, E>(simd, at).store_slice(&mut queue.pixel.0[at..end]);
                     queue.count = end;
                 },
             );

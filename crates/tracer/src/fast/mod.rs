@@ -55,6 +55,7 @@ mod tree;
 mod waiting;
 mod window;
 
+use core::ops::Range;
 use std::sync::atomic::Ordering;
 
 use fearless_simd::{Level, Simd};
@@ -139,7 +140,35 @@ impl<'a> Drawing<'a> {
     /// # Errors
     /// Those of [`crate::render`].
     pub fn draw(&self) -> Result<RgbImage, RenderError> {
-        self.draw_with(None)
+        self.draw_rows(0..self.height())
+    }
+
+    /// Some rows of the image, counted from the top: the very pixels that the whole image has there. It takes the time and
+    /// memory of those rows, and of the [margin](Self::margin) above and below them. Rows that the image has not are left out.
+    ///
+    /// # Errors
+    /// Those of [`crate::render`].
+    pub fn draw_rows(&self, rows: Range<u32>) -> Result<RgbImage, RenderError> {
+        self.draw_within(rows, self.margin())
+    }
+
+    /// Draws rows without any regard for those beside them: what that shows is not quite what the image shows, but it takes
+    /// about as long. For measuring what the whole will take.
+    ///
+    /// # Errors
+    /// Those of [`crate::render`].
+    pub fn sketch_rows(&self, rows: Range<u32>) -> Result<(), RenderError> {
+        self.draw_within(rows, 0).map(drop)
+    }
+
+    /// How many rows beside it have a say in what a row shows: none, unless the picture has an error to be reached, so that
+    /// pixels get as many samples as those near them ask for.
+    pub fn margin(&self) -> u32 {
+        match &self.0 {
+            Backend::SampledSingle(sampled) => sampled.margin(),
+            Backend::SampledDouble(sampled) => sampled.margin(),
+            Backend::Single(_) | Backend::Double(_) | Backend::Reference(..) => 0,
+        }
     }
 
     /// The same; `each` gets the picture after each pass over the image but the last. Each is an estimate of the whole picture,
@@ -148,17 +177,39 @@ impl<'a> Drawing<'a> {
     /// # Errors
     /// Those of [`crate::render`].
     pub fn draw_progressively(&self, mut each: impl FnMut(RgbImage)) -> Result<RgbImage, RenderError> {
-        self.draw_with(Some(&mut each))
+        match &self.0 {
+            Backend::SampledSingle(sampled) => sampled.draw_progressively(&mut each),
+            Backend::SampledDouble(sampled) => sampled.draw_progressively(&mut each),
+            Backend::Single(_) | Backend::Double(_) | Backend::Reference(..) => self.draw(),
+        }
     }
 
-    fn draw_with(&self, each: Option<&mut dyn FnMut(RgbImage)>) -> Result<RgbImage, RenderError> {
-        match &self.0 {
-            Backend::Single(setup) => setup.draw::<Robust>(),
-            Backend::Double(setup) => setup.draw::<Robust>(),
-            Backend::SampledSingle(sampled) => sampled.draw(each),
-            Backend::SampledDouble(sampled) => sampled.draw(each),
-            Backend::Reference(exposure, options) => crate::reference::render_exposed(*exposure, options),
+    fn draw_within(&self, rows: Range<u32>, margin: u32) -> Result<RgbImage, RenderError> {
+        let end = rows.end.min(self.height());
+        let rows = rows.start.min(end)..end;
+        if rows.is_empty() {
+            return Ok(RgbImage::default());
         }
+        match &self.0 {
+            Backend::Single(setup) => setup.draw::<Robust>(rows),
+            Backend::Double(setup) => setup.draw::<Robust>(rows),
+            Backend::SampledSingle(sampled) => sampled.draw_rows(rows, margin),
+            Backend::SampledDouble(sampled) => sampled.draw_rows(rows, margin),
+            Backend::Reference(exposure, options) => {
+                crate::reference::render_exposed_rows(*exposure, rows, options)
+            }
+        }
+    }
+
+    fn height(&self) -> u32 {
+        let scene = match &self.0 {
+            Backend::Single(setup) => setup.scene,
+            Backend::Double(setup) => setup.scene,
+            Backend::SampledSingle(sampled) => sampled.scene(),
+            Backend::SampledDouble(sampled) => sampled.scene(),
+            Backend::Reference(exposure, _) => exposure.scene(),
+        };
+        scene.screen.height()
     }
 }
 
@@ -179,9 +230,10 @@ impl Drawing<'_> {
     /// # Errors
     /// Those of [`crate::render`].
     pub fn draw_means(&self) -> Result<Option<Means>, RenderError> {
+        let rows = 0..self.height();
         let film = match &self.0 {
-            Backend::SampledSingle(sampled) => sampled.expose(|_| Ok(()))?,
-            Backend::SampledDouble(sampled) => sampled.expose(|_| Ok(()))?,
+            Backend::SampledSingle(sampled) => sampled.expose(rows, |_| Ok(()))?,
+            Backend::SampledDouble(sampled) => sampled.expose(rows, |_| Ok(()))?,
             Backend::Single(_) | Backend::Double(_) | Backend::Reference(..) => return Ok(None),
         };
         let (means, counts) = film.means().unzip();
@@ -242,7 +294,8 @@ pub(crate) fn precision(scene: &Scene) -> Precision {
 #[cfg(feature = "accuracy")]
 pub(crate) fn render_naive(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     let Ranked { scene: ranked, .. } = &Ranked::new(scene);
-    Setup::<f32>::new(scene, ranked, &Geometry::new(ranked, options.tree)?, options)?.draw::<naive::Naive>()
+    let setup = Setup::<f32>::new(scene, ranked, &Geometry::new(ranked, options.tree)?, options)?;
+    setup.draw::<naive::Naive>(0..scene.screen.height())
 }
 
 /// What a kernel needs to draw a scene.
@@ -276,8 +329,8 @@ impl<'a, E: Real> Setup<'a, E> {
         Ok(Self { scene, options, prepared, window, side })
     }
 
-    /// Draws bands of tiles side by side.
-    fn draw<By: Formulas<E>>(&self) -> Result<RgbImage, RenderError> {
+    /// Draws bands of tiles side by side, those with these rows.
+    fn draw<By: Formulas<E>>(&self, rows: Range<u32>) -> Result<RgbImage, RenderError> {
         let Self { scene, options, prepared, window, side } = self;
         let size = (scene.screen.width(), scene.screen.height());
         let background = levels(scene.background.colors().0, scene.tone);
@@ -286,6 +339,7 @@ impl<'a, E: Real> Setup<'a, E> {
         // Boxed: it is passed from band to band by value.
         let image = bands(
             scene.screen,
+            rows,
             side.1,
             options,
             || Box::new(Scratch::new(options.cancel)),

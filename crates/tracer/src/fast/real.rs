@@ -30,6 +30,9 @@ pub(super) trait Real:
     /// Farther than anything in a scene of unit size, and near enough that products with it are finite.
     const FAR: f64;
 
+    /// A number a lane, from 0 on.
+    const COUNT: [Self; 16];
+
     /// The nearest number of this kind.
     fn narrow(x: f64) -> Self;
 
@@ -45,6 +48,7 @@ pub(super) trait Real:
 impl Real for f32 {
     const ROUNDOFF: f64 = f32::EPSILON as f64 / 2.0;
     const FAR: f64 = 1e18;
+    const COUNT: [Self; 16] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
 
     #[inline(always)]
     fn narrow(x: f64) -> Self {
@@ -72,6 +76,7 @@ impl Real for f32 {
 impl Real for f64 {
     const ROUNDOFF: f64 = f64::EPSILON / 2.0;
     const FAR: f64 = 1e140;
+    const COUNT: [Self; 16] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
 
     #[inline(always)]
     fn narrow(x: f64) -> Self {

@@ -86,7 +86,9 @@ pub(super) const SIDE: f64 = 5.25;
 pub(super) const CONSTANT: f64 = 4.0 * f64::EPSILON;
 
 /// Rounding errors of a triangle's volume with the eye in `f64`, relative to the product of the lengths: those of
-/// [`CONSTANT`], and of a dot product of three terms.
+/// [`CONSTANT`], and of a dot product of three terms. Relative, too, to the sum of the six products of the determinant, each
+/// at most that of the corners' largest coordinates: which is less where a triangle lies in a plane along two axes, near the
+/// eye for its size.
 pub(super) const VOLUME: f64 = 4.0 * f64::EPSILON;
 
 /// How far a region of points that wait for light is widened on a sun's screen, in roundoffs of the sum of the

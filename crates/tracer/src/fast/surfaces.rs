@@ -4,7 +4,7 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use super::beyond::Beyond;
-use super::bounce::{Column, Columns, Hits, Queue, lanes, weigh};
+use super::bounce::{Column, Columns, Hits, Queue, count_from, weigh};
 use super::features::Features;
 use super::packet::{Nearest, Ray, Surface};
 use super::prepare::{Entry, Prepared};
@@ -202,7 +202,7 @@ pub(super) fn reflect<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>(
                 let normal = Vec3::<S, E>::load(simd, &hits.normal, at);
                 let incoming = Vec3::load(simd, &queue.direction, at);
                 let pixel = if EYE {
-                    lanes::<S, E>(simd, at, usize::MAX)
+                    count_from::<S, E>(simd, at)
                 } else {
                     Lanes::<S, E>::from_slice(simd, &queue.pixel.0[at..at + Lanes::<S, E>::LEN])
                 };

@@ -25,6 +25,8 @@ mod shapes;
 mod tone;
 mod world;
 
+use core::ops::Range;
+
 use glam::DVec3;
 use image::RgbImage;
 use rayfold_scene::{Object, Scene};
@@ -32,6 +34,7 @@ use rayfold_scene::{Object, Scene};
 pub(crate) use glass::is_flat;
 pub(crate) use light::highlight;
 pub(crate) use pattern::coefficients;
+pub(crate) use sampled::render_rows as render_exposed_rows;
 pub use sampled::{Estimate, estimate, render_exposed};
 pub(crate) use shading::{FAINT, FAINT_LINEAR};
 pub use shapes::Surface;
@@ -60,11 +63,17 @@ pub struct Hit {
 /// # Errors
 /// Those of [`crate::render`].
 pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
+    render_rows(scene, 0..scene.screen.height(), options)
+}
+
+/// The same, of some of its rows.
+fn render_rows(scene: &Scene, rows: Range<u32>, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     let world = World::new(scene);
     let lights = world.middles();
     let shader = Shader { world: &world, lights: &lights, cancel: options.cancel };
     let image = bands(
         scene.screen,
+        rows,
         1,
         options,
         || (),

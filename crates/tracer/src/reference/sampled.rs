@@ -1,5 +1,7 @@
 //! Pixels that are means, in the words of the language: points of the square, of the lens, of the lights, and moments.
 
+use core::ops::Range;
+
 use glam::DVec3;
 use image::RgbImage;
 use rayfold_scene::{Camera, Light, Scene};
@@ -25,10 +27,19 @@ struct Moment<'a> {
 /// # Errors
 /// Those of [`crate::render`].
 pub fn render_exposed(exposure: Exposure, options: &RenderOptions) -> Result<RgbImage, RenderError> {
+    render_rows(exposure, 0..exposure.scene().screen.height(), options)
+}
+
+/// The same, of some of its rows.
+pub(crate) fn render_rows(
+    exposure: Exposure,
+    rows: Range<u32>,
+    options: &RenderOptions,
+) -> Result<RgbImage, RenderError> {
     let scene = exposure.scene();
     let samples = scene.samples.most();
     if samples == 1 {
-        return super::render(scene, options);
+        return super::render_rows(scene, rows, options);
     }
     let scenes = exposure.moments();
     let dimensions = Dimensions::new(&scenes);
@@ -38,6 +49,7 @@ pub fn render_exposed(exposure: Exposure, options: &RenderOptions) -> Result<Rgb
     let moments: Vec<Moment> = moments.collect();
     let image = bands(
         scene.screen,
+        rows,
         1,
         options,
         || (),

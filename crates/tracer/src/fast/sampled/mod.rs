@@ -8,6 +8,8 @@ mod hulls;
 pub(super) mod light;
 mod tile;
 
+use core::ops::Range;
+
 use fearless_simd::{Level, Simd};
 use image::RgbImage;
 use rayfold_scene::{Scene, Tone};
@@ -27,8 +29,8 @@ use super::real::Real;
 use super::shape::Robust;
 use super::shapes::Shape;
 use super::window::{Grid, Window};
-use crate::parallel::{CHANNELS, image};
-use crate::sampling::film::{Band, Film, Wanted};
+use crate::parallel::{CHANNELS, image, whole_bands};
+use crate::sampling::film::{self, Band, Film, Wanted};
 use crate::sampling::{Dimensions, Points};
 use crate::{RenderError, RenderOptions};
 
@@ -84,24 +86,43 @@ impl<'a, E: Real> Sampled<'a, E> {
     }
 
     /// Draws all passes; `each` sees the picture so far after each but the last.
-    pub(super) fn draw(&self, each: Option<&mut dyn FnMut(RgbImage)>) -> Result<RgbImage, RenderError> {
-        let film = match each {
-            None => self.expose(|_| Ok(()))?,
-            Some(each) => self.expose(|film| {
-                each(self.develop(film)?);
-                Ok(())
-            })?,
-        };
-        self.develop(&film)
+    pub(super) fn draw_progressively(&self, each: &mut dyn FnMut(RgbImage)) -> Result<RgbImage, RenderError> {
+        let rows = 0..self.scene.screen.height();
+        let film = self.expose(rows.clone(), |film| {
+            each(self.develop(film, 0, rows.clone())?);
+            Ok(())
+        })?;
+        self.develop(&film, 0, rows)
     }
 
-    /// The same, before it becomes levels.
+    /// Draws rows of the image, which show what they show in the whole one if as many beside them as [`Self::margin`] says are
+    /// drawn with them.
+    pub(super) fn draw_rows(&self, rows: Range<u32>, margin: u32) -> Result<RgbImage, RenderError> {
+        let height = self.scene.screen.height();
+        let drawn = rows.start.saturating_sub(margin)..rows.end.saturating_add(margin).min(height);
+        let drawn = whole_bands(&drawn, self.side.1, height);
+        let film = self.expose(drawn.clone(), |_| Ok(()))?;
+        self.develop(&film, drawn.start, rows)
+    }
+
+    /// In the middle of its exposure.
+    pub(super) fn scene(&self) -> &'a Scene {
+        self.scene
+    }
+
+    /// How many rows beside it have a say in what a row shows.
+    pub(super) fn margin(&self) -> u32 {
+        if self.scene.samples.error() > 0.0 { film::MARGIN } else { 0 }
+    }
+
+    /// The same rows, which are whole rows of tiles, before they become levels.
     pub(super) fn expose(
         &self,
+        rows: Range<u32>,
         mut each: impl FnMut(&Film) -> Result<(), RenderError>,
     ) -> Result<Film, RenderError> {
         let scene = self.scene;
-        let size = (scene.screen.width(), scene.screen.height());
+        let size = (scene.screen.width(), rows.end - rows.start);
         let too_large = || RenderError::TooLarge { width: size.0, height: size.1 };
         let mut film = Film::new(size, self.side, scene.samples, scene.tone, PASS).ok_or_else(too_large)?;
         let mut passes = 0;
@@ -110,13 +131,13 @@ impl<'a, E: Real> Sampled<'a, E> {
                 each(&film)?;
             }
             passes += 1;
-            self.pass(&mut film, span)?;
+            self.pass(&mut film, rows.start, span)?;
         }
         Ok(film)
     }
 
     /// Gives each pixel the samples that it lacks.
-    fn pass(&self, film: &mut Film, (first, end): (u32, u32)) -> Result<(), RenderError> {
+    fn pass(&self, film: &mut Film, above: u32, (first, end): (u32, u32)) -> Result<(), RenderError> {
         let points = Points::new(&self.dimensions, self.options.sampler, first, end);
         let level = self.options.level.unwrap_or_else(Level::new);
         let side = film.side();
@@ -127,30 +148,30 @@ impl<'a, E: Real> Sampled<'a, E> {
                 if self.options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
                     return Err(RenderError::Cancelled);
                 }
-                let job = Job { of: self, points: &points, wanted, side, row };
+                let job = Job { of: self, points: &points, wanted, side, row, above };
                 draw::<E>(&job, level, &mut band, workspace);
                 Ok(())
             },
         )
     }
 
-    fn develop(&self, film: &Film) -> Result<RgbImage, RenderError> {
-        let (screen, tone) = (self.scene.screen, self.scene.tone);
-        image(screen, |bytes| {
-            bytes.par_chunks_exact_mut(CHANNELS * screen.width() as usize).enumerate().for_each(
-                |(row, bytes)| {
-                    let mut bytes = bytes.chunks_exact_mut(CHANNELS);
-                    film.each_of_row(row, |color| {
-                        let levels = match tone {
-                            Tone::Plain => color.levels(),
-                            Tone::Srgb => super::tone::levels(color.unit(), tone),
-                        };
-                        if let Some(bytes) = bytes.next() {
-                            bytes.copy_from_slice(&levels);
-                        }
-                    });
-                },
-            );
+    /// Levels of rows of the image, from a film with so many rows above it.
+    fn develop(&self, film: &Film, above: u32, rows: Range<u32>) -> Result<RgbImage, RenderError> {
+        let (width, tone) = (self.scene.screen.width(), self.scene.tone);
+        let first = (rows.start - above) as usize;
+        image((width, rows.end - rows.start), |bytes| {
+            bytes.par_chunks_exact_mut(CHANNELS * width as usize).enumerate().for_each(|(row, bytes)| {
+                let mut bytes = bytes.chunks_exact_mut(CHANNELS);
+                film.each_of_row(first + row, |color| {
+                    let levels = match tone {
+                        Tone::Plain => color.levels(),
+                        Tone::Srgb => super::tone::levels(color.unit(), tone),
+                    };
+                    if let Some(bytes) = bytes.next() {
+                        bytes.copy_from_slice(&levels);
+                    }
+                });
+            });
         })
     }
 }
@@ -189,8 +210,10 @@ struct Job<'a, E> {
     wanted: Wanted<'a>,
     /// Columns and rows of a tile.
     side: (usize, usize),
-    /// Of tiles, from the top.
+    /// Of tiles, from the top of the film.
     row: usize,
+    /// Rows of the image above the film.
+    above: u32,
 }
 
 impl<E: Real> Job<'_, E> {
@@ -209,15 +232,18 @@ impl<E: Real> Job<'_, E> {
                     wanted: self.wanted,
                     height: height as u32,
                 };
-                let top = self.row * self.side.1;
+                let (top, above) = (self.row * self.side.1, self.above as usize);
+                let place = above / self.of.side.1 as usize + self.row;
+                let rows = self.wanted.pixels.rows();
                 for (column, pixels) in band.tiles.iter_mut().enumerate() {
                     let left = column * self.side.0;
                     let tile = SampledTile {
-                        place: (column, self.row),
+                        place: (column, place),
                         left,
                         top,
+                        above,
                         width: self.side.0.min(width - left),
-                        height: self.side.1.min(height - top),
+                        height: self.side.1.min(rows - top),
                         side: self.side,
                         stride: width,
                     };

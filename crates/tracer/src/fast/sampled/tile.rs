@@ -44,10 +44,13 @@ pub(super) struct Pass<'a, E> {
 
 /// A tile of the image, its first row at the top.
 pub(super) struct SampledTile {
-    /// Columns and rows of tiles before it.
+    /// Columns and rows of tiles of the image before it.
     pub(super) place: (usize, usize),
     pub(super) left: usize,
+    /// Rows of the film above it.
     pub(super) top: usize,
+    /// Rows of the image above the film.
+    pub(super) above: usize,
     pub(super) width: usize,
     pub(super) height: usize,
     /// Columns and rows of tiles in the middle of the image.
@@ -158,7 +161,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
 }
 
 impl SampledTile {
-    /// Of the image.
+    /// Of the film.
     pub(super) fn columns(&self) -> Range<usize> {
         self.left..self.left + self.width
     }
@@ -215,7 +218,7 @@ impl SampledTile {
     /// Column and row of the image; both count from the upper left corner.
     #[inline(always)]
     fn in_image(&self, (column, row): (u32, u32)) -> (u32, u32) {
-        (self.left as u32 + column, self.top as u32 + row)
+        (self.left as u32 + column, (self.above + self.top) as u32 + row)
     }
 }
 

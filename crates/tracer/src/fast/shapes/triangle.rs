@@ -148,7 +148,9 @@ impl<E: Real> Triangle<E> {
         let ends = Ends::new(vertices);
         let [to_a, to_b, to_c] = ends.squares.map(f64::sqrt);
         let volume = a.dot((b - a).cross(c - a));
-        let noise = VOLUME * to_a * to_b.max(to_c) * (b - a).length().max((c - a).length());
+        let lengths = to_a * to_b.max(to_c) * (b - a).length().max((c - a).length());
+        let coordinates = vertices.iter().fold(DVec3::ZERO, |most, v| most.max(v.abs()));
+        let noise = VOLUME * lengths.min(6.0 * coordinates.element_product());
         let sign = if volume.abs() > noise { volume.signum() } else { 0.0 };
         // From elsewhere a cross product adds its errors.
         let slack = |size: f64, noise: f64| E::narrow(2.0 * SIDE * E::ROUNDOFF * size + noise);

@@ -28,7 +28,7 @@ impl Shape for Cuboid {
         let mut point = (ray.origin + distance * ray.direction).clamp(min, max);
         point[axis] = if forwards == entering { min[axis] } else { max[axis] };
         let normal = if forwards { -DVec3::AXES[axis] } else { DVec3::AXES[axis] };
-        let largest = min.abs().max(max.abs()).max_element();
+        let largest = point.abs().max_element();
         Surface { point, normal, offset: 16.0 * ROUNDOFF * largest, flat: true, within: !entering }
     }
 

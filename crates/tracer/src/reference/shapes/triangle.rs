@@ -33,7 +33,10 @@ impl Shape for Triangle {
         let corner = self.vertices()[0];
         let near = ray.origin + distance * ray.direction;
         let point = near - (near - corner).dot(normal) * normal;
-        let largest = self.vertices().iter().fold(ray.origin.abs(), |m, v| m.max(v.abs())).max_element();
+        // How far along its plane it reaches is no error: where the plane lies along axes, only what is square to it counts.
+        let across = DVec3::select(normal.cmpeq(DVec3::ZERO), DVec3::ZERO, DVec3::ONE);
+        let here = ray.origin.abs().max(point.abs());
+        let largest = self.vertices().iter().fold(here, |m, v| m.max(v.abs() * across)).max_element();
         Surface { point, normal, offset: 32.0 * ROUNDOFF * largest, flat: true, within: false }
     }
 

@@ -31,7 +31,7 @@ impl Bits {
         Some(Self { words: zeroed(self.words.len())?, ..*self })
     }
 
-    pub(super) fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.words.len() / self.stride
     }
 

@@ -73,13 +73,20 @@ impl First {
                 converted.each_ref().map(Vec::as_slice)
             }
         };
-        let band = Band { colors, objects, width, limit };
-        let mut flags = vec![0; width];
-        for (row, words) in rows.clone().zip(into.chunks_exact_mut(width.div_ceil(WORD))) {
-            flags.fill(0);
-            for other in row.saturating_sub(1)..(row + 2).min(all) {
-                band.mark(&mut flags, row - top, other - top);
+        let band = Band { colors, objects, limit };
+        let (mut flags, mut apart) = (vec![0; objects.len()], vec![0; width]);
+        for row in (0..objects.len()).step_by(width) {
+            band.mark(&mut flags, &mut apart[1..], (row, row + 1));
+            let below = row + width;
+            if below < objects.len() {
+                band.mark(&mut flags, &mut apart, (row, below));
+                band.mark(&mut flags, &mut apart[1..], (row, below + 1));
+                band.mark(&mut flags, &mut apart[1..], (row + 1, below));
             }
+        }
+        let inner = (rows.start - top) * width;
+        let words = into.chunks_exact_mut(width.div_ceil(WORD));
+        for (words, flags) in words.zip(flags[inner..].chunks_exact(width)) {
             for (word, flags) in words.iter_mut().zip(flags.chunks(WORD)) {
                 *word = packed(flags);
             }
@@ -87,17 +94,17 @@ impl First {
     }
 }
 
-/// At most 64 flags of 0 or 1 as bits, the first the lowest.
-fn packed(flags: &[u8]) -> u64 {
-    let mut word = 0;
-    for (k, flags) in flags.chunks(8).enumerate() {
-        let mut eight = [0; 8];
-        eight[..flags.len()].copy_from_slice(flags);
-        // The product has flag k, which is bit 8 k, at bit 56 + k, and nothing carries into there.
-        let bits = u64::from_le_bytes(eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
-        word |= bits << (8 * k);
+/// At most 64 flags as bits, the first the lowest: whether they are not zero.
+fn packed(flags: &[u16]) -> u64 {
+    let mut set = [0; WORD];
+    for (set, &flag) in set.iter_mut().zip(flags) {
+        *set = u8::from(flag != 0);
     }
-    word
+    let (eights, _) = set.as_chunks::<8>();
+    // Each product has flag k, which is bit 8 k, at bit 56 + k, and nothing carries into there.
+    let bits =
+        eights.iter().map(|eight| u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56);
+    bits.enumerate().fold(0, |word, (k, bits)| word | bits << (8 * k))
 }
 
 /// The sRGB curve of each [`quantised`] channel.
@@ -105,36 +112,30 @@ static SHOWN: LazyLock<Vec<u16>> = LazyLock::new(|| {
     (0..=u16::MAX).map(|channel| quantised(encoded(f64::from(channel) / ONE)) as u16).collect()
 });
 
+/// Rows of a picture.
 struct Band<'a> {
     colors: [&'a [u16]; CHANNELS],
     objects: &'a [u16],
-    width: usize,
     limit: u16,
 }
 
 impl Band<'_> {
-    /// Marks the pixels of a row that differ from those of another in the same column or one beside it.
-    fn mark(&self, flags: &mut [u8], row: usize, other: usize) {
-        let last = self.width - 1;
-        let (row, other) = (row * self.width, other * self.width);
-        self.mark_run(flags, row, other);
-        self.mark_run(&mut flags[..last], row, other + 1);
-        self.mark_run(&mut flags[1..], row + 1, other);
-    }
-
-    /// The pixels from one place on beside those from another on.
-    fn mark_run(&self, flags: &mut [u8], from: usize, other: usize) {
-        let count = flags.len();
-        let [red, green, blue] =
-            self.colors.map(|plane| (&plane[from..from + count], &plane[other..other + count]));
-        let objects = (&self.objects[from..from + count], &self.objects[other..other + count]);
-        let limit = self.limit;
-        for (k, flag) in flags.iter_mut().enumerate() {
-            let differs = (red.0[k].abs_diff(red.1[k]) > limit)
-                | (green.0[k].abs_diff(green.1[k]) > limit)
-                | (blue.0[k].abs_diff(blue.1[k]) > limit)
-                | (objects.0[k] != objects.1[k]);
-            *flag |= u8::from(differs);
+    /// Marks the pixels from two places on that differ from each other, as many as there is memory for.
+    fn mark(&self, flags: &mut [u16], apart: &mut [u16], places: (usize, usize)) {
+        let runs = [places.0, places.1].map(|place| place..place + apart.len());
+        let [[red, green, blue], [red_2, green_2, blue_2]] =
+            runs.each_ref().map(|run| self.colors.map(|plane| &plane[run.clone()]));
+        let [objects, objects_2] = runs.each_ref().map(|run| &self.objects[run.clone()]);
+        // Not zero where they differ by more than the limit.
+        let beyond = |a: u16, b: u16| a.abs_diff(b).saturating_sub(self.limit);
+        for (k, apart) in apart.iter_mut().enumerate() {
+            let colors = beyond(red[k], red_2[k]) | beyond(green[k], green_2[k]) | beyond(blue[k], blue_2[k]);
+            *apart = colors | objects[k] ^ objects_2[k];
+        }
+        for place in [places.0, places.1] {
+            for (flag, apart) in flags[place..].iter_mut().zip(&*apart) {
+                *flag |= apart;
+            }
         }
     }
 }
@@ -162,8 +163,8 @@ mod tests {
     fn flags_become_bits() {
         let mut dice = fastrand::Rng::with_seed(4);
         for _ in 0..1000 {
-            let flags: Vec<u8> = (0..dice.usize(0..=WORD)).map(|_| u8::from(dice.bool())).collect();
-            let expected = flags.iter().rev().fold(0, |word, &flag| word << 1 | u64::from(flag));
+            let flags: Vec<u16> = (0..dice.usize(0..=WORD)).map(|_| dice.u16(..) * dice.u16(..2)).collect();
+            let expected = flags.iter().rev().fold(0, |word, &flag| word << 1 | u64::from(flag != 0));
             assert_eq!(packed(&flags), expected, "{flags:?}");
         }
     }

@@ -22,7 +22,11 @@ use self::plan::Plan;
 pub(crate) use self::plan::Wanted;
 use crate::parallel::CHANNELS;
 
-/// An image of samples, its first row at the top.
+/// Of a picture with an error to be reached, as many rows above and below a band have a say in what it shows: those beside
+/// it in the first look, and one more for each time that it is decided who goes on.
+pub(crate) const MARGIN: u32 = 1 + plan::MOST_ROUNDS;
+
+/// An image of samples, or a band of one, its first row at the top.
 #[derive(Debug)]
 pub(crate) struct Film {
     size: (usize, usize),
@@ -163,7 +167,7 @@ impl Color {
 
 #[cfg(test)]
 mod tests {
-    use super::plan::{CONTRAST, SLOPE, SPARED};
+    use super::plan::{CONTRAST, MOST_ROUNDS, SLOPE, SPARED};
     use super::*;
     use crate::reference::encoded;
 
@@ -304,7 +308,7 @@ mod tests {
                     around(place).any(|other| (shown(other) - shown(place)).abs() > CONTRAST / 255.0)
                 })
                 .collect();
-            loop {
+            for _ in 0..MOST_ROUNDS {
                 let next: Vec<u32> = (0..counts.len())
                     .map(|place| {
                         let goes_on = unsettled[place]

@@ -29,6 +29,10 @@ pub(super) const SPARED: f64 = 3.0;
 /// Moments of the first samples.
 const FEW_MOMENTS: u32 = 16;
 
+/// How often it is decided who goes on, at most, so that no pixel depends on one that is farther away, and a band can be drawn
+/// by itself. The example scenes take up to 34 of them (docs/decisions/frames-in-bands.md).
+pub(super) const MOST_ROUNDS: u32 = 128;
+
 /// Rows that are looked at together.
 const BAND: usize = 16;
 
@@ -70,6 +74,8 @@ pub(super) struct Plan {
     going: Vec<Bits>,
     /// Passes of this going on that are done.
     done: u32,
+    /// How often it was decided who goes on.
+    rounds: u32,
     /// Those that get something in this pass.
     wanted: Bits,
     stage: Stage,
@@ -94,6 +100,7 @@ impl Plan {
             at_least: vec![],
             going: vec![],
             done: 0,
+            rounds: 0,
             wanted: none()?,
             stage: Stage::Begins,
         })
@@ -196,6 +203,10 @@ impl Plan {
             self.judge(sums, tone)?;
         }
         self.stage = Stage::Later;
+        if self.rounds == MOST_ROUNDS {
+            return None;
+        }
+        self.rounds += 1;
         self.plan()?;
         self.want()
     }
