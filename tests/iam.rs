@@ -19,7 +19,7 @@ use stage::stores::on_every_store;
 const BUCKET: &str = "films";
 
 /// One of each kind, and some that the pipeline knows nothing of.
-const KEYS: [&str; 15] = [
+const KEYS: [&str; 21] = [
     "scripts/a/1.txt",
     "scripts/a/animation.json",
     "parts/a/1@v-p1/2.json",
@@ -28,16 +28,22 @@ const KEYS: [&str; 15] = [
     "frames/a/1@v-p1.error.json",
     "frames/a/1@v-p1/2.error.json",
     "frames/a/1@v-p1.split-3",
+    "parts/a/1@v-p1/2-of-3.band-0.json",
+    "frames/a/1@v-p1.cut-3",
+    "frames/a/1@v-p1.2-of-3.band",
+    "frames/a/1@v-p1/2.cut-3",
+    "frames/a/1@v-p1/2.2-of-3.band",
     "manifests/a.json",
     "assemblies/a/1-g.json",
     "retries/a/1@v-p1/1",
+    "checkpoints/a.state",
     "animations/a.gif",
     "films/a.gif",
     "frames.json",
     "animation.json",
 ];
 
-const PREFIXES: [&str; 10] = [
+const PREFIXES: [&str; 11] = [
     "scripts/",
     "scripts/a/",
     "parts/a/",
@@ -45,6 +51,7 @@ const PREFIXES: [&str; 10] = [
     "manifests/",
     "assemblies/a/",
     "retries/a/",
+    "checkpoints/",
     "animations/",
     "films/",
     "frames",
@@ -62,23 +69,24 @@ fn allowed(role: &str) -> Vec<(&'static str, Vec<&'static str>)> {
             .collect()
     };
     let errors = ["frames/a/1@v-p1.error.json", "frames/a/1@v-p1/2.error.json"];
+    let bands = ["frames/a/1@v-p1.2-of-3.band", "frames/a/1@v-p1/2.2-of-3.band"];
     match role {
         "render" => vec![
             ("list", keys(&["scripts/", "parts/", "frames/"])),
-            ("read", [keys(&["scripts/", "parts/", "manifests/"]), errors.to_vec()].concat()),
+            ("read", [keys(&["scripts/", "parts/", "manifests/"]), errors.to_vec(), bands.to_vec()].concat()),
             ("put", keys(&["parts/", "frames/", "manifests/", "assemblies/"])),
             ("upload", keys(&["parts/", "frames/", "manifests/", "assemblies/"])),
             ("delete", vec![]),
         ],
         "assemble" => {
-            let written =
-                [keys(&["manifests/", "animations/", "retries/", "assemblies/"]), errors.to_vec()].concat();
+            let written = keys(&["manifests/", "animations/", "retries/", "assemblies/", "checkpoints/"]);
+            let written = [written, errors.to_vec()].concat();
             vec![
                 ("list", keys(&["scripts/", "parts/", "frames/", "manifests/", "retries/"])),
-                ("read", keys(&["scripts/", "frames/", "manifests/", "animations/"])),
+                ("read", keys(&["scripts/", "frames/", "manifests/", "checkpoints/", "animations/"])),
                 ("put", written.clone()),
                 ("upload", written),
-                ("delete", keys(&["parts/", "frames/", "animations/"])),
+                ("delete", keys(&["parts/", "frames/", "checkpoints/", "animations/"])),
             ]
         }
         "viewer" => vec![
@@ -97,8 +105,9 @@ fn allowed(role: &str) -> Vec<(&'static str, Vec<&'static str>)> {
         ],
         "operator" => {
             let written = keys(&["scripts/", "retries/", "manifests/", "assemblies/"]);
-            let ours =
-                ["scripts/", "parts/", "frames/", "manifests/", "assemblies/", "retries/", "animations/"];
+            let made =
+                ["parts/", "frames/", "manifests/", "assemblies/", "retries/", "checkpoints/", "animations/"];
+            let ours = [&["scripts/"], &made[..]].concat();
             vec![
                 ("list", PREFIXES.to_vec()),
                 ("read", keys(&["scripts/", "frames/", "manifests/", "animations/"])),

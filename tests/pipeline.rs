@@ -8,14 +8,17 @@ mod stage;
 use std::path::Path;
 use std::time::Duration;
 
+use rayfold_lambda::raytracer::RayTracer;
 use rayfold_local::StoreKind;
 use rayfold_local::invoker::{Chaos, Settings};
 use rayfold_local::observation::{RequestKind, Seen};
 use rayfold_local::routes::Function;
+use rayfold_pipeline::keys::ScriptName;
 use rayfold_pipeline::manifest::{FrameState, Manifest, Reason, Status};
 use rayfold_pipeline::store::{ListRequest, Store};
+use rayfold_pipeline::{Drawing, Renderer};
 use stage::stores::on_every_store;
-use stage::{Stage, built, drawn, frames, outcomes, requests, scene};
+use stage::{SMALL_MB, Stage, big_scene, built, drawn, frames, outcomes, requests, scene};
 
 async fn stage(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Stage {
     let functions = Path::new(env!("CARGO_BIN_EXE_rayfold-render")).parent().unwrap();
@@ -305,8 +308,8 @@ async fn the_requests_of_a_lonely_frame_are_these() {
             keys.collect::<Vec<_>>()
         };
         assert_eq!(kinds(Function::Render), ["frames", "manifests", "assemblies"]);
-        // Its lease, and the GIF.
-        assert_eq!(kinds(Function::Assemble), ["frames", "animations"]);
+        // Its lease, the GIF, and in the manifest which GIF that is.
+        assert_eq!(kinds(Function::Assemble), ["frames", "animations", "manifests"]);
     })
     .await;
 }
@@ -389,6 +392,59 @@ async fn a_script_beyond_the_limits_of_the_stack_is_named_with_the_limit() {
             format!("{said:?}"),
             r#"[("frames", ["more than 2 frames"]), ("objects", ["more than 1 objects in a scene"]), ("pixels", ["the image has 456 pixels, the limit is 432"])]"#
         );
+    })
+    .await;
+}
+
+/// What a function of a little memory cannot hold is drawn by several: no byte shows it.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_frame_too_big_for_one_invocation_is_drawn_in_bands_with_the_same_bytes() {
+    on_every_store(async |store| {
+        let mut stage = stage(store, |settings| settings.memory_mb = SMALL_MB).await;
+        let small = big_scene(50.0).replace("Samples 4 0\n", "");
+        let several =
+            big_scene(70.0).replace("Trace\n", "Trace\nSphere 9 20 20 -50 .9 .2 .2 .3 .3 .3\nTrace\n");
+        let files = [("a.txt", big_scene(30.0)), ("b.txt", small), ("c.txt", several), frames(4)];
+        stage.upload("film", &files).await;
+        // The GIF is the one that is made locally, in one piece.
+        let manifest = stage.until_gif_of("film", &files).await;
+        let seen = stage.seen();
+        let outcomes = outcomes(&seen);
+        assert_eq!(outcomes.get("cut into 4"), Some(&3), "{outcomes:?}");
+        assert_eq!((drawn(&seen), built(&seen)), (4, 1), "{outcomes:?}");
+        for frame in &manifest.frames {
+            let key = rayfold_pipeline::assemble::frame_key(&manifest.head.animation, frame).unwrap();
+            let there = stage.store().get(&key).await.unwrap().body;
+            let (_, text) = files.iter().find(|(file, _)| file.starts_with(frame.script.as_str())).unwrap();
+            let name = ScriptName::new(frame.script.as_str()).unwrap();
+            let script = text.clone().into();
+            let whole = RayTracer::default().draw(&name, script, frame.part, None).await.unwrap();
+            let Drawing::Frame(whole) = whole else { panic!("{key}") };
+            assert!(there == whole, "{key}");
+        }
+        // The same again costs no more than any frame that is there.
+        stage.upload("film", &files[..1]).await;
+        stage.settle().await;
+        for requests in requests(&stage.seen(), Function::Render) {
+            assert!(requests.billed() <= 4, "{requests:?}");
+        }
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_frame_that_fits_in_no_number_of_bands_is_named_with_what_it_takes() {
+    on_every_store(async |store| {
+        let mut stage = stage(store, |settings| {
+            settings.memory_mb = SMALL_MB;
+            settings.environment.push(("RAYFOLD_MAX_BANDS".into(), "3".into()));
+        })
+        .await;
+        stage.upload("film", &[("a.txt", big_scene(30.0))]).await;
+        let manifest = stage.until("film", Status::Failed).await;
+        let [(_, reason)] = failures(&manifest)[..] else { panic!("{manifest:?}") };
+        let expected = "a.txt: 160 x 400 pixels take 4 MB of memory, in 3 bands 2 MB each, and the render function has 1 MB";
+        assert!(reason.message.starts_with(expected), "{}", reason.message);
     })
     .await;
 }

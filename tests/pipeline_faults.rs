@@ -17,7 +17,7 @@ use rayfold_local::observation::{Outcome, RequestKind, Seen};
 use rayfold_local::routes::Function;
 use rayfold_pipeline::manifest::{FrameState, Status};
 use stage::stores::on_every_store;
-use stage::{Stage, built, drawn, frames, scene};
+use stage::{SMALL_MB, Stage, big_scene, built, drawn, frames, scene};
 
 async fn stage(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Stage {
     stage::stage(store, Path::new(env!("CARGO_BIN_EXE_rayfold-render")).parent().unwrap(), change).await
@@ -62,6 +62,42 @@ async fn a_render_process_killed_in_the_middle_is_made_good() {
                 assert!(met > usize::from(again), "{fate:?} at {prefix}: written {met} times");
                 let expected = usize::from(fate != Fate::LoseAnswer);
                 assert_eq!(crashes(&mut stage), expected, "{fate:?} at {prefix}");
+            }
+        }
+    })
+    .await;
+}
+
+/// The first put of a key that ends so.
+fn at_put_of(ending: &'static str, fate: Fate) -> (Fates, Arc<AtomicUsize>) {
+    let met = Arc::new(AtomicUsize::new(0));
+    let count = met.clone();
+    let fates: Fates = Arc::new(move |_, request| {
+        let is_it = request.kind == RequestKind::Put
+            && request.key.ends_with(ending)
+            && count.fetch_add(1, Ordering::SeqCst) == 0;
+        if is_it { fate } else { Fate::Pass }
+    });
+    (fates, met)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_frame_in_bands_is_put_together_whoever_is_killed_on_the_way() {
+    on_every_store(async |store| {
+        for ending in [".cut-4", ".band-0.json", ".band", ".png"] {
+            for fate in [Fate::KillBefore, Fate::KillAfter, Fate::LoseAnswer] {
+                let (fates, met) = at_put_of(ending, fate);
+                let mut stage = stage(store, |settings| {
+                    settings.memory_mb = SMALL_MB;
+                    settings.fates = Some(fates);
+                })
+                .await;
+                let film = [("a.txt", big_scene(40.0)), frames(1)];
+                stage.upload("film", &film).await;
+                stage.until_gif_of("film", &film).await;
+                assert!(met.load(Ordering::SeqCst) > 0, "{fate:?} at {ending}");
+                let expected = usize::from(fate != Fate::LoseAnswer);
+                assert_eq!(crashes(&mut stage), expected, "{fate:?} at {ending}");
             }
         }
     })
@@ -120,9 +156,11 @@ async fn a_frame_that_takes_too_long_is_named() {
     let mut stage = stage(store, |settings| {
         settings.timeout = Duration::from_secs(3);
         settings.retry_pauses = vec![Duration::from_millis(10), Duration::from_millis(10)];
+        // In bands it would be drawn, and named at once if it had more pixels.
+        settings.environment.push(("RAYFOLD_MAX_BANDS".into(), "1".into()));
     })
     .await;
-    let endless = scene(4.0).replace("Screen 24 18", "Screen 8000 8000").replace("Trace", &mirrors());
+    let endless = scene(4.0).replace("Screen 24 18", "Screen 4000 4000").replace("Trace", &mirrors());
     let files = vec![("slow.txt", endless), ("quick.txt", scene(8.0)), frames(2)];
     stage.upload("film", &files).await;
     let manifest = stage.until("film", Status::Failed).await;

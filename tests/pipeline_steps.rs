@@ -509,6 +509,31 @@ async fn a_frame_that_is_none_is_drawn_anew_and_in_the_end_named() {
     assert!(world.gif("a").await.unwrap() == local_gif(&[script(1, 1), script(9, 1)], 10.0));
 }
 
+/// Half of it stood there as current, for its metadata said so.
+#[tokio::test]
+async fn a_gif_that_was_cut_off_with_its_metadata_is_built_anew() {
+    let mut world = World::new();
+    world.upload("scripts/a/1.txt", &script(1, 2)).await;
+    let key = "animations/a.gif";
+    let whole = world.store.get(key).await.unwrap();
+    let built = world.manifest("a").await.head.gif.expect("written down");
+    assert_eq!(built.version, whole.info.etag);
+    assert!(!world.sweep().await.claimed, "all is right");
+    let cut = async |world: &World| {
+        let metadata = whole.info.metadata.clone();
+        let options = PutOptions { metadata, ..PutOptions::always() };
+        world.store.put(key, whole.body.slice(..whole.body.len() / 2), options).await.unwrap();
+    };
+    cut(&world).await;
+    assert!(world.sweep().await.claimed);
+    assert!(world.gif("a").await.unwrap() == whole.body);
+    // The set becomes another one and this one again, before a GIF of the other is built.
+    cut(&world).await;
+    world.upload("scripts/a/animation.json", r#"{"frames": 9}"#).await;
+    world.remove("scripts/a/animation.json").await;
+    assert!(world.gif("a").await.unwrap() == whole.body);
+}
+
 /// One animation of millions of frames, or one script of them, could be drawn at others' cost.
 #[tokio::test]
 async fn of_an_animation_with_too_many_frames_no_more_are_drawn() {

@@ -6,12 +6,18 @@
 #[path = "stage/stores.rs"]
 mod stores;
 
+use std::time::Duration;
+
 use aws_sdk_s3::config::{BehaviorVersion, Credentials, Region};
 use aws_smithy_http_client::Builder as HttpBuilder;
-use bytes::Bytes;
+use bytes::{Bytes, BytesMut};
 use rayfold_local::{S3Server, StoreKind, any_port};
-use rayfold_pipeline::Error;
+use rayfold_pipeline::manifest::Reason;
 use rayfold_pipeline::store::{Connection, ListRequest, PutOptions, S3Store, Store, Upload, conformance};
+use rayfold_pipeline::{
+    Animator, Clock, Encoding, Error, Invocation, Policy, Randomness, SystemClock, Unfit, assemble,
+};
+use rayfold_scene::AnimationSettings;
 use stores::on_every_store;
 
 async fn started(store: StoreKind) -> (S3Server, tempfile::TempDir) {
@@ -30,6 +36,75 @@ async fn the_s3_store_conforms() {
         store.create_bucket().await.expect("a bucket that is there and ours is fine");
         store.check().await.unwrap();
         conformance::check(&store, "suite").await;
+    })
+    .await;
+}
+
+/// What is put together of frames that are parts of an upload by themselves.
+struct Joiner;
+
+struct Joined(BytesMut);
+
+impl Animator for Joiner {
+    type Encoding = Joined;
+
+    fn begin(&self, _: &AnimationSettings) -> Result<Joined, Reason> {
+        Ok(Joined(BytesMut::new()))
+    }
+
+    async fn resume(&self, state: Bytes) -> Result<Joined, Reason> {
+        Ok(Joined(state.into()))
+    }
+}
+
+impl Encoding for Joined {
+    async fn push(&mut self, frame: Bytes) -> Result<Bytes, Unfit> {
+        Ok(std::mem::replace(&mut self.0, frame.into()).freeze())
+    }
+
+    async fn finish(self) -> Result<Bytes, Reason> {
+        Ok(self.0.freeze())
+    }
+
+    async fn suspend(self) -> Result<Bytes, Reason> {
+        Ok(self.0.freeze())
+    }
+}
+
+/// The parts of one upload are sent by one invocation after the other, each with a client of its own.
+#[tokio::test]
+async fn an_animation_of_many_parts_is_assembled_by_several_invocations() {
+    on_every_store(async |store| {
+        let (server, _data) = started(store).await;
+        let store = || S3Store::at(&server.connection(), "pieces");
+        store().create_bucket().await.unwrap();
+        let frames: Vec<Bytes> = (1..=6_u8).map(|number| vec![number; 5_000_000].into()).collect();
+        let settings = Bytes::from(format!(r#"{{"frames": {}}}"#, frames.len()));
+        store().put("scripts/film/animation.json", settings, PutOptions::always()).await.unwrap();
+        for (number, frame) in (1..).zip(&frames) {
+            let script = format!("scripts/film/{number}.txt");
+            let version = store().put(&script, script.clone().into(), PutOptions::always()).await.unwrap();
+            let key = format!("frames/film/{number}@{version}-p1.png");
+            store().put(&key, frame.clone(), PutOptions::always()).await.unwrap();
+        }
+        let (random, policy) = (Randomness::seeded(1), Policy { spare_frames: 1_000_000, ..Policy::new(1) });
+        let claim = format!("assemblies/film/1-{}.json", "0".repeat(32));
+        let mut left = Vec::new();
+        loop {
+            let (store, id) = (store(), format!("invocation {}", left.len()));
+            let deadline = SystemClock.now().after(Duration::from_secs(900));
+            let invocation = Invocation::new(&store, &SystemClock, &random, &policy, &id).until(deadline);
+            match assemble(&invocation, &Joiner, &claim).await.unwrap().left_after {
+                Some(frames) => left.push(frames),
+                None => break,
+            }
+        }
+        assert_eq!(left, [1, 2, 3, 4, 5]);
+        assert!(
+            store().get("animations/film.gif").await.unwrap().body == frames.concat(),
+            "the parts in their order"
+        );
+        assert_eq!(unfinished(&server, "pieces", "animations/film.gif").await, 0);
     })
     .await;
 }

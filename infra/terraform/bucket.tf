@@ -78,19 +78,22 @@ locals {
   # A rule names one prefix. What people value is kept for longer than the pipeline's own objects: a manifest is
   # written once for every few frames, and each old version would be stored, and billed, for as long.
   noncurrent_days = {
-    "scripts/"    = var.noncurrent_version_days
-    "animations/" = var.noncurrent_version_days
-    "parts/"      = 1
-    "frames/"     = 1
-    "manifests/"  = 1
-    "assemblies/" = 1
-    "retries/"    = 1
+    "scripts/"     = var.noncurrent_version_days
+    "animations/"  = var.noncurrent_version_days
+    "parts/"       = 1
+    "frames/"      = 1
+    "manifests/"   = 1
+    "assemblies/"  = 1
+    "retries/"     = 1
+    "checkpoints/" = 1
   }
 
-  # The only current objects that age removes. Every other one is a receipt: gone, its work would be done again.
+  # The only current objects that age removes. Every other one is a receipt: gone, its work would be done again. A
+  # checkpoint is of use for as long as its upload is there, which is removed after a day.
   expiry_days = {
-    "assemblies/" = var.claim_days
-    "retries/"    = var.claim_days
+    "assemblies/"  = var.claim_days
+    "retries/"     = var.claim_days
+    "checkpoints/" = 1
   }
 }
 

@@ -14,8 +14,9 @@ locals {
 locals {
   # What a script may ask for. The defaults fit the render function's memory, as measured with spheres, boxes and
   # triangles: a megabyte holds 1,700 objects with their part of the script and of the search tree, and an image takes six
-  # bytes a pixel with its PNG.
+  # bytes a pixel with its PNG. What takes more, as with many samples, or too long, is drawn in bands.
   limits_of_scripts = {
+    RAYFOLD_MAX_BANDS        = tostring(var.limits.max_bands)
     RAYFOLD_MAX_FRAMES       = tostring(var.limits.max_frames)
     RAYFOLD_MAX_LIGHTS       = tostring(var.limits.max_lights)
     RAYFOLD_MAX_SCRIPT_BYTES = tostring(var.limits.max_script_bytes)
@@ -116,8 +117,9 @@ resource "aws_lambda_function" "this" {
   depends_on = [aws_iam_role_policy.objects, aws_iam_role_policy.platform]
 }
 
-# A function that wakes itself without end is stopped by Lambda. The longest chain here is script, part, claim; this
-# spells out the default, so that nobody turns it off in passing.
+# A function that wakes itself without end is stopped by Lambda. The longest chain here is script, part, band, claim, and one
+# more claim for each further invocation that a long GIF takes: one of more than a dozen is stopped, and the sweep takes it up
+# again. This spells out the default, so that nobody turns it off in passing.
 resource "aws_lambda_function_recursion_config" "this" {
   for_each = aws_lambda_function.this
 

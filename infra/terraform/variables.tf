@@ -227,9 +227,10 @@ variable "record" {
 }
 
 variable "limits" {
-  description = "What a script may ask for: Traces (each is an invocation), pixels of an image, objects, lights, bytes; and how many frames an animation may have, beyond which no more are drawn. Null pixels and objects are as many as fit render.memory_mb: 64,000,000 and 1,817,300 with its default"
+  description = "What a script may ask for: Traces (each is an invocation), bands of a frame that is too big for one invocation (each is one, too; with 1 none is cut), pixels of an image, objects, lights, bytes; and how many frames an animation may have, beyond which no more are drawn. Null pixels and objects are as many as fit render.memory_mb: 64,000,000 and 1,817,300 with its default"
   type = object({
     max_animation_frames = optional(number, 100000)
+    max_bands            = optional(number, 64)
     max_frames           = optional(number, 10000)
     max_pixels           = optional(number)
     max_objects          = optional(number)

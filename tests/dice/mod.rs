@@ -25,6 +25,7 @@ impl Dice {
         self.point(0.5) + 0.5
     }
 
+    #[allow(dead_code, reason = "not every test asks for all of these")]
     pub(crate) fn material(&mut self) -> Material {
         let mirror = if self.0.bool() { 0.6 * self.color() } else { DVec3::ZERO };
         Material::new(0.1 * self.color(), self.color(), mirror).unwrap()

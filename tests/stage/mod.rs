@@ -240,6 +240,17 @@ pub fn scene(x: f64) -> String {
     )
 }
 
+/// A frame that is drawn in four bands by functions of [`SMALL_MB`] megabytes, and differs by `x`.
+pub fn big_scene(x: f64) -> String {
+    format!(
+        "Screen 160 400\nSamples 4 0\nBackground .1 .2 .3  .7 .8 .9\nSphere 60 {x} 200 -90 .2 .2 .2 .7 .6 .5 .2 .2 .2\n\
+         Sphere 30 90 330 -70 .1 .2 .1 .3 .8 .5\nIlight 1 1 1 .2 -.3 -1\nTrace\n"
+    )
+}
+
+/// A memory in which four samples a pixel of [`big_scene`] have no room, and one has.
+pub const SMALL_MB: u32 = 2;
+
 /// `animation.json` that waits for this many frames.
 pub fn frames(count: usize) -> (&'static str, String) {
     ("animation.json", format!("{{\"frames\": {count}}}"))

@@ -128,7 +128,7 @@ const SCALE_HEADER: &str = "
 One animation of single-frame scripts, uploaded within 200 ms with `frames` set, drawn in 800 to 1,200 ms each; GET takes
 10-25 ms, PUT 25-60 ms, LIST 20-40 ms a page. Requests are those of the render function, and so are the bytes of objects
 that it reads; GET, PUT and LIST are of both functions together. The time beyond drawing, which Lambda bills too, is the
-mean of the render function's invocations: requests and pauses. The tail is from the last frame's put to the last claim's.
+mean of the render function's invocations: requests and pauses. The tail is from the last frame's put to the render function's last claim.
 The worst of the seeds.
 
 | frames | at once | seeds | requests a frame | KB read a frame | GET | PUT | LIST a frame | beyond drawing, ms | tail, ms | claims | manifests written | assembler's requests | requests when all is done |

@@ -1,16 +1,19 @@
 //! The command line: its flags, and which module answers which subcommand.
 
 use std::ffi::OsString;
+#[cfg(not(feature = "network"))]
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
-use crate::cloud::{fetch, remove, retry, status, submit};
 use crate::console::{Color, Console};
-#[cfg(unix)]
-use crate::dev;
+#[cfg(not(feature = "network"))]
+use crate::elsewhere;
+#[cfg(feature = "network")]
+use crate::network;
 use crate::outcome::{Outcome, exit_code};
-use crate::{check, completions, cost, encode, interrupt, render, split, studio};
+use crate::{check, completions, encode, interrupt, render, split};
 
 /// Ray-traced animations from a folder of scene scripts.
 #[derive(Debug, Parser)]
@@ -31,6 +34,7 @@ Examples:
 
 Exit codes: 0 done, 1 the input or the rendering failed, 2 wrong usage, 130 interrupted."
 )]
+#[cfg_attr(not(feature = "network"), command(after_help = elsewhere::HELP))]
 pub(crate) struct App {
     #[command(flatten)]
     global: Global,
@@ -53,16 +57,10 @@ enum Command {
     Render(render::Args),
     Check(check::Args),
     Split(split::Args),
-    Studio(studio::Args),
     Encode(encode::Args),
-    Cost(cost::Args),
-    Submit(submit::Args),
-    Status(status::Args),
-    Fetch(fetch::Args),
-    Retry(retry::Args),
-    Remove(remove::Args),
-    #[cfg(unix)]
-    Dev(dev::Args),
+    #[cfg(feature = "network")]
+    #[command(flatten)]
+    Network(network::Command),
     Completions(completions::Args),
 }
 
@@ -72,26 +70,24 @@ impl Command {
             Self::Render(args) => render::run(&args, console),
             Self::Check(args) => check::run(&args, console),
             Self::Split(args) => split::run(&args, console),
-            Self::Studio(args) => studio::run(&args, console),
             Self::Encode(args) => encode::run(&args, console),
-            Self::Cost(args) => cost::run(&args, console),
-            Self::Submit(args) => submit::run(&args, console),
-            Self::Status(args) => status::run(&args, console),
-            Self::Fetch(args) => fetch::run(&args, console),
-            Self::Retry(args) => retry::run(&args, console),
-            Self::Remove(args) => remove::run(&args, console),
-            #[cfg(unix)]
-            Self::Dev(args) => dev::run(&args, console),
+            #[cfg(feature = "network")]
+            Self::Network(command) => command.run(console),
             Self::Completions(args) => completions::run(&args, App::command(), console),
         }
     }
 }
 
 /// Parses, runs, and says what went wrong.
-pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let app = match App::try_parse_from(args) {
         Ok(app) => app,
         Err(e) => {
+            #[cfg(not(feature = "network"))]
+            if let Some(message) = elsewhere::missing(&e) {
+                let _ = writeln!(std::io::stderr(), "{message}");
+                return ExitCode::from(2);
+            }
             // Help and version go to standard output and are no failure; nobody is left to tell if that is closed.
             let _ = e.print();
             return ExitCode::from(if e.use_stderr() { 2 } else { 0 });

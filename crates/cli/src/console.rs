@@ -95,11 +95,13 @@ impl Console {
     }
 
     /// Somebody sits at a terminal who sees what is said here and can answer.
+    #[cfg(feature = "network")]
     pub(crate) fn can_ask(&self) -> bool {
         std::io::stdin().is_terminal() && std::io::stderr().is_terminal()
     }
 
     /// A question, which the cursor stays behind.
+    #[cfg(feature = "network")]
     pub(crate) fn ask(&self, question: &str) {
         let mut err = std::io::stderr().lock();
         let _ = write!(err, "{question} ").and_then(|()| err.flush());

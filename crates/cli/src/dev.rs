@@ -28,12 +28,13 @@ const LOOK: Duration = Duration::from_millis(50);
 const CATCH_UP: Duration = Duration::from_secs(3);
 
 /// What the functions take from their environment about the largest script and animation; the stack sets the same.
-const LIMITS: [&str; 6] = [
+const LIMITS: [&str; 7] = [
     "RAYFOLD_MAX_SCRIPT_BYTES",
     "RAYFOLD_MAX_OBJECTS",
     "RAYFOLD_MAX_LIGHTS",
     "RAYFOLD_MAX_PIXELS",
     "RAYFOLD_MAX_FRAMES",
+    "RAYFOLD_MAX_BANDS",
     "RAYFOLD_MAX_ANIMATION_FRAMES",
 ];
 

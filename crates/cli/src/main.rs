@@ -1,36 +1,9 @@
-//! The `rayfold` command.
+//! The `rayfold` command: all of it is in the library beside this file.
 //!
-//! One module a subcommand, each with its flags (`Args`) and a `run` that takes them together with the `Console`,
-//! which holds what the global flags and the environment resolved to. Data goes to standard output, everything for
-//! people to standard error. Exit codes: see [`outcome`].
+//! So it is compiled while the tracer still is; what waits for the tracer is linking.
 
 use std::process::ExitCode;
 
-mod ahead;
-mod app;
-mod check;
-mod cloud;
-mod completions;
-mod console;
-mod cost;
-#[cfg(unix)]
-mod dev;
-mod encode;
-mod input;
-mod interrupt;
-mod outcome;
-mod output;
-mod plan;
-mod playback;
-mod progress;
-mod render;
-mod split;
-mod studio;
-mod survey;
-mod threads;
-mod values;
-mod wording;
-
 fn main() -> ExitCode {
-    app::run(std::env::args_os())
+    rayfold_cli::run(std::env::args_os())
 }

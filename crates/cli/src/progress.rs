@@ -49,6 +49,7 @@ impl Progress {
     }
 
     /// There turn out to be more, or fewer.
+    #[cfg(feature = "network")]
     pub(crate) fn resize(&mut self, total: u64) {
         self.total = total;
         if let Shown::Bar(bar) = &self.shown {

@@ -34,17 +34,6 @@ pub(crate) fn rate(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A number above 0.
-///
-/// # Errors
-/// What was expected.
-pub(crate) fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err("expected a number greater than 0".into()),
-    }
-}
-
 /// Seconds as hundredths of one, which is how an animation counts.
 ///
 /// # Errors

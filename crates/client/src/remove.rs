@@ -81,6 +81,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
             animation.parts(),
             format!("assemblies/{animation}/"),
             animation.frames(),
+            animation.checkpoint(),
             animation.gif(),
             animation.manifest(),
         ];

@@ -94,6 +94,8 @@ impl<'a, S: Store, C: Clock> Client<'a, S, C> {
 
 #[cfg(test)]
 mod tests {
+    use rayfold_pipeline::store::{PutOptions, Store};
+
     use super::*;
     use crate::world::World;
 
@@ -136,6 +138,20 @@ mod tests {
             let (is_behind, is_settled, is_current) = seen(&world).await;
             assert_eq!((is_behind, is_settled, is_current), (false, true, text != "[]"), "{key}");
         }
+    }
+
+    /// "Done, GIF current" stood there beside half of a GIF whose metadata had been copied.
+    #[tokio::test]
+    async fn a_gif_that_was_cut_off_is_not_current() {
+        let world = World::new();
+        world.put("scripts/film/1.txt", "frame").await;
+        world.functions().await;
+        let gif = world.store.get("animations/film.gif").await.unwrap();
+        let half = gif.body.slice(..gif.body.len() / 2);
+        let options = PutOptions { metadata: gif.info.metadata, ..PutOptions::always() };
+        world.store.put("animations/film.gif", half, options).await.unwrap();
+        let looks = world.client().look(&[world.film()]).await.unwrap();
+        assert!(!looks[0].is_settled() && !looks[0].is_current());
     }
 
     #[tokio::test]

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use rayfold_pipeline::assemble::generation_of;
+use rayfold_pipeline::assemble::is_current;
 use rayfold_pipeline::keys::{Animation, Key};
 use rayfold_pipeline::manifest::{Manifest, Status};
 use rayfold_pipeline::store::{ETag, ListRequest, ObjectInfo, Store};
@@ -185,8 +185,8 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
 
     /// The GIF shows what the manifest says, and the manifest is about the newest scripts.
     pub fn is_current(&self) -> bool {
-        let generation = self.manifest.as_ref().map(|manifest| manifest.head.generation.as_str());
-        !self.is_behind && generation.is_some() && generation_of(self.gif.as_ref()) == generation
+        let manifest = self.manifest.as_ref();
+        !self.is_behind && manifest.is_some_and(|manifest| is_current(&manifest.head, self.gif.as_ref()))
     }
 
     /// Nothing more will happen unless somebody changes something.

@@ -2,20 +2,22 @@
 //! to: the real steps with a renderer of one line.
 
 use std::collections::BTreeSet;
+use std::num::NonZeroU64;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bytes::{Bytes, BytesMut};
-use rayfold_pipeline::keys::{Animation, Key, Part, ScriptName};
+use rayfold_pipeline::keys::{Animation, Band, Key, Part, ScriptName};
 use rayfold_pipeline::manifest::Reason;
 use rayfold_pipeline::store::{
     ETag, ListPage, ListRequest, Listing, MemoryStore, MemoryUpload, Object, ObjectInfo, PutOptions, Store,
+    UnfinishedUpload,
 };
 use rayfold_pipeline::{
-    Animator, Clock, Drawing, Encoding, Invocation, Policy, Randomness, Renderer, Result, Timestamp, Unfit,
-    assemble, render_frame,
+    Animator, Clock, Drawing, Encoding, Invocation, Joining, Policy, Randomness, Renderer, Result, Timestamp,
+    Unfit, assemble, render_frame,
 };
 use rayfold_scene::AnimationSettings;
 
@@ -132,6 +134,10 @@ impl Store for WatchedStore {
         self.note("upload", key).await;
         self.inner.upload(key, options).await
     }
+
+    fn take_up(&self, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> Self::Upload {
+        self.inner.take_up(key, options, unfinished)
+    }
 }
 
 /// Everything together.
@@ -223,16 +229,46 @@ impl World {
 struct OneLine;
 
 impl Renderer for OneLine {
+    type Joining = Whole;
+
     fn most_bytes(&self) -> u64 {
         1_000
     }
 
-    async fn draw(&self, name: &ScriptName, script: Bytes, _: Part) -> Result<Drawing> {
+    async fn draw(&self, name: &ScriptName, script: Bytes, _: Part, _: Option<Duration>) -> Result<Drawing> {
         let text = String::from_utf8_lossy(&script);
         Ok(match text.as_ref() {
             "bad" => Drawing::Fault(Reason::new(format!("{name}.txt: bad"))),
             text => Drawing::Frame(format!("{name}: {text}").into()),
         })
+    }
+
+    /// Nothing here is too big.
+    async fn draw_band(
+        &self,
+        _: &ScriptName,
+        _: Bytes,
+        _: Part,
+        band: Band,
+    ) -> Result<Result<Bytes, Reason>> {
+        Ok(Err(Reason::new(format!("no frame has a band {band}"))))
+    }
+
+    async fn join(&self, _: &ScriptName, _: Bytes, _: Part, _: NonZeroU64) -> Result<Result<Whole, Reason>> {
+        Ok(Err(Reason::new("no frame has bands")))
+    }
+}
+
+/// No frame is in pieces.
+enum Whole {}
+
+impl Joining for Whole {
+    async fn push(&mut self, _: Bytes) -> Result<(), Reason> {
+        match *self {}
+    }
+
+    async fn finish(self) -> Result<Bytes, Reason> {
+        match self {}
     }
 }
 
@@ -247,6 +283,10 @@ impl Animator for Joiner {
     fn begin(&self, _: &AnimationSettings) -> Result<Joined, Reason> {
         Ok(Joined(BytesMut::new()))
     }
+
+    async fn resume(&self, state: Bytes) -> Result<Joined, Reason> {
+        Ok(Joined(state.into()))
+    }
 }
 
 impl Encoding for Joined {
@@ -256,6 +296,10 @@ impl Encoding for Joined {
     }
 
     async fn finish(self) -> Result<Bytes, Reason> {
+        Ok(self.0.freeze())
+    }
+
+    async fn suspend(self) -> Result<Bytes, Reason> {
         Ok(self.0.freeze())
     }
 }

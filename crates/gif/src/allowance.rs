@@ -8,7 +8,11 @@
 //! A frame is prepared before the previous one has been drawn, that is, before it is known how much that one used. So a
 //! frame gets a [`Loan`], and pays back what it did not use.
 
+use std::io;
+
 use crate::colour;
+use crate::error::Error;
+use crate::state::{StateReader, StateWriter, damaged};
 
 /// An amount of allowance, relative to the pixels that stay: what part of them, and what CIE 1976 difference in the mean of
 /// all of them.
@@ -95,6 +99,19 @@ impl Allowance {
         Self { share: AT_FIRST.pixels, difference: AT_FIRST.difference, waited: 1 }
     }
 
+    pub(crate) fn write(&self, state: &mut StateWriter) -> io::Result<()> {
+        state.f64(self.share)?;
+        state.f64(self.difference)?;
+        state.u64(self.waited as u64)
+    }
+
+    pub(crate) fn read(state: &mut StateReader<'_>) -> Result<Self, Error> {
+        let (share, difference, waited) = (state.f64()?, state.f64()?, state.u64()?);
+        let waited =
+            u32::try_from(waited).map_err(|_| damaged("it has waited for longer than there can be"))?;
+        Ok(Self { share, difference, waited: waited as usize })
+    }
+
     pub(crate) fn is_left(&self) -> bool {
         self.share > 0.01 && self.difference > 0.01
     }
@@ -145,6 +162,20 @@ pub(crate) struct Loan {
     difference: f64,
     /// The error from which a tile's pixels that stay may be drawn anew.
     pub(crate) least_error: f32,
+}
+
+impl Loan {
+    pub(crate) fn write(&self, state: &mut StateWriter) -> io::Result<()> {
+        state.f64(self.pixels)?;
+        state.f64(self.share)?;
+        state.f64(self.difference)?;
+        state.f32(self.least_error)
+    }
+
+    pub(crate) fn read(state: &mut StateReader<'_>) -> Result<Self, Error> {
+        let (pixels, share, difference) = (state.f64()?, state.f64()?, state.f64()?);
+        Ok(Self { pixels, share, difference, least_error: state.f32()? })
+    }
 }
 
 /// The CIE 1976 difference of a squared error of which L\*a\*b\* makes up half.

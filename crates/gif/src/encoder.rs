@@ -9,6 +9,7 @@ use image::RgbImage;
 use crate::block::Block;
 use crate::error::{Error, LONGEST_SIDE};
 use crate::quantise::Quantiser;
+use crate::state::{StateReader, StateWriter, damaged};
 use crate::timeline::Timeline;
 
 /// How to write the animation.
@@ -127,6 +128,7 @@ impl<W: Write> Encoder<W> {
 
         let mut running = match std::mem::replace(&mut self.stage, Stage::Failed) {
             Stage::Empty(writer) => {
+                let writer = Counting { inner: Some(writer), bytes: 0 };
                 let file = begin(writer, found, self.settings.plays)
                     .map_err(|source| Error::Write { frame: number, source })?;
                 Box::new(Running { size: found, file, quantiser: Quantiser::new() })
@@ -159,12 +161,104 @@ impl<W: Write> Encoder<W> {
         }
         let end = || {
             let mut counting = file.into_inner().map_err(into_io)?;
-            counting.inner.flush()?;
+            counting.flush()?;
             Ok(counting.bytes)
         };
         let Self { pushed, written, duration_cs, .. } = self;
         let bytes = end().map_err(|source| Error::Write { frame: written, source })?;
         Ok(Summary { frames: written, dropped: pushed - written, size, duration_cs, bytes })
+    }
+
+    /// Writes down where the animation stands, so that [`resume`](Self::resume) goes on with it, in another process, too.
+    /// What has been written to the writer up to now is to be kept beside it. Bytes, compressed: mostly 2 to 4 for each
+    /// pixel of a frame, at most some 7.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Write`]: writing has failed before.
+    pub fn suspend(self) -> Result<Vec<u8>, Error> {
+        if matches!(self.stage, Stage::Failed) {
+            return Err(self.failed_before());
+        }
+        let Self { settings, pushed, written, duration_cs, stage, .. } = self;
+        let write = |stage: Stage<W>| {
+            let mut state = StateWriter::new();
+            state.f64(settings.fps)?;
+            let (plays, times) = match settings.plays {
+                Plays::Endless => (ENDLESS, 0),
+                Plays::Once => (ONCE, 0),
+                Plays::Repeated(times) => (REPEATED, times.get()),
+            };
+            state.bytes(&[plays, u8::from(settings.last_delay_cs.is_some())])?;
+            state.u16(times)?;
+            state.u16(settings.last_delay_cs.unwrap_or_default())?;
+            for count in [pushed, written, duration_cs] {
+                state.u64(count)?;
+            }
+            match stage {
+                Stage::Empty(_) | Stage::Failed => state.bytes(&[EMPTY])?,
+                Stage::Running(running) => {
+                    let Running { size, mut file, quantiser } = *running;
+                    // The file is not at its end.
+                    file.get_mut().inner = None;
+                    state.bytes(&[RUNNING])?;
+                    for number in [size.0.into(), size.1.into(), file.get_ref().bytes] {
+                        state.u64(number)?;
+                    }
+                    quantiser.write(&mut state)?;
+                }
+            }
+            state.finish()
+        };
+        write(stage).map_err(|source| Error::Write { frame: written + 1, source })
+    }
+
+    /// Goes on with an animation that was [suspended](Self::suspend): what it writes follows what was written before.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::StateVersion`], [`Error::State`]: encode the animation from its beginning.
+    pub fn resume(writer: W, state: &[u8]) -> Result<Self, Error> {
+        let mut state = StateReader::new(state)?;
+        let (fps, plays, has_last_delay) = (state.f64()?, state.u8()?, state.u8()? != 0);
+        let (times, last_delay_cs) = (state.u16()?, state.u16()?);
+        let plays = match (plays, NonZeroU16::new(times)) {
+            (ENDLESS, _) => Plays::Endless,
+            (ONCE, _) => Plays::Once,
+            (REPEATED, Some(times)) => Plays::Repeated(times),
+            _ => return Err(damaged("it says not how often it is shown")),
+        };
+        let settings = Settings { fps, plays, last_delay_cs: has_last_delay.then_some(last_delay_cs) };
+        let (pushed, written, duration_cs) = (state.u64()?, state.u64()?, state.u64()?);
+        if written > pushed || pushed > MOST_COUNTED || duration_cs > MOST_COUNTED {
+            return Err(damaged("it has frames that there cannot be"));
+        }
+        let timeline = Timeline::new(fps).map_err(|_| damaged("its frame rate is wrong"))?.after(pushed);
+        let stage = match state.u8()? {
+            EMPTY => Stage::Empty(writer),
+            RUNNING => {
+                let sides = (state.u64()?, state.u64()?);
+                let side =
+                    |side: u64| u32::try_from(side).ok().filter(|side| (1..=LONGEST_SIDE).contains(side));
+                let (Some(width), Some(height)) = (side(sides.0), side(sides.1)) else {
+                    return Err(damaged("its size is wrong"));
+                };
+                let bytes = state.u64()?;
+                if bytes > MOST_COUNTED {
+                    return Err(damaged("it is longer than there can be"));
+                }
+                let quantiser = Quantiser::read(&mut state, (width, height))?;
+                // The file's beginning is written already.
+                let nowhere = Counting { inner: None, bytes: 0 };
+                let mut file =
+                    begin(nowhere, (width, height), plays).map_err(|source| Error::State { source })?;
+                *file.get_mut() = Counting { inner: Some(writer), bytes };
+                Stage::Running(Box::new(Running { size: (width, height), file, quantiser }))
+            }
+            _ => return Err(damaged("it is neither begun nor not")),
+        };
+        state.finish()?;
+        Ok(Self { settings, timeline, pushed, written, duration_cs, stage })
     }
 
     fn write(&mut self, file: &mut gif::Encoder<Counting<W>>, block: Block) -> Result<(), Error> {
@@ -180,9 +274,22 @@ impl<W: Write> Encoder<W> {
     }
 }
 
-fn begin<W: Write>(writer: W, size: (u32, u32), plays: Plays) -> io::Result<gif::Encoder<Counting<W>>> {
-    let mut file = gif::Encoder::new(Counting { inner: writer, bytes: 0 }, size.0 as u16, size.1 as u16, &[])
-        .map_err(into_io)?;
+/// What a suspended animation begins with: how often it is shown, and whether there was a frame.
+const ENDLESS: u8 = 0;
+const ONCE: u8 = 1;
+const REPEATED: u8 = 2;
+const EMPTY: u8 = 0;
+const RUNNING: u8 = 1;
+
+/// No animation comes to so many frames, hundredths of a second or bytes: no count of a state that is gone on with overflows.
+const MOST_COUNTED: u64 = 1 << 52;
+
+fn begin<W: Write>(
+    writer: Counting<W>,
+    size: (u32, u32),
+    plays: Plays,
+) -> io::Result<gif::Encoder<Counting<W>>> {
+    let mut file = gif::Encoder::new(writer, size.0 as u16, size.1 as u16, &[]).map_err(into_io)?;
     let repeat = match plays {
         Plays::Endless => Some(Repeat::Infinite),
         // Without a word on repetitions a GIF is shown once.
@@ -218,18 +325,19 @@ fn into_io(error: gif::EncodingError) -> io::Error {
 }
 
 struct Counting<W> {
-    inner: W,
+    /// `None` where what the file's encoder writes by itself, at the file's beginning and end, is not wanted.
+    inner: Option<W>,
     bytes: u64,
 }
 
 impl<W: Write> Write for Counting<W> {
     fn write(&mut self, buf: &[u8]) -> io::Result<usize> {
-        let written = self.inner.write(buf)?;
+        let written = self.inner.as_mut().map_or(Ok(buf.len()), |inner| inner.write(buf))?;
         self.bytes += written as u64;
         Ok(written)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.inner.flush()
+        self.inner.as_mut().map_or(Ok(()), Write::flush)
     }
 }

@@ -43,4 +43,14 @@ pub enum Error {
         /// What the writer said.
         source: io::Error,
     },
+    /// [`Encoder::resume`](crate::Encoder::resume) was given the state of another version of the encoder, which might go on
+    /// with other bytes: encode the animation from its beginning.
+    #[error("the state is of another version of the encoder")]
+    StateVersion,
+    /// [`Encoder::resume`](crate::Encoder::resume) was given what is no state, or a damaged one.
+    #[error("the state of the animation cannot be read")]
+    State {
+        /// What is wrong with it.
+        source: io::Error,
+    },
 }

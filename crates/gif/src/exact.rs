@@ -59,7 +59,7 @@ impl FewColours {
 }
 
 /// The colours of a frame, if there are at most 256.
-fn few_colours(pixels: &[[u8; 3]]) -> Option<FewColours> {
+pub(crate) fn few_colours(pixels: &[[u8; 3]]) -> Option<FewColours> {
     let mut colours = FewColours::new();
     let mut last = None;
     for now in pixels {

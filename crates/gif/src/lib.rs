@@ -9,6 +9,8 @@
 //!   are frames dropped, and the [`Summary`] says how many.
 //! - Memory does not grow with the number of frames: two of them, what a viewer sees, and a block. [`Encoder::push`]
 //!   writes the frame before the one that it takes.
+//! - Between two frames an animation can be [suspended](Encoder::suspend), and gone on with in another process: the bytes are
+//!   the same.
 //! - The bytes depend on frames and settings alone, not on threads or time. Work is spread over the rayon pool that
 //!   [`Encoder::push`] is called in, by fork and join only: a pool of one thread is enough, inside or outside.
 //! - A frame with at most 256 colours is kept exactly, but where the picture drifts: where an eighth of it or more
@@ -43,6 +45,7 @@ mod needs;
 mod palette;
 mod plan;
 mod quantise;
+mod state;
 mod stripe;
 mod timeline;
 

@@ -48,6 +48,22 @@ pub(crate) enum Need {
     Draw,
 }
 
+impl Need {
+    /// As a suspended animation holds it.
+    pub(crate) fn to_byte(self) -> u8 {
+        match self {
+            Need::Keep => 0,
+            Need::Either => 1,
+            Need::Refine => 2,
+            Need::Draw => 3,
+        }
+    }
+
+    pub(crate) fn of_byte(byte: u8) -> Option<Self> {
+        [Need::Keep, Need::Either, Need::Refine, Need::Draw].get(usize::from(byte)).copied()
+    }
+}
+
 /// The previous frame, which is about to be drawn.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Previous<'a> {
@@ -82,6 +98,13 @@ struct TileNeeds {
 }
 
 impl Needs {
+    /// Those that a suspended animation has come to: [`count`](Self::count) counts them as they are.
+    pub(crate) fn decided(width: usize, pixels: Vec<Need>) -> Self {
+        let tiles = width.div_ceil(TILE) * pixels.len().div_ceil(TILE * width);
+        let as_it_is = TileNeeds { changes: false, wrong: 0, error: f32::INFINITY };
+        Self { width, pixels, tiles: vec![as_it_is; tiles] }
+    }
+
     /// All of a frame is to be drawn.
     pub(crate) fn draw_all(&mut self, width: usize, pixels: usize) {
         self.width = width;

@@ -3,16 +3,23 @@
 //! Two frames are worked on at once: while one is drawn, the next one is prepared. To prepare a frame is to [compare
 //! it](crate::needs) with what will be seen before it, and to [plan](crate::plan) how it is drawn; to draw it is to choose
 //! its indices, in [stripes](crate::stripe).
+//!
+//! Between two frames a quantiser can be written down. What follows from the rest is not written but worked out anew: the
+//! histogram, the palette, and which of its entries is nearest to each colour.
+
+use std::io;
 
 use image::RgbImage;
 
 use crate::allowance::{Allowance, Loan, Redrawn};
 use crate::block::{Area, Block};
 use crate::colour::LocalMetric;
+use crate::error::Error;
 use crate::exact::{self, Change, Kind};
 use crate::histogram::{Histogram, MOST_BINS};
 use crate::needs::{LEFT_ERROR, LEFT_ERROR_IF_EXACT, Need, Needs, Previous};
 use crate::plan::{LossyPlan, Plan, Quantised};
+use crate::state::{StateReader, StateWriter, damaged};
 use crate::stripe::{self, Colours, Layout, Row, Stripe};
 
 /// Parts of a frame whose colours are counted in parallel.
@@ -148,6 +155,88 @@ impl Quantiser {
         let last = self.prepared.take()?;
         rayon::scope(|_| Some(last.draw(&mut self.seen).0))
     }
+}
+
+/// How a prepared frame is drawn, as a suspended animation holds it.
+const LOSSLESS: u8 = 0;
+const LOSSY: u8 = 1;
+/// With pixels that stay refined out of a loan.
+const LOSSY_WITH_LOAN: u8 = 2;
+
+impl Quantiser {
+    /// Writes down what later blocks depend on. Nothing before the first frame.
+    pub(crate) fn write(&self, state: &mut StateWriter) -> io::Result<()> {
+        let Some(Prepared { frame, delay_cs, first, drifts, buffers, plan }) = &self.prepared else {
+            return Ok(());
+        };
+        self.allowance.write(state)?;
+        state.f32(self.drawn_error)?;
+        state.u16(*delay_cs)?;
+        state.bytes(&[u8::from(*first), u8::from(*drifts)])?;
+        match plan {
+            Plan::Lossless(_) => state.bytes(&[LOSSLESS])?,
+            Plan::Lossy(LossyPlan { loan: None, .. }) => state.bytes(&[LOSSY])?,
+            Plan::Lossy(LossyPlan { loan: Some(loan), .. }) => {
+                state.bytes(&[LOSSY_WITH_LOAN])?;
+                loan.write(state)?;
+            }
+        }
+        state.bytes(self.seen.as_raw())?;
+        // Mostly small: the frame as it differs from what is seen before it.
+        for (now, seen) in rows(frame).zip(rows(&self.seen)) {
+            let differences: Vec<u8> =
+                now.iter().zip(seen).map(|(now, seen)| now.wrapping_sub(*seen)).collect();
+            state.bytes(&differences)?;
+        }
+        for needs in buffers.needs.pixels.chunks(frame.width() as usize) {
+            let needs: Vec<u8> = needs.iter().map(|need| need.to_byte()).collect();
+            state.bytes(&needs)?;
+        }
+        Ok(())
+    }
+
+    /// Reads what was written for frames of a size.
+    pub(crate) fn read(state: &mut StateReader<'_>, (width, height): (u32, u32)) -> Result<Self, Error> {
+        let mut quantiser =
+            Self { allowance: Allowance::read(state)?, drawn_error: state.f32()?, ..Self::new() };
+        let (delay_cs, first, drifts) = (state.u16()?, state.u8()? != 0, state.u8()? != 0);
+        let kind = state.u8()?;
+        let loan = if kind == LOSSY_WITH_LOAN { Some(Loan::read(state)?) } else { None };
+        let pixels = width as usize * height as usize;
+        let seen = state.bytes(pixels * 3)?;
+        let mut frame = state.bytes(pixels * 3)?;
+        for (level, seen) in frame.iter_mut().zip(&seen) {
+            *level = level.wrapping_add(*seen);
+        }
+        let image = |levels: Vec<u8>| {
+            RgbImage::from_raw(width, height, levels).ok_or_else(|| damaged("its size is wrong"))
+        };
+        let (frame, seen) = (image(frame)?, image(seen)?);
+        let needs = state.bytes(pixels)?.into_iter().map(Need::of_byte).collect::<Option<Vec<_>>>();
+        let needs =
+            Needs::decided(width as usize, needs.ok_or_else(|| damaged("a pixel needs what there is not"))?);
+        let mut buffers = Buffers { needs, ..Buffers::new() };
+        let plan = match kind {
+            LOSSLESS => {
+                let few = exact::few_colours(pixels_of(&frame));
+                Plan::Lossless(few.ok_or_else(|| damaged("a frame without loss has too many colours"))?)
+            }
+            LOSSY | LOSSY_WITH_LOAN if first == loan.is_none() => {
+                let Buffers { needs, histogram } = &mut buffers;
+                let (pixels, parts) = (pixels_of(&frame), &mut quantiser.parts);
+                let plan = || LossyPlan::new(pixels, width as usize, loan, needs, histogram, parts);
+                Plan::Lossy(rayon::scope(|_| plan()))
+            }
+            _ => return Err(damaged("a frame is drawn as there is not")),
+        };
+        quantiser.seen = seen;
+        quantiser.prepared = Some(Prepared { frame, delay_cs, first, drifts, buffers, plan });
+        Ok(quantiser)
+    }
+}
+
+fn rows(image: &RgbImage) -> impl Iterator<Item = &[u8]> {
+    image.as_raw().chunks(3 * image.width() as usize)
 }
 
 impl Buffers {

@@ -28,6 +28,11 @@ impl Timeline {
         Ok(Self { fps, next: 0 })
     }
 
+    /// The same, with so many frames handed out.
+    pub(crate) fn after(self, frames: u64) -> Self {
+        Self { next: frames, ..self }
+    }
+
     /// The delay of the next frame in hundredths of a second; `None` if it is dropped.
     pub(crate) fn advance(&mut self) -> Option<u16> {
         let k = self.next;

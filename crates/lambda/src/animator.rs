@@ -33,6 +33,14 @@ impl Animator for GifAnimator {
         let encoder = Encoder::new(ready.clone(), settings).map_err(reason)?;
         Ok(GifEncoding { encoder: Some(encoder), ready, most_pixels: self.most_pixels })
     }
+
+    async fn resume(&self, state: Bytes) -> Result<GifEncoding, Reason> {
+        let ready = Shelf::default();
+        let shelf = ready.clone();
+        let work = move || Encoder::resume(shelf, &state).map_err(reason);
+        let encoder = pool::run(work).await.unwrap_or_else(|| Err(failed_before()))?;
+        Ok(GifEncoding { encoder: Some(encoder), ready, most_pixels: self.most_pixels })
+    }
 }
 
 /// A GIF being encoded.
@@ -62,6 +70,12 @@ impl Encoding for GifEncoding {
         let work = move || encoder.finish().map_err(reason);
         pool::run(work).await.unwrap_or_else(|| Err(failed_before()))?;
         Ok(self.ready.take())
+    }
+
+    async fn suspend(mut self) -> Result<Bytes, Reason> {
+        let encoder = self.encoder.take().ok_or_else(failed_before)?;
+        let work = move || encoder.suspend().map(Bytes::from).map_err(reason);
+        pool::run(work).await.unwrap_or_else(|| Err(failed_before()))
     }
 }
 

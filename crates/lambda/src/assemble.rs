@@ -53,6 +53,7 @@ fn log(call: &Call, assembled: &Assembled) {
         rounds = assembled.rounds,
         built = assembled.built,
         frames = assembled.frames,
+        left_after = assembled.left_after,
         waited_ms = ms(assembled.waited),
         building_ms = ms(assembled.building),
         "assembled"
@@ -172,6 +173,7 @@ mod tests {
     use bytes::Bytes;
     use rayfold_pipeline::store::{
         ETag, ListPage, ListRequest, MemoryStore, MemoryUpload, Object, ObjectInfo, PutOptions,
+        UnfinishedUpload,
     };
     use rayfold_pipeline::{Randomness, Result, SystemClock, Timestamp};
     use serde_json::json;
@@ -216,6 +218,10 @@ mod tests {
 
         async fn upload(&self, key: &str, options: PutOptions) -> Result<Self::Upload> {
             self.0.upload(key, options).await
+        }
+
+        fn take_up(&self, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> Self::Upload {
+            self.0.take_up(key, options, unfinished)
         }
     }
 

@@ -9,7 +9,7 @@ use rayfold_pipeline::store::{S3Store, Store};
 use rayfold_pipeline::{Invocation, Policy, Randomness, SystemClock, Timestamp};
 
 use crate::animator::GifAnimator;
-use crate::limits::{limits, most_frames};
+use crate::limits::{capacity, limits, most_frames};
 use crate::raytracer::RayTracer;
 
 /// The store's client and what the steps are given.
@@ -41,8 +41,9 @@ pub struct Call {
 impl Context<S3Store> {
     /// From the function's environment: `RAYFOLD_BUCKET`, and the standard AWS variables for who and where.
     ///
-    /// `RAYFOLD_MAX_OBJECTS` and its like bound what a script may ask for. `RAYFOLD_QUIET_MS` and `RAYFOLD_STUCK_AFTER_MS` change the pauses of the protocol, `RAYFOLD_ATTEMPTS` how often
-    /// the sweep wakes a frame before it gives it up; `RAYFOLD_SEED` makes random pauses repeatable.
+    /// `RAYFOLD_MAX_OBJECTS` and its like bound what a script may ask for. `RAYFOLD_QUIET_MS` and `RAYFOLD_STUCK_AFTER_MS`
+    /// change the pauses of the protocol, `RAYFOLD_ATTEMPTS` how often the sweep wakes a frame before it gives it up,
+    /// `RAYFOLD_SPARE_FRAMES` how early an assembler leaves a long GIF to the next one; `RAYFOLD_SEED` makes random pauses repeatable.
     ///
     /// # Errors
     /// What is missing in the environment, or unreadable.
@@ -59,12 +60,16 @@ impl Context<S3Store> {
         if let Some(attempts) = number("RAYFOLD_ATTEMPTS")? {
             policy.attempts = attempts;
         }
+        if let Some(frames) = number("RAYFOLD_SPARE_FRAMES")? {
+            policy.spare_frames = frames;
+        }
         policy.most_frames = most_frames(|name| env::var(name).ok())?;
         let seed = match number("RAYFOLD_SEED")? {
             Some(seed) => seed,
             None => getrandom::u64().context("no randomness from the system")?,
         };
-        let renderer = RayTracer { limits: limits(|name| env::var(name).ok())? };
+        let variable = |name: &str| env::var(name).ok();
+        let renderer = RayTracer { limits: limits(variable)?, capacity: capacity(variable)? };
         let animator = GifAnimator { most_pixels: renderer.limits.max_pixels };
         Ok(Self { store, bucket, renderer, animator, policy, random: Randomness::seeded(seed) })
     }

@@ -11,8 +11,10 @@
 pub mod animator;
 pub mod answer;
 pub mod assemble;
+pub mod capacity;
 pub mod context;
 pub mod event;
+pub mod joining;
 mod limits;
 mod logs;
 mod png;

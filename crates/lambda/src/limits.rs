@@ -4,10 +4,12 @@
 //! it is given up. So the limits are settings of the stack. Knows only names and numbers; what a limit means is
 //! [`Limits`]'s.
 
-use std::num::NonZeroU64;
+use std::num::{NonZeroU32, NonZeroU64};
 
 use anyhow::Context as _;
 use rayfold_scene::Limits;
+
+use crate::capacity::{Capacity, MOST_BANDS};
 
 /// The default limits, changed by the variables that `variable` finds: `RAYFOLD_MAX_SCRIPT_BYTES`, `RAYFOLD_MAX_OBJECTS`,
 /// `RAYFOLD_MAX_LIGHTS`, `RAYFOLD_MAX_PIXELS` and `RAYFOLD_MAX_FRAMES` (of one script).
@@ -36,6 +38,20 @@ pub(crate) fn limits(variable: impl Fn(&str) -> Option<String>) -> anyhow::Resul
 /// When the variable is no whole number of at least 1.
 pub(crate) fn most_frames(variable: impl Fn(&str) -> Option<String>) -> anyhow::Result<Option<u64>> {
     number(&variable, "RAYFOLD_MAX_ANIMATION_FRAMES")
+}
+
+/// What an invocation bears, by Lambda's own `AWS_LAMBDA_FUNCTION_MEMORY_SIZE`, in megabytes, and `RAYFOLD_MAX_BANDS`, into how
+/// many bands a frame may be cut.
+///
+/// # Errors
+/// When one of them is no whole number of at least 1.
+pub(crate) fn capacity(variable: impl Fn(&str) -> Option<String>) -> anyhow::Result<Capacity> {
+    let megabytes = number(&variable, "AWS_LAMBDA_FUNCTION_MEMORY_SIZE")?;
+    let bands = number(&variable, "RAYFOLD_MAX_BANDS")?.map(|bands| u32::try_from(bands).unwrap_or(u32::MAX));
+    Ok(Capacity {
+        memory: megabytes.map(|megabytes| megabytes.saturating_mul(1 << 20)),
+        most_bands: bands.and_then(NonZeroU32::new).unwrap_or(MOST_BANDS),
+    })
 }
 
 fn number(variable: impl Fn(&str) -> Option<String>, name: &str) -> anyhow::Result<Option<u64>> {
@@ -77,6 +93,19 @@ mod tests {
     }
 
     #[test]
+    fn what_an_invocation_bears_is_what_lambda_and_the_stack_say() {
+        let of = |asked: &str| match asked {
+            "AWS_LAMBDA_FUNCTION_MEMORY_SIZE" => Some("1769".to_owned()),
+            "RAYFOLD_MAX_BANDS" => Some("7".to_owned()),
+            _ => None,
+        };
+        let expected = Capacity { memory: Some(1769 << 20), most_bands: NonZeroU32::new(7).unwrap() };
+        assert_eq!(capacity(of).unwrap(), expected);
+        assert_eq!(capacity(|_| None).unwrap(), Capacity::default());
+        assert!(capacity(|name| (name == "RAYFOLD_MAX_BANDS").then(|| "0".to_owned())).is_err());
+    }
+
+    #[test]
     fn what_is_no_limit_is_named() {
         for text in ["0", "-1", "many", "1.5", ""] {
             let error = with("RAYFOLD_MAX_OBJECTS", text).unwrap_err();
@@ -101,7 +130,9 @@ mod tests {
         };
         limits(note).unwrap();
         most_frames(note).unwrap();
+        capacity(note).unwrap();
         let mut read = read.into_inner();
+        read.retain(|name| name.starts_with("RAYFOLD_"));
         read.sort_unstable();
         assert_eq!(set, read);
     }

@@ -1,11 +1,17 @@
-//! Frames as the bucket keeps them: PNG files of exactly an image's RGB pixels.
+//! Frames as the bucket keeps them: PNG files of exactly an image's RGB pixels. The bytes of a file depend on its pixels
+//! alone, not on how many rows at a time came in.
 
-use std::io::Cursor;
+use std::io::{Cursor, Write};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use bytes::Bytes;
-use image::codecs::png::{CompressionType, FilterType, PngDecoder, PngEncoder};
+use image::codecs::png::PngDecoder;
 use image::error::{LimitError, LimitErrorKind};
-use image::{ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageResult, RgbImage};
+use image::{ImageDecoder, ImageError, ImageResult, RgbImage};
+use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, Filter, StreamWriter};
+
+/// Bytes of a chunk of the file.
+const CHUNK: usize = 1 << 16;
 
 /// Of what a PNG can hold at most, 16 bits of red, green, blue and alpha.
 const BYTES_A_PIXEL: u64 = 8;
@@ -14,15 +20,65 @@ const BYTES_A_PIXEL: u64 = 8;
 ///
 /// # Errors
 /// When the image cannot be held as PNG, which one with pixels always can.
-pub(crate) fn encode(image: &RgbImage) -> ImageResult<Bytes> {
-    let mut png = Vec::new();
-    PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Adaptive).write_image(
-        image.as_raw(),
-        image.width(),
-        image.height(),
-        ExtendedColorType::Rgb8,
-    )?;
-    Ok(png.into())
+pub(crate) fn encode(image: &RgbImage) -> Result<Bytes, EncodingError> {
+    let mut rows = Rows::begin(image.width(), image.height())?;
+    rows.push(image.as_raw())?;
+    rows.finish()
+}
+
+/// A PNG being written, from the top. Memory for its file and a few rows.
+pub(crate) struct Rows {
+    writer: StreamWriter<'static, Sink>,
+    sink: Sink,
+}
+
+impl Rows {
+    /// An image of so many columns and rows.
+    ///
+    /// # Errors
+    /// When there are none, or more than the format knows.
+    pub(crate) fn begin(width: u32, height: u32) -> Result<Self, EncodingError> {
+        let sink = Sink::default();
+        let mut encoder = Encoder::new(sink.clone(), width, height);
+        encoder.set_color(ColorType::Rgb);
+        encoder.set_depth(BitDepth::Eight);
+        encoder.set_compression(Compression::Fast);
+        encoder.set_filter(Filter::Adaptive);
+        let writer = encoder.write_header()?.into_stream_writer_with_size(CHUNK)?;
+        Ok(Self { writer, sink })
+    }
+
+    /// Adds the RGB pixels of the next rows.
+    ///
+    /// # Errors
+    /// When they are more than the image has.
+    pub(crate) fn push(&mut self, pixels: &[u8]) -> Result<(), EncodingError> {
+        Ok(self.writer.write_all(pixels)?)
+    }
+
+    /// The file.
+    ///
+    /// # Errors
+    /// When rows are missing.
+    pub(crate) fn finish(self) -> Result<Bytes, EncodingError> {
+        self.writer.finish()?;
+        Ok(std::mem::take(&mut *self.sink.0.lock().unwrap_or_else(PoisonError::into_inner)).into())
+    }
+}
+
+/// Where the encoder, which keeps what it writes to, leaves the file.
+#[derive(Clone, Default)]
+struct Sink(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
 }
 
 /// The RGB pixels of a PNG.
@@ -55,6 +111,35 @@ mod tests {
         for end in 0..png.len() - 12 {
             assert!(decode(&png[..end], 15).is_err(), "{end} of {} bytes", png.len());
         }
+    }
+
+    /// Bands of any height give the file that the whole gives, of what compresses and of what does not.
+    #[test]
+    fn the_bytes_do_not_depend_on_how_rows_come_in() {
+        let mut dice = fastrand::Rng::with_seed(7);
+        for noise in [0, 1, 255] {
+            let image = RgbImage::from_fn(301, 200, |x, y| {
+                image::Rgb(
+                    [x as u8, (y / 3) as u8, 9].map(|level: u8| level.wrapping_add(dice.u8(0..=noise))),
+                )
+            });
+            let whole = encode(&image).unwrap();
+            assert_eq!(decode(&whole, u64::MAX >> 3).unwrap(), image);
+            for _ in 0..20 {
+                let mut rows = Rows::begin(301, 200).unwrap();
+                let mut rest = &image.as_raw()[..];
+                while !rest.is_empty() {
+                    // Also pieces that are no whole rows.
+                    let (piece, after) = rest.split_at(dice.usize(1..=rest.len()));
+                    rows.push(piece).unwrap();
+                    rest = after;
+                }
+                assert!(rows.finish().unwrap() == whole, "noise {noise}");
+            }
+        }
+        let mut short = Rows::begin(301, 200).unwrap();
+        short.push(&[0; 301 * 3 * 199]).unwrap();
+        assert!(short.finish().is_err(), "a row is missing");
     }
 
     /// A few bytes that say they are 4 gigapixels.

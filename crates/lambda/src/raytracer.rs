@@ -1,19 +1,31 @@
 //! The render function's renderer: scripts to PNG images by `rayfold-scene` and `rayfold-tracer`.
 //!
-//! A drawing that nobody waits for any more is cancelled.
+//! A drawing that nobody waits for any more is cancelled. One that is too big for an invocation, by what [`Capacity`] makes of
+//! a few strips of it or by how long it takes, is to be drawn in bands.
 
-use std::num::NonZeroU64;
+use std::num::{NonZeroU32, NonZeroU64};
+use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use rayfold_pipeline::keys::{Part, ScriptName};
+use rayfold_pipeline::keys::{Band, Part, ScriptName};
 use rayfold_pipeline::manifest::Reason;
 use rayfold_pipeline::{Drawing, Error, Renderer, Result};
-use rayfold_scene::Limits;
-use rayfold_tracer::{RenderError, RenderOptions};
+use rayfold_scene::{Limits, Scene, Script};
+use rayfold_tracer::{Drawing as Picture, Exposure, RenderError, RenderOptions};
 
+use crate::capacity::{Capacity, Extent, FEW_RAYS, Measured, STOP_SHARE, STRIP, Verdict, strips};
+use crate::joining::PngJoining;
 use crate::{png, pool};
+
+/// Bytes of a pixel's sums where it may have many samples, and of what its first one saw where not all pixels get sums.
+const SUMS_BYTES: u64 = 56;
+const FIRST_BYTES: u64 = 9;
+
+/// The share of the time that is left after which no more strips are drawn.
+const MEASURING_SHARE: f64 = 0.1;
 
 /// Draws scripts.
 ///
@@ -22,7 +34,7 @@ use crate::{png, pool};
 /// use rayfold_pipeline::{Drawing, Renderer, keys::ScriptName};
 /// # #[tokio::main(flavor = "current_thread")] async fn main() -> rayfold_pipeline::Result<()> {
 /// let script = "Screen 4 3\nSphere 1 0 0 -5 1 0 0 0 0 0\nTrace";
-/// let drawing = RayTracer::default().draw(&ScriptName::new("red")?, script.into(), None).await?;
+/// let drawing = RayTracer::default().draw(&ScriptName::new("red")?, script.into(), None, None).await?;
 /// assert!(matches!(drawing, Drawing::Frame(png) if png.starts_with(b"\x89PNG")));
 /// # Ok(()) }
 /// ```
@@ -30,54 +42,342 @@ use crate::{png, pool};
 pub struct RayTracer {
     /// What a script may ask for.
     pub limits: Limits,
+    /// What an invocation bears.
+    pub capacity: Capacity,
 }
 
 impl Renderer for RayTracer {
+    type Joining = PngJoining;
+
     fn most_bytes(&self) -> u64 {
         self.limits.max_script_bytes as u64
     }
 
-    async fn draw(&self, name: &ScriptName, script: Bytes, part: Part) -> Result<Drawing> {
-        let cancelled = CancelOnDrop::default();
-        let (flag, limits, file) = (cancelled.0.clone(), self.limits, format!("{name}.txt"));
-        pool::run(move || draw(&file, &script, part, &limits, &flag))
-            .await
-            .unwrap_or_else(|| Err(Error::OutOfTime { what: format!("drawing {name} was given up") }))
-    }
-}
-
-fn draw(file: &str, script: &[u8], part: Part, limits: &Limits, cancel: &AtomicBool) -> Result<Drawing> {
-    let parsed = rayfold_scene::parse(file, script, limits);
-    let Some(script) = parsed.script else {
-        return Ok(Drawing::Fault(Reason::from_diagnostics(parsed.diagnostics)));
-    };
-    let count = script.frame_count() as u64;
-    let number = match (part, NonZeroU64::new(count)) {
-        (None, Some(count)) if count.get() > 1 => return Ok(Drawing::Split(count)),
-        (part, _) => part.map_or(1, NonZeroU64::get),
-    };
-    let place = usize::try_from(number - 1).unwrap_or(usize::MAX);
-    let options = RenderOptions { cancel: Some(cancel), ..Default::default() };
-    let Some(drawn) = rayfold_tracer::render_frame(&script, place, &options) else {
-        return Ok(Drawing::Fault(Reason::new(format!("{file} has {count} frames, no frame {number}"))));
-    };
-    match drawn {
-        Ok(image) => match png::encode(&image) {
-            Ok(frame) => Ok(Drawing::Frame(frame)),
-            Err(source) => Err(Error::Malformed { key: "the drawn frame".to_owned(), source: source.into() }),
-        },
-        Err(RenderError::Cancelled) => {
-            Err(Error::OutOfTime { what: format!("drawing {file} was cancelled") })
+    async fn draw(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+        left: Option<Duration>,
+    ) -> Result<Drawing> {
+        let stop = CancelOnDrop::default();
+        let (flag, limits, file) = (stop.0.clone(), self.limits, format!("{name}.txt"));
+        let time = Time { began: Instant::now(), left, capacity: self.capacity };
+        let drawing = run(name, move || match Shot::read(&file, &script, part, &limits) {
+            Ok(shot) => shot.draw(&time, &flag),
+            Err(other) => Ok(other),
+        });
+        let mut drawing = pin!(drawing);
+        let Some(patience) = left.filter(|_| self.capacity.cuts()) else { return drawing.await };
+        match tokio::time::timeout(patience.mul_f64(STOP_SHARE), &mut drawing).await {
+            Ok(drawn) => drawn,
+            Err(_) => {
+                // What draws ends soon, and says into how many bands the frame is to be cut.
+                stop.0.store(true, Ordering::Relaxed);
+                drawing.await
+            }
         }
-        Err(error) => Ok(Drawing::Fault(Reason::new(format!("{file}: {error}")))),
+    }
+
+    async fn draw_band(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+        band: Band,
+    ) -> Result<Result<Bytes, Reason>> {
+        let stop = CancelOnDrop::default();
+        let (flag, limits, file) = (stop.0.clone(), self.limits, format!("{name}.txt"));
+        run(name, move || match Shot::read(&file, &script, part, &limits) {
+            Ok(shot) => shot.draw_band(band, &flag),
+            Err(other) => Ok(Err(no_single_frame(&file, other))),
+        })
+        .await
+    }
+
+    async fn join(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+        count: NonZeroU64,
+    ) -> Result<Result<PngJoining, Reason>> {
+        let (limits, file) = (self.limits, format!("{name}.txt"));
+        run(name, move || {
+            Ok(match Shot::read(&file, &script, part, &limits) {
+                Ok(shot) => PngJoining::begin(shot.size(), count),
+                Err(other) => Err(no_single_frame(&file, other)),
+            })
+        })
+        .await
     }
 }
 
+/// Works on the pool.
+async fn run<T: Send + 'static>(
+    name: &ScriptName,
+    work: impl FnOnce() -> Result<T> + Send + 'static,
+) -> Result<T> {
+    let given_up = || Err(Error::OutOfTime { what: format!("drawing {name} was given up") });
+    pool::run(work).await.unwrap_or_else(given_up)
+}
+
+/// Why there is no band of what is no frame: a script that was cut does not change, so it has a frame.
+fn no_single_frame(file: &str, drawing: Drawing) -> Reason {
+    match drawing {
+        Drawing::Fault(reason) => reason,
+        Drawing::Split(count) => Reason::new(format!("{file} has {count} frames, each of which has bands")),
+        Drawing::Frame(_) | Drawing::Cut(_) => Reason::new(format!("{file} has no bands")),
+    }
+}
+
+/// What an invocation has for a drawing.
+struct Time {
+    began: Instant,
+    /// From then on.
+    left: Option<Duration>,
+    capacity: Capacity,
+}
+
+/// A frame of a script.
+struct Shot {
+    file: String,
+    script: Script,
+    /// Counted from 0.
+    place: usize,
+    scene: Scene,
+}
+
+impl Shot {
+    /// Reads a script; what comes of it if it is not a frame to be drawn.
+    fn read(file: &str, script: &[u8], part: Part, limits: &Limits) -> std::result::Result<Self, Drawing> {
+        let parsed = rayfold_scene::parse(file, script, limits);
+        let Some(script) = parsed.script else {
+            return Err(Drawing::Fault(Reason::from_diagnostics(parsed.diagnostics)));
+        };
+        let count = script.frame_count() as u64;
+        let number = match (part, NonZeroU64::new(count)) {
+            (None, Some(count)) if count.get() > 1 => return Err(Drawing::Split(count)),
+            (part, _) => part.map_or(1, NonZeroU64::get),
+        };
+        let place = usize::try_from(number - 1).unwrap_or(usize::MAX);
+        match script.frame(place) {
+            Some(scene) => Ok(Shot { file: file.to_owned(), script, place, scene }),
+            None => Err(Drawing::Fault(Reason::new(format!("{file} has {count} frames, no frame {number}")))),
+        }
+    }
+
+    /// Columns and rows.
+    fn size(&self) -> (u32, u32) {
+        (self.scene.screen.width(), self.scene.screen.height())
+    }
+
+    /// Prepares the picture.
+    fn expose<T>(
+        &self,
+        options: &RenderOptions,
+        then: impl FnOnce(&Picture) -> std::result::Result<T, RenderError>,
+    ) -> std::result::Result<T, RenderError> {
+        let after =
+            |frames| self.script.frame_after(self.place, frames).unwrap_or_else(|| self.scene.clone());
+        then(&Picture::exposed(Exposure::moving(&self.scene, &after), options)?)
+    }
+
+    /// Draws the frame, unless it is too big for that.
+    fn draw(&self, time: &Time, stop: &AtomicBool) -> Result<Drawing> {
+        let options = RenderOptions { cancel: Some(stop), ..Default::default() };
+        let drawn = self.expose(&options, |picture| {
+            let extent = self.extent(picture.margin());
+            match self.judge(picture, &extent, time) {
+                Verdict::Whole => match picture.draw() {
+                    Err(RenderError::Cancelled) if time.left.is_some() => {
+                        Ok(Err(time.judge_late(&extent, extent.height)))
+                    }
+                    image => image.map(Ok),
+                },
+                verdict => Ok(Err(verdict)),
+            }
+        });
+        let (file, cut) = (&self.file, |bands: NonZeroU32| Drawing::Cut(NonZeroU64::from(bands)));
+        match drawn {
+            Ok(Ok(image)) => match png::encode(&image) {
+                Ok(frame) => Ok(Drawing::Frame(frame)),
+                Err(source) => {
+                    Err(Error::Malformed { key: "the drawn frame".to_owned(), source: source.into() })
+                }
+            },
+            Ok(Err(Verdict::Bands(bands))) => Ok(cut(bands)),
+            Ok(Err(Verdict::TooBig(why))) => Ok(Drawing::Fault(Reason::new(format!("{file}: {why}")))),
+            Ok(Err(Verdict::Whole)) | Err(RenderError::Cancelled) => {
+                Err(Error::OutOfTime { what: format!("drawing {file} was cancelled") })
+            }
+            Err(error) => Ok(Drawing::Fault(Reason::new(format!("{file}: {error}")))),
+        }
+    }
+
+    fn draw_band(&self, band: Band, stop: &AtomicBool) -> Result<std::result::Result<Bytes, Reason>> {
+        let options = RenderOptions { cancel: Some(stop), ..Default::default() };
+        let (file, (_, height)) = (&self.file, self.size());
+        let rows = band.rows(height);
+        if rows.is_empty() {
+            return Ok(Err(Reason::new(format!("{file}: a frame of {height} rows has no band {band}"))));
+        }
+        match self.expose(&options, |picture| picture.draw_rows(rows)) {
+            Ok(image) => match png::encode(&image) {
+                Ok(image) => Ok(Ok(image)),
+                Err(source) => {
+                    Err(Error::Malformed { key: "the drawn band".to_owned(), source: source.into() })
+                }
+            },
+            Err(RenderError::Cancelled) => {
+                Err(Error::OutOfTime { what: format!("drawing band {band} of {file} was cancelled") })
+            }
+            Err(error) => Ok(Err(Reason::new(format!("{file}: {error}")))),
+        }
+    }
+
+    fn extent(&self, margin: u32) -> Extent {
+        let (width, height) = self.size();
+        let samples = self.scene.samples;
+        let pixel_bytes = match samples.most() {
+            1 => 0,
+            _ if samples.error() > 0.0 => FIRST_BYTES + SUMS_BYTES,
+            _ => SUMS_BYTES,
+        };
+        Extent { width, height, pixel_bytes, margin }
+    }
+
+    /// What to do about the frame, by strips of it where it may be more than an invocation bears.
+    fn judge(&self, picture: &Picture, extent: &Extent, time: &Time) -> Verdict {
+        let by_memory = time.capacity.judge_memory(extent);
+        let rays = self.scene.screen.pixels().saturating_mul(u64::from(self.scene.samples.most()));
+        let Some(left) = time.left.filter(|_| rays > FEW_RAYS || by_memory != Verdict::Whole) else {
+            return by_memory;
+        };
+        let before = time.began.elapsed();
+        let (mut seconds, mut rows_drawn) = (0.0, 0);
+        let mut measured = Measured { before, row: 0.0, dearest_row: 0.0 };
+        for rows in strips(extent.height) {
+            let (start, count) = (Instant::now(), rows.end - rows.start);
+            if picture.sketch_rows(rows).is_err() {
+                // It is stopped: this strip alone took longer than a frame may.
+                return time.judge_late(extent, STRIP);
+            }
+            let took = start.elapsed().as_secs_f64();
+            seconds += took;
+            rows_drawn += count;
+            measured.row = seconds / f64::from(rows_drawn);
+            measured.dearest_row = measured.dearest_row.max(took / f64::from(count));
+            if time.capacity.is_sure(extent, &measured, left)
+                || seconds > MEASURING_SHARE * left.as_secs_f64()
+            {
+                break;
+            }
+        }
+        time.capacity.judge(extent, &measured, left)
+    }
+}
+
+impl Time {
+    /// What to do about a frame of which it is known only that so many rows of it take longer than there is time.
+    fn judge_late(&self, extent: &Extent, rows: u32) -> Verdict {
+        let left = self.left.unwrap_or_default();
+        // Twice as long, for who knows.
+        let row = 2.0 * left.as_secs_f64() / f64::from(rows.min(extent.height));
+        let measured = Measured { before: Duration::ZERO, row, dearest_row: row };
+        self.capacity.judge(extent, &measured, left)
+    }
+}
+
+/// Stops a drawing that nobody waits for any more.
 #[derive(Default)]
 struct CancelOnDrop(Arc<AtomicBool>);
 
 impl Drop for CancelOnDrop {
     fn drop(&mut self) {
         self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rayfold_pipeline::Joining;
+
+    use super::*;
+
+    fn name() -> ScriptName {
+        ScriptName::new("big").unwrap()
+    }
+
+    /// Balls on a floor, seen in mirrors.
+    fn script(size: &str, samples: &str) -> Bytes {
+        let text = format!(
+            "Screen {size}\nSamples {samples}\nLook 0 3 9  0 0 0  40\nBackground .5 .6 .8\nIlight .6 .6 .55  1 -1.7 -1  9\n\
+             Sphere 1 -1.6 .9 -.4  .04 .04 .04 .2 .2 .2 .6 .6 .6\nSphere .8 1 .6 1.2  .08 .02 .02 .8 .2 .15\n\
+             Plane 0 -1 0  0 1 0  .1 .1 .1 .5 .5 .45 .2 .2 .2\nTrace\n"
+        );
+        text.into()
+    }
+
+    /// Of any number of bands, so that a machine that others keep busy finds none too big.
+    fn patient() -> RayTracer {
+        let capacity = Capacity { memory: None, most_bands: NonZeroU32::new(100_000).unwrap() };
+        RayTracer { capacity, ..RayTracer::default() }
+    }
+
+    async fn draw(script: &Bytes, left_ms: Option<u64>) -> Drawing {
+        let left = left_ms.map(Duration::from_millis);
+        patient().draw(&name(), script.clone(), None, left).await.unwrap()
+    }
+
+    async fn put_together(script: &Bytes, count: NonZeroU64) -> Bytes {
+        let tracer = patient();
+        let mut joining = tracer.join(&name(), script.clone(), None, count).await.unwrap().unwrap();
+        for band in Band::all(count) {
+            let image = tracer.draw_band(&name(), script.clone(), None, band).await.unwrap().unwrap();
+            joining.push(image).await.unwrap();
+        }
+        joining.finish().await.unwrap()
+    }
+
+    #[tokio::test]
+    async fn bands_are_the_frame_byte_for_byte_whatever_the_samples() {
+        for samples in ["1", "4 0", "16 2"] {
+            let script = script("70 400", samples);
+            let Drawing::Frame(whole) = draw(&script, None).await else { panic!("{samples}") };
+            for count in [2, 5] {
+                let joined = put_together(&script, NonZeroU64::new(count).unwrap()).await;
+                assert!(joined == whole, "{samples} samples in {count} bands");
+            }
+        }
+    }
+
+    /// Of many rays: by strips, before it is drawn.
+    #[tokio::test]
+    async fn a_frame_that_is_measured_to_take_too_long_is_cut() {
+        let script = script("3000 3000", "64 0");
+        let start = Instant::now();
+        let cut = draw(&script, Some(200)).await;
+        let Drawing::Cut(bands) = cut else { panic!("{cut:?}") };
+        println!("{bands} bands, after {:?}", start.elapsed());
+        assert!(bands.get() >= 2);
+    }
+
+    /// Of few: when it is seen to take long.
+    #[tokio::test]
+    async fn a_frame_that_turns_out_to_take_too_long_is_cut() {
+        let cut = draw(&script("1000 1000", "16 0"), Some(5)).await;
+        assert!(matches!(cut, Drawing::Cut(bands) if bands.get() >= 2), "{cut:?}");
+    }
+
+    #[tokio::test]
+    async fn where_no_frame_may_be_cut_those_that_fit_are_drawn() {
+        let tracer = RayTracer {
+            capacity: Capacity { memory: None, most_bands: NonZeroU32::MIN },
+            ..RayTracer::default()
+        };
+        let left = Some(Duration::from_secs(600));
+        let drawn = tracer.draw(&name(), script("40 30", "4 0"), None, left).await.unwrap();
+        assert!(matches!(drawn, Drawing::Frame(_)));
     }
 }

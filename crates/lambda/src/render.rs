@@ -46,6 +46,8 @@ fn described(outcome: &Came) -> String {
         Came::Present => "present".into(),
         Came::Drawn => "drawn".into(),
         Came::Split(parts) => format!("split into {parts}"),
+        Came::Cut(bands) => format!("cut into {bands}"),
+        Came::Band(band) => format!("band {band}"),
         Came::Faulty(_) => "faulty".into(),
         Came::TooMany => "one too many".into(),
     }

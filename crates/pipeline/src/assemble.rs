@@ -6,61 +6,24 @@
 //! so that no GIF from an older listing stays, and no set that became whole while it worked is left. Whoever waits or builds
 //! holds the animation's lease; another assembler that finds it taken leaves the GIF to its holder.
 //!
-//! Memory does not grow with the number of frames: they are fetched a few ahead of the encoder, and what it writes goes
-//! out piece by piece.
+//! A GIF that does not fit the time of one invocation is left to the next one where it stands (`build`).
 
-use std::future::Future;
 use std::time::Duration;
 
-use bytes::Bytes;
-use futures_util::stream::{self, StreamExt};
 use rayfold_scene::AnimationSettings;
 
+use crate::animator::Animator;
+use crate::build::Built;
 use crate::invocation::{Invocation, Known, Mutation};
 use crate::keys::{Animation, Generation, Key, Receipt, Tag};
-use crate::manifest::{Frame, FrameState, Head, Manifest, Reason, Status};
+use crate::lease::Held;
+use crate::manifest::{Frame, Head, Manifest, Reason, Status};
 use crate::observe::Observation;
-use crate::store::{Condition, ObjectInfo, PutOptions, Store, Upload};
+use crate::store::{ETag, ObjectInfo, Store};
 use crate::wakings::Wakings;
 use crate::{Clock, Error, Result, Timestamp};
 
-/// The name of the GIF's metadata that holds its generation.
-pub const GENERATION: &str = "generation";
-
-/// What encodes. The assemble function brings a GIF encoder, the simulation something smaller.
-pub trait Animator: Send + Sync {
-    /// An animation being encoded.
-    type Encoding: Encoding;
-
-    /// Starts an animation; the reason when it cannot be.
-    fn begin(&self, settings: &AnimationSettings) -> Result<Self::Encoding, Reason>;
-}
-
-/// An animation being encoded: frames in, pieces of the file out.
-pub trait Encoding: Send {
-    /// Adds the next frame, a PNG, and gives what of the file is ready.
-    ///
-    /// # Errors
-    ///
-    /// What is wrong with this frame, or with all of them together.
-    fn push(&mut self, frame: Bytes) -> impl Future<Output = Result<Bytes, Unfit>> + Send;
-
-    /// Gives the rest of the file.
-    ///
-    /// # Errors
-    ///
-    /// The reason why these frames make no animation; it would be the same next time.
-    fn finish(self) -> impl Future<Output = Result<Bytes, Reason>> + Send;
-}
-
-/// Why a frame cannot be added to an animation.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Unfit {
-    /// The frame is none: someone has put something else in its place. Drawn again it may be one.
-    Corrupt(Reason),
-    /// The frame does not go with the others; it would be the same next time.
-    Unlike(Reason),
-}
+pub use crate::build::{GENERATION, MOST_PIECES, frame_key, generation_of, is_current};
 
 /// What an invocation of the assembler did.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,6 +40,8 @@ pub struct Assembled {
     pub built: u32,
     /// Frames of the last GIF that was written.
     pub frames: u64,
+    /// Frames of a GIF that was left unfinished to the next invocation.
+    pub left_after: Option<u64>,
     /// Waiting for uploads to settle.
     pub waited: Duration,
     /// Building GIFs.
@@ -114,7 +79,7 @@ pub(crate) enum Due {
 /// What is to be done about the GIF of a set that the manifest's head stands for.
 pub(crate) fn due(head: &Head, gif: Option<&ObjectInfo>) -> Due {
     match head.status {
-        Status::Done if generation_of(gif) != Some(head.generation.as_str()) => Due::Gif,
+        Status::Done if !is_current(head, gif) => Due::Gif,
         Status::Empty | Status::Failed | Status::Refused if gif.is_some() => Due::NoGif,
         Status::Done | Status::Empty | Status::Failed | Status::Refused => Due::Nothing,
         // While more is to come the last GIF stays.
@@ -122,25 +87,22 @@ pub(crate) fn due(head: &Head, gif: Option<&ObjectInfo>) -> Due {
     }
 }
 
-/// How a build ended.
-enum Built<'a> {
-    /// The GIF is put.
-    Put,
-    /// A frame is gone, or someone else's GIF came first: look again.
-    Stale,
-    /// This frame cannot be read.
-    Corrupt(&'a Frame, Reason),
-    /// These frames make no GIF.
-    Refused(Reason),
+/// The version of this set's GIF, if nobody has written it down.
+fn new_gif(head: &Head, gif: Option<&ObjectInfo>) -> Option<ETag> {
+    let is_new = head.status == Status::Done && head.gif_version().is_none() && is_current(head, gif);
+    gif.filter(|_| is_new).map(|gif| gif.etag.clone())
 }
 
 /// How a round ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Next {
     /// Something was written or waited for: look again.
     Round,
-    /// There is nothing to do, or another assembler does it.
+    /// There is nothing to do.
     End,
-    /// The set does not settle in this invocation's time: wake the next one.
+    /// Another assembler does it: this one has no say in its lease.
+    Leave,
+    /// The set does not settle in this invocation's time, or its GIF is not finished in it: wake the next one.
     HandOver,
 }
 
@@ -169,9 +131,11 @@ struct Tally {
     rounds: u32,
     built: u32,
     frames: u64,
+    left_after: Option<u64>,
     waited: Duration,
     building: Duration,
-    holds_lease: bool,
+    /// The animation's lease, while this invocation holds it.
+    lease: Option<Held>,
 }
 
 impl Quiet {
@@ -191,13 +155,14 @@ impl Tally {
     fn new(began: Timestamp) -> Self {
         let (waited, building) = (Duration::ZERO, Duration::ZERO);
         let quiet = Quiet::default();
-        Tally { began, quiet, rounds: 0, built: 0, frames: 0, waited, building, holds_lease: false }
+        let (left_after, lease) = (None, None);
+        Tally { began, quiet, rounds: 0, built: 0, frames: 0, left_after, waited, building, lease }
     }
 
     fn of(self, head: &Head) -> Assembled {
-        let Tally { rounds, built, frames, waited, building, .. } = self;
+        let Tally { rounds, built, frames, left_after, waited, building, .. } = self;
         let (animation, status, generation) = (head.animation.clone(), head.status, head.generation.clone());
-        Assembled { animation, status, generation, rounds, built, frames, waited, building }
+        Assembled { animation, status, generation, rounds, built, frames, left_after, waited, building }
     }
 }
 
@@ -217,17 +182,34 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                     None => continue,
                 },
             };
+            let known = match new_gif(&known.manifest.head, gif.as_ref()) {
+                Some(version) => match self.record_gif(&known, version).await? {
+                    Some(known) => known,
+                    None => continue,
+                },
+                None => known,
+            };
             let leaves_early = self.breaks(Mutation::AssemblerLeavesEarly) && !observed.head.is_terminal();
-            let next = match due(&observed.head, gif.as_ref()) {
+            let next = match due(&known.manifest.head, gif.as_ref()) {
                 Due::Nothing if agrees || leaves_early => Next::End,
                 Due::Nothing => Next::Round,
                 Due::NoGif => self.delete(&animation.gif()).await.map(|()| Next::Round)?,
                 Due::Gif => self.make_gif(animator, &observation, &known, gif, &mut tally).await?,
             };
+            if next == Next::End && tally.lease.is_none() && observation.has_lease {
+                // An earlier attempt at the same event died with it, or nobody has taken it up.
+                tally.lease = self.take_left_lease(animation).await?;
+                if tally.lease.is_some_and(|held| held.has_checkpoint) {
+                    // The GIF may have been another one when it was handed over, since this round looked.
+                    continue;
+                }
+            }
             match next {
                 Next::Round => {}
-                Next::End if tally.holds_lease || self.left_lease(&observation).await? => {
-                    tally.holds_lease = false;
+                Next::Leave => return Ok(tally.of(&observed.head)),
+                Next::End => {
+                    let Some(mut held) = tally.lease.take() else { return Ok(tally.of(&observed.head)) };
+                    self.abandon_checkpoint(&observed.head, &mut held).await?;
                     self.release_lease(animation).await?;
                     // Whoever found the lease taken was woken for a manifest that was written before.
                     let now = self.head(&animation.manifest()).await?;
@@ -236,19 +218,15 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                         return Ok(tally.of(&observed.head));
                     }
                 }
-                Next::End => return Ok(tally.of(&observed.head)),
                 Next::HandOver => {
-                    self.release_lease(animation).await?;
+                    if let Some(held) = tally.lease.take() {
+                        self.hand_over_lease(animation, &held).await?;
+                    }
                     self.claim(&known.manifest).await?;
                     return Ok(tally.of(&observed.head));
                 }
             }
         }
-    }
-
-    /// Whether an earlier attempt at the same event died with the lease.
-    async fn left_lease(&self, observation: &Observation) -> Result<bool> {
-        Ok(observation.has_lease && self.holds_lease(&observation.manifest.head.animation).await?)
     }
 
     /// Waits until the set is settled, or builds its GIF, unless another assembler does.
@@ -261,10 +239,10 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         tally: &mut Tally,
     ) -> Result<Next> {
         let observed = &observation.manifest;
-        tally.holds_lease = tally.holds_lease || self.take_lease(&observed.head.animation).await?;
-        if !tally.holds_lease {
-            return Ok(Next::End);
+        if tally.lease.is_none() {
+            tally.lease = self.take_lease(&observed.head.animation).await?;
         }
+        let Some(held) = &mut tally.lease else { return Ok(Next::Leave) };
         let changed =
             last_change(&observed.head, observation.newest_script(), known.manifest.head.removed_at);
         let wait = changed
@@ -278,118 +256,27 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             return Ok(Next::Round);
         }
         let start = self.clock.now();
-        let built = self.build(animator, observed, gif, tally.began).await?;
+        let built = self.build(animator, observed, gif, tally.began, held).await?;
         tally.building += self.clock.now().since(start);
         match built {
-            Built::Put => {
+            Built::Put(version) => {
+                // If this fails, the next round writes it down.
+                self.record_gif(known, version).await?;
                 tally.built += 1;
                 tally.frames = observed.head.total;
                 if self.breaks(Mutation::AssemblerDoesNotLookAgain) {
                     return Ok(Next::End);
                 }
             }
+            Built::Left(frames) => {
+                tally.left_after = Some(frames);
+                return Ok(Next::HandOver);
+            }
             Built::Stale => {}
             Built::Corrupt(frame, reason) => self.draw_anew(observation, frame, &reason).await?,
             Built::Refused(reason) => self.refuse(observed, &reason).await?,
         }
         Ok(Next::Round)
-    }
-
-    /// Writes the GIF of a manifest that is done over the version that was there, or fails to.
-    async fn build<'m, A: Animator>(
-        &self,
-        animator: &A,
-        manifest: &'m Manifest,
-        gif: Option<ObjectInfo>,
-        began: Timestamp,
-    ) -> Result<Built<'m>> {
-        let head = &manifest.head;
-        let animation = &head.animation;
-        let mut encoding = match animator.begin(&head.settings.value.unwrap_or_default()) {
-            Ok(encoding) => encoding,
-            Err(reason) => return Ok(Built::Refused(reason)),
-        };
-        let condition = match gif {
-            _ if self.breaks(Mutation::DropGifCondition) => Condition::Always,
-            None => Condition::IfAbsent,
-            Some(gif) => Condition::IfMatch(gif.etag),
-        };
-        let options = PutOptions { condition, ..PutOptions::always() }
-            .content_type("image/gif")
-            .metadata(GENERATION, head.generation.as_str());
-        let mut upload = self.store.upload(&animation.gif(), options).await?;
-        let rest = match self.encode(&mut encoding, manifest, &mut upload, began).await {
-            Ok(None) => encoding.finish().await,
-            Ok(Some(Built::Refused(reason))) => Err(reason),
-            Ok(Some(ended)) => {
-                upload.abort().await?;
-                return Ok(ended);
-            }
-            Err(error) => {
-                upload.abort().await?;
-                return Err(error);
-            }
-        };
-        match rest {
-            Err(reason) => {
-                upload.abort().await?;
-                Ok(Built::Refused(reason))
-            }
-            Ok(rest) => {
-                upload.write(rest).await?;
-                match upload.finish().await {
-                    Ok(_) => Ok(Built::Put),
-                    Err(error) if error.is_conflict() || error.is_not_found() || error.is_retryable() => {
-                        Ok(Built::Stale)
-                    }
-                    Err(error) => Err(error),
-                }
-            }
-        }
-    }
-
-    /// Fetches the frames, a few ahead of the encoder, and sends what it writes; says why, if it does not come to the
-    /// end.
-    async fn encode<'m, E: Encoding, U: Upload>(
-        &self,
-        encoding: &mut E,
-        manifest: &'m Manifest,
-        upload: &mut U,
-        began: Timestamp,
-    ) -> Result<Option<Built<'m>>> {
-        let animation = &manifest.head.animation;
-        let keys = manifest.frames.iter().filter_map(|frame| Some((frame, frame_key(animation, frame)?)));
-        let fetches: Vec<_> =
-            keys.map(|(frame, key)| async move { Ok::<_, Error>((frame, self.get(&key).await?)) }).collect();
-        let mut images = stream::iter(fetches).buffered(self.policy.prefetch);
-        let start = self.clock.now();
-        let mut pushed = 0_u64;
-        while let Some(image) = images.next().await {
-            let (frame, Some(image)) = image? else { return Ok(Some(Built::Stale)) };
-            match encoding.push(image.body).await {
-                Ok(piece) if piece.is_empty() => {}
-                Ok(piece) => upload.write(piece).await?,
-                Err(Unfit::Corrupt(reason)) => return Ok(Some(Built::Corrupt(frame, reason))),
-                Err(Unfit::Unlike(reason)) => return Ok(Some(Built::Refused(reason))),
-            }
-            pushed += 1;
-            if self.is_out_of_time() {
-                let (before, building) = (start.since(began), self.clock.now().since(start));
-                return out_of_time(&manifest.head, pushed, before, building)
-                    .map(|reason| Some(Built::Refused(reason)));
-            }
-        }
-        Ok(None)
-    }
-
-    fn is_out_of_time(&self) -> bool {
-        self.is_out_of_time_in(Duration::ZERO)
-    }
-
-    /// Whether no time will be left to go on after `wait`.
-    fn is_out_of_time_in(&self, wait: Duration) -> bool {
-        let then = self.clock.now().after(wait).after(self.policy.margin);
-        self.deadline.is_some_and(|deadline| then >= deadline)
     }
 
     /// Has a frame drawn again that cannot be read; after a bounded number of attempts it gets an error receipt.
@@ -419,39 +306,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 }
 
-/// The key of a frame that is drawn.
-pub fn frame_key(animation: &Animation, frame: &Frame) -> Option<String> {
-    let FrameState::Done { pixels } = frame.state else { return None };
-    let (name, version) = (frame.script.clone(), frame.version.clone());
-    Some(animation.receipt(&Receipt::Frame { name, tag: Tag { version, pixels }, part: frame.part }))
-}
-
-/// The generation that a GIF was made of.
-pub fn generation_of(gif: Option<&ObjectInfo>) -> Option<&str> {
-    gif?.metadata.get(GENERATION).map(String::as_str)
-}
-
-/// What a build that has come to the end of its time means. A set that cannot be assembled in the function's time is
-/// refused, but only by an invocation that had most of its time for that; one that spent more `before`, waiting and
-/// building other sets, leaves it to its next attempt.
-fn out_of_time(head: &Head, pushed: u64, before: Duration, building: Duration) -> Result<Reason> {
-    if before > building {
-        let what = format!("{} became whole too late to assemble it", head.animation);
-        return Err(Error::OutOfTime { what });
-    }
-    let (total, seconds) = (head.total, building.as_secs());
-    Ok(Reason::new(format!(
-        "{pushed} of {total} frames were assembled in the {seconds} s that the assemble function had: give it more \
-         time or memory and retry, or fetch the frames and assemble them locally"
-    )))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::manifest::Settings;
     use crate::reconcile::{Results, Scripts, reconcile};
-    use crate::store::{ETag, Metadata};
+    use crate::store::Metadata;
 
     fn head(status: Status) -> Head {
         let animation = Animation::new("film").unwrap();
@@ -510,15 +370,5 @@ mod tests {
         assert_eq!(changed(Some(9), removal), None, "nine frames are announced, and there");
         assert_eq!(changed(Some(8), None), script);
         assert_eq!(changed(Some(8), removal), removal);
-    }
-
-    #[test]
-    fn only_whoever_had_most_of_its_time_for_a_set_refuses_it() {
-        let head = head(Status::Done);
-        let (short, long) = (Duration::from_secs(10), Duration::from_secs(20));
-        assert!(matches!(out_of_time(&head, 3, long, short), Err(Error::OutOfTime { .. })));
-        let reason = out_of_time(&head, 3, short, long).unwrap();
-        assert!(reason.message.starts_with("3 of 9 frames were assembled in the 20 s"), "{}", reason.message);
-        assert!(out_of_time(&head, 3, short, short).is_ok());
     }
 }

@@ -107,6 +107,11 @@ impl Error {
         matches!(self, Error::Ambiguous { .. })
     }
 
+    /// The work was stopped before the invocation's deadline.
+    pub fn is_out_of_time(&self) -> bool {
+        matches!(self, Error::OutOfTime { .. })
+    }
+
     pub(crate) fn key(key: &str, problem: &'static str) -> Self {
         Error::Key { key: key.to_owned(), problem }
     }

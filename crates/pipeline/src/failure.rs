@@ -10,8 +10,10 @@ use serde::Deserialize;
 use crate::assemble::generation_of;
 use crate::fold::{Age, Folded};
 use crate::invocation::Invocation;
-use crate::keys::{Animation, Generation, Key, Part, Receipt, ScriptName, Tag, decode_event_key};
+use crate::keys::{Animation, Band, Generation, Key, Part, Receipt, ScriptName, Tag, decode_event_key};
 use crate::manifest::{Fact, Reason, Status};
+use crate::observe::standing;
+use crate::render::bands::Bands;
 use crate::store::{ETag, ListRequest, Store};
 use crate::{Clock, Error, Result};
 
@@ -97,13 +99,18 @@ pub async fn record_failure<S: Store, C: Clock>(
     match failure.key.parse()? {
         Key::Script { animation, name } => {
             let version = failure.version.clone();
-            invocation.record_frame(failure, animation, name, None, version).await
+            invocation.record_frame(failure, animation, name, (None, None), version).await
         }
         Key::Part { animation, name, tag, number } => {
-            invocation.record_frame(failure, animation, name, Some(number), Some(tag.version)).await
+            let of = (Some(number), None);
+            invocation.record_frame(failure, animation, name, of, Some(tag.version)).await
+        }
+        Key::Band { animation, name, tag, part, band, .. } => {
+            let of = (part, Some(band));
+            invocation.record_frame(failure, animation, name, of, Some(tag.version)).await
         }
         Key::Retry { animation, name, tag, part, .. } => {
-            invocation.record_frame(failure, animation, name, part, Some(tag.version)).await
+            invocation.record_frame(failure, animation, name, (part, None), Some(tag.version)).await
         }
         Key::Settings { animation } => {
             invocation.fold(&animation, &Fact::Fold, Age::Old).await.map(Recorded::Resolved)
@@ -121,32 +128,35 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         failure: &Failure,
         animation: Animation,
         name: ScriptName,
-        part: Part,
+        (part, band): (Part, Option<Band>),
         tried: Option<ETag>,
     ) -> Result<Recorded> {
         let Some(script) = self.head(&animation.script(&name)).await? else {
             return self.fold(&animation, &Fact::Absent(name), Age::Old).await.map(Recorded::Resolved);
         };
         let version = script.etag;
-        if part.is_some() && tried.as_ref() != Some(&version) {
+        if (part.is_some() || band.is_some()) && tried.as_ref() != Some(&version) {
             return self
                 .fold(&animation, &Fact::Version(name, version), Age::Old)
                 .await
                 .map(Recorded::Resolved);
         }
-        if let Some(standing) = self.standing(&animation, &name, &version, part).await? {
+        let receipts = self.receipts_of(&animation, &name, &version, part).await?;
+        if let Some(standing) = standing(&receipts, part) {
             let fact = standing.fact(name, version, part);
             return self.fold(&animation, &fact, Age::Old).await.map(Recorded::Resolved);
         }
         let (attempts, begun) = self.attempts(&animation, &name, &version, part).await?;
         let tag = Tag { version: version.clone(), pixels: self.policy.pixels };
         let tries = failure.attempts;
+        // Whoever is woken for a frame that is cut only wakes others.
+        let is_cut = Bands::of(&receipts, part, self.policy.pixels).cut().is_some();
+        let has_tried = tried.as_ref() == Some(&version) && (band.is_some() || !is_cut);
+        let what = band.map_or(String::new(), |band| format!("band {} of {}: ", band.number(), band.of()));
         let hopeless = match &failure.end {
-            End::TimedOut if tried.as_ref() == Some(&version) => {
-                Some(format!("timed out in each of {tries} attempts"))
-            }
-            End::Died if tried.as_ref() == Some(&version) => Some(format!(
-                "the render function died in each of {tries} attempts, most likely for lack of memory"
+            End::TimedOut if has_tried => Some(format!("{what}timed out in each of {tries} attempts")),
+            End::Died if has_tried => Some(format!(
+                "{what}the render function died in each of {tries} attempts, most likely for lack of memory"
             )),
             // It has not been tried.
             End::TooOld => None,
@@ -155,8 +165,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             End::Error(message) => Some(format!("no result in each of {begun} attempts: {message}")),
         };
         match hopeless {
-            // The store may be busy for long: the sweep is more patient with every waking.
-            None if attempts >= self.policy.attempts && failure.end != End::TooOld => {
+            // The store may be busy for long: the sweep is more patient with every waking. One retry wakes all bands that are
+            // missing, so that a record for each of them is not one too many.
+            None if attempts >= self.policy.attempts && (failure.end != End::TooOld || band.is_some()) => {
                 self.fold(&animation, &Fact::Fold, Age::Old).await?;
                 Ok(Recorded::LeftToSweep)
             }

@@ -19,13 +19,15 @@
 
 use crate::invocation::{Glimpse, Invocation, Known, Mutation};
 use crate::keys::{Animation, Key};
-use crate::manifest::{Fact, Head, Manifest};
-use crate::store::{PAGE, PutOptions, Store};
+use crate::manifest::{Fact, Gif, Head, Manifest};
+use crate::store::{ETag, PAGE, PutOptions, Store};
 use crate::{Clock, Error, Result, invariants};
 
 /// How a fold ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Folded {
+    /// Nothing has come that a manifest shows: it was not looked at.
+    Untouched,
     /// The manifest, someone else's, showed the fact: nothing was listed.
     Covered,
     /// The manifest agreed with the listing.
@@ -183,6 +185,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         next.head.revision = before.map_or(0, |manifest| manifest.head.revision) + 1;
         next.head.writer = self.request_id().to_owned();
         next.head.removed_at = next.removed_at(before, self.clock.now());
+        next.head.gif = before.and_then(|before| before.head.gif.clone());
         invariants::check(&next, before)?;
         let options = match known {
             _ if self.breaks(Mutation::DropIfMatch) => PutOptions::always(),
@@ -194,8 +197,25 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             let key = Key::SetAside { animation: animation.clone(), version: etag.clone() };
             self.put_receipt(&key.to_string(), body.clone(), "application/octet-stream").await?;
         }
-        match self.store.put(&animation.manifest(), next.encode(self.policy.glimpse)?, options).await {
-            Ok(etag) => Ok(Some(Known { manifest: next, etag, unreadable: None })),
+        self.put_manifest(next, options).await
+    }
+
+    /// Writes down which GIF is this generation's; `None` as of a commit. It is no revision: whatever else the manifest says
+    /// was listed before it.
+    pub(crate) async fn record_gif(&self, known: &Known, version: ETag) -> Result<Option<Known>> {
+        if known.manifest.head.gif_version() == Some(&version) {
+            return Ok(Some(known.clone()));
+        }
+        let mut next = known.manifest.clone();
+        next.head.gif = Some(Gif { generation: next.head.generation.clone(), version });
+        let options = PutOptions::if_match(known.etag.clone()).content_type("application/json");
+        self.put_manifest(next, options).await
+    }
+
+    async fn put_manifest(&self, manifest: Manifest, options: PutOptions) -> Result<Option<Known>> {
+        let (key, body) = (manifest.head.animation.manifest(), manifest.encode(self.policy.glimpse)?);
+        match self.store.put(&key, body, options).await {
+            Ok(etag) => Ok(Some(Known { manifest, etag, unreadable: None })),
             Err(error) if error.is_conflict() || error.is_retryable() || error.is_not_found() => Ok(None),
             Err(error) => Err(error),
         }

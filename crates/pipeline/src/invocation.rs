@@ -52,8 +52,11 @@ pub struct Policy {
     pub concurrency: usize,
     /// How many frames are fetched ahead of the encoder.
     pub prefetch: usize,
-    /// How long before its deadline the assembler gives up.
+    /// How long before its deadline the assembler stops.
     pub margin: Duration,
+    /// What it keeps free before that for one more frame, and for writing down where the GIF stands: so many times what the
+    /// longest frame has taken. To write it down takes about as long as 5 to 10 frames.
+    pub spare_frames: u32,
     /// How long before its deadline a drawing is stopped: enough to say so.
     pub draw_margin: Duration,
 }
@@ -77,6 +80,7 @@ impl Policy {
             concurrency: 64,
             prefetch: 8,
             margin: Duration::from_secs(5),
+            spare_frames: 12,
             draw_margin: Duration::from_millis(500),
         }
     }
@@ -114,11 +118,15 @@ pub enum Mutation {
     AssemblerDoesNotLookAgain,
     /// The GIF is put without its condition.
     DropGifCondition,
+    /// A frame is put together though one of its bands is missing.
+    JoinTooEarly,
+    /// An unfinished GIF is gone on with, whatever set it is of.
+    TakeUpAnyCheckpoint,
 }
 
 impl Mutation {
     /// All of them.
-    pub const ALL: [Mutation; 8] = [
+    pub const ALL: [Mutation; 10] = [
         Mutation::SkipSecondListing,
         Mutation::ClaimBeforeCommit,
         Mutation::DropIfMatch,
@@ -127,6 +135,8 @@ impl Mutation {
         Mutation::AssemblerLeavesEarly,
         Mutation::AssemblerDoesNotLookAgain,
         Mutation::DropGifCondition,
+        Mutation::JoinTooEarly,
+        Mutation::TakeUpAnyCheckpoint,
     ];
 }
 
@@ -269,6 +279,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     pub(crate) async fn put(&self, key: &str, body: Bytes) -> Result<ETag> {
         let options = || PutOptions::always().content_type("application/json");
         self.persist(|| self.store.put(key, body.clone(), options())).await
+    }
+
+    /// Puts an image in place of what cannot be read.
+    pub(crate) async fn put_image(&self, key: &str, body: Bytes) -> Result<()> {
+        let options = || PutOptions::always().content_type("image/png");
+        self.persist(|| self.store.put(key, body.clone(), options())).await.map(drop)
     }
 
     /// Puts a receipt; `None` when there is one already.

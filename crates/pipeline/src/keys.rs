@@ -21,8 +21,10 @@ use serde::{Deserialize, Serialize};
 use crate::store::ETag;
 use crate::{Error, Result};
 
+mod band;
 mod event;
 
+pub use band::Band;
 pub use event::decode_event_key;
 
 /// The longest key below `scripts/`, in bytes: S3 allows 1,024, and a receipt's key adds a tag to the script's.
@@ -35,6 +37,10 @@ pub const MANIFESTS: &str = "manifests/";
 
 /// What a lease's file is called. No receipt ends like this.
 const LEASE_FILE: &str = "@assembler.json";
+
+/// Where unfinished GIFs are written down, and what their names end in.
+const CHECKPOINTS: &str = "checkpoints/";
+const CHECKPOINT_END: &str = ".state";
 
 /// An animation's name: path segments joined by `/`, none of them empty, `.` or `..`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -89,6 +95,22 @@ pub enum Key {
         /// Which of its frames.
         number: NonZeroU64,
     },
+    /// `parts/<animation>/<name>@<tag>/<band>.band-<attempt>.json`, of a part
+    /// `parts/<animation>/<name>@<tag>/<number>/<band>.band-<attempt>.json`
+    Band {
+        /// The animation.
+        animation: Animation,
+        /// The script.
+        name: ScriptName,
+        /// The script's version, and that of the renderer that cut the frame.
+        tag: Tag,
+        /// Which of its frames.
+        part: Part,
+        /// Which rows of the frame.
+        band: Band,
+        /// The retry that woke it; 0 for whoever cut the frame.
+        attempt: u64,
+    },
     /// Below `frames/`: what came of a script, a part, or of the whole.
     Receipt {
         /// The animation.
@@ -134,6 +156,11 @@ pub enum Key {
         part: Part,
         /// Counted from 1.
         attempt: NonZeroU64,
+    },
+    /// `checkpoints/<animation>.state`: how far a GIF is that is made by several invocations, one after the other.
+    Checkpoint {
+        /// The animation.
+        animation: Animation,
     },
     /// `animations/<animation>.gif`
     Gif {
@@ -183,6 +210,28 @@ pub enum Receipt {
         tag: Tag,
         /// How many frames it is.
         count: NonZeroU64,
+    },
+    /// `<name>@<tag>.cut-<k>`, of a part `<name>@<tag>/<number>.cut-<k>`: the frame is drawn in bands.
+    Cut {
+        /// The script.
+        name: ScriptName,
+        /// Its version.
+        tag: Tag,
+        /// Which of its frames.
+        part: Part,
+        /// How many bands.
+        count: NonZeroU64,
+    },
+    /// `<name>@<tag>.<band>.band`, of a part `<name>@<tag>/<number>.<band>.band`: rows of a frame, as PNG.
+    Band {
+        /// The script.
+        name: ScriptName,
+        /// Its version.
+        tag: Tag,
+        /// Which of its frames.
+        part: Part,
+        /// Which rows of it.
+        band: Band,
     },
     /// `@<generation>.error.json`: this set of frames gives no GIF.
     Refusal {
@@ -241,6 +290,11 @@ impl Animation {
     /// `animations/<animation>.gif`
     pub fn gif(&self) -> String {
         format!("animations/{self}.gif")
+    }
+
+    /// `checkpoints/<animation>.state`
+    pub fn checkpoint(&self) -> String {
+        format!("{CHECKPOINTS}{self}{CHECKPOINT_END}")
     }
 
     /// `scripts/<animation>/animation.json`
@@ -317,12 +371,14 @@ impl Key {
             Key::Script { animation, .. }
             | Key::Settings { animation }
             | Key::Part { animation, .. }
+            | Key::Band { animation, .. }
             | Key::Receipt { animation, .. }
             | Key::Lease { animation }
             | Key::Manifest { animation }
             | Key::SetAside { animation, .. }
             | Key::Claim { animation, .. }
             | Key::Retry { animation, .. }
+            | Key::Checkpoint { animation }
             | Key::Gif { animation } => animation,
         }
     }
@@ -336,6 +392,14 @@ impl FromStr for Key {
         let (folder, rest) = text.split_once('/').ok_or_else(unknown)?;
         let key = match folder {
             "scripts" => script(text, rest)?,
+            "parts" if rest.rsplit_once('/').is_some_and(|(_, file)| file.contains(".band-")) => {
+                let (above, file) = rest.rsplit_once('/').ok_or_else(unknown)?;
+                let (band, attempt) = file.rsplit_once(".band-").ok_or_else(unknown)?;
+                let (animation, name, tag, part) = scripted_part(above).ok_or_else(unknown)?;
+                let attempt = attempt.strip_suffix(".json").and_then(canonical).ok_or_else(unknown)?;
+                let band = Band::parse(band).ok_or_else(unknown)?;
+                Key::Band { animation: Animation::new(animation)?, name, tag, part, band, attempt }
+            }
             "parts" => {
                 let (animation, scripted, file) = beneath_tag(rest).ok_or_else(unknown)?;
                 let (name, tag) = name_and_tag(scripted).ok_or_else(unknown)?;
@@ -373,16 +437,12 @@ impl FromStr for Key {
             "retries" => {
                 let (above, attempt) = rest.rsplit_once('/').ok_or_else(unknown)?;
                 let attempt = canonical(attempt).ok_or_else(unknown)?;
-                let (animation, last) = above.rsplit_once('/').ok_or_else(unknown)?;
-                let (animation, (name, tag), part) = match name_and_tag(last) {
-                    Some(found) => (animation, found, None),
-                    None => {
-                        let part = canonical(last).ok_or_else(unknown)?;
-                        let (animation, scripted) = animation.rsplit_once('/').ok_or_else(unknown)?;
-                        (animation, name_and_tag(scripted).ok_or_else(unknown)?, Some(part))
-                    }
-                };
+                let (animation, name, tag, part) = scripted_part(above).ok_or_else(unknown)?;
                 Key::Retry { animation: Animation::new(animation)?, name, tag, part, attempt }
+            }
+            "checkpoints" => {
+                let animation = rest.strip_suffix(CHECKPOINT_END).ok_or_else(unknown)?;
+                Key::Checkpoint { animation: Animation::new(animation)? }
             }
             "animations" => {
                 let animation = rest.strip_suffix(".gif").ok_or_else(unknown)?;
@@ -401,6 +461,8 @@ impl Receipt {
             Receipt::Frame { name, tag, .. }
             | Receipt::Fault { name, tag, .. }
             | Receipt::Begun { name, tag, .. }
+            | Receipt::Cut { name, tag, .. }
+            | Receipt::Band { name, tag, .. }
             | Receipt::Split { name, tag, .. } => name == script && tag.version == *version,
             Receipt::Refusal { .. } => false,
         }
@@ -451,6 +513,18 @@ fn beneath_tag(rest: &str) -> Option<(&str, &str, &str)> {
     Some((animation, scripted, file))
 }
 
+/// `<animation>/<name>@<tag>`, of a part `<animation>/<name>@<tag>/<number>`.
+fn scripted_part(above: &str) -> Option<(&str, ScriptName, Tag, Part)> {
+    let (animation, last) = above.rsplit_once('/')?;
+    if let Some((name, tag)) = name_and_tag(last) {
+        return Some((animation, name, tag, None));
+    }
+    let part = canonical(last)?;
+    let (animation, scripted) = animation.rsplit_once('/')?;
+    let (name, tag) = name_and_tag(scripted)?;
+    Some((animation, name, tag, Some(part)))
+}
+
 fn name_and_tag(text: &str) -> Option<(ScriptName, Tag)> {
     let (name, tag) = text.rsplit_once('@')?;
     Some((ScriptName::new(name).ok()?, Tag::parse(tag)?))
@@ -464,32 +538,37 @@ fn receipt(rest: &str) -> Option<(&str, Receipt)> {
         if let Some(generation) = refused.and_then(|text| Generation::new(text).ok()) {
             return Some((above, Receipt::Refusal { generation }));
         }
-        let receipt = if let Some(stem) = file.strip_suffix(".png") {
-            let (name, tag) = name_and_tag(stem)?;
-            Receipt::Frame { name, tag, part: None }
-        } else if let Some(stem) = file.strip_suffix(".error.json") {
-            let (name, tag) = name_and_tag(stem)?;
-            Receipt::Fault { name, tag, part: None }
-        } else if let Some((stem, attempt)) = file.rsplit_once(".begun-") {
-            let (name, tag) = name_and_tag(stem)?;
-            Receipt::Begun { name, tag, part: None, attempt: canonical(attempt)? }
-        } else {
-            let (stem, count) = file.rsplit_once(".split-")?;
-            let (name, tag) = name_and_tag(stem)?;
-            Receipt::Split { name, tag, count: canonical(count)? }
-        };
-        return Some((above, receipt));
+        // A name may hold whatever ends a receipt; a tag holds no dot.
+        let (name, rest) = file.rsplit_once('@')?;
+        let (tag, kind) = rest.split_once('.')?;
+        let (name, tag) = (ScriptName::new(name).ok()?, Tag::parse(tag)?);
+        return Some((above, receipt_of_kind(name, tag, None, kind)?));
     }
     let (animation, scripted) = above.rsplit_once('/')?;
     let (name, tag) = name_and_tag(scripted)?;
-    let receipt = if let Some(number) = file.strip_suffix(".error.json") {
-        Receipt::Fault { name, tag, part: Some(canonical(number)?) }
-    } else if let Some((number, attempt)) = file.split_once(".begun-") {
-        Receipt::Begun { name, tag, part: Some(canonical(number)?), attempt: canonical(attempt)? }
-    } else {
-        Receipt::Frame { name, tag, part: Some(canonical(file.strip_suffix(".png")?)?) }
-    };
-    Some((animation, receipt))
+    let (number, kind) = file.split_once('.')?;
+    Some((animation, receipt_of_kind(name, tag, Some(canonical(number)?), kind)?))
+}
+
+/// By what follows the dot after the tag, or after the part's number.
+fn receipt_of_kind(name: ScriptName, tag: Tag, part: Part, kind: &str) -> Option<Receipt> {
+    let numbered = |what: &str| kind.strip_prefix(what).map(canonical);
+    Some(match kind {
+        "png" => Receipt::Frame { name, tag, part },
+        "error.json" => Receipt::Fault { name, tag, part },
+        _ => {
+            if let Some(attempt) = numbered("begun-") {
+                Receipt::Begun { name, tag, part, attempt: attempt? }
+            } else if let Some(count) = numbered("cut-") {
+                Receipt::Cut { name, tag, part, count: count? }
+            } else if let Some(count) = numbered("split-") {
+                // A part is not split.
+                part.is_none().then_some(Receipt::Split { name, tag, count: count? })?
+            } else {
+                Receipt::Band { name, tag, part, band: Band::parse(kind.strip_suffix(".band")?)? }
+            }
+        }
+    })
 }
 
 /// A number whose text is the one way of writing it.
@@ -534,6 +613,12 @@ impl fmt::Display for Key {
             Key::Part { animation, name, tag, number } => {
                 write!(f, "parts/{animation}/{name}@{tag}/{number}.json")
             }
+            Key::Band { animation, name, tag, part: None, band, attempt } => {
+                write!(f, "parts/{animation}/{name}@{tag}/{band}.band-{attempt}.json")
+            }
+            Key::Band { animation, name, tag, part: Some(number), band, attempt } => {
+                write!(f, "parts/{animation}/{name}@{tag}/{number}/{band}.band-{attempt}.json")
+            }
             Key::Receipt { animation, receipt } => f.write_str(&animation.receipt(receipt)),
             Key::Lease { animation } => write!(f, "{}{LEASE_FILE}", animation.frames()),
             Key::Manifest { animation } => f.write_str(&animation.manifest()),
@@ -549,6 +634,7 @@ impl fmt::Display for Key {
             Key::Retry { animation, name, tag, part: Some(number), attempt } => {
                 write!(f, "retries/{animation}/{name}@{tag}/{number}/{attempt}")
             }
+            Key::Checkpoint { animation } => f.write_str(&animation.checkpoint()),
             Key::Gif { animation } => f.write_str(&animation.gif()),
         }
     }
@@ -566,6 +652,14 @@ impl fmt::Display for Receipt {
                 write!(f, "{name}@{tag}/{number}.begun-{attempt}")
             }
             Receipt::Split { name, tag, count } => write!(f, "{name}@{tag}.split-{count}"),
+            Receipt::Cut { name, tag, part: None, count } => write!(f, "{name}@{tag}.cut-{count}"),
+            Receipt::Cut { name, tag, part: Some(number), count } => {
+                write!(f, "{name}@{tag}/{number}.cut-{count}")
+            }
+            Receipt::Band { name, tag, part: None, band } => write!(f, "{name}@{tag}.{band}.band"),
+            Receipt::Band { name, tag, part: Some(number), band } => {
+                write!(f, "{name}@{tag}/{number}.{band}.band")
+            }
             Receipt::Refusal { generation } => write!(f, "@{generation}.error.json"),
         }
     }

@@ -3,7 +3,10 @@
 //! `docs/pipeline.md` is the protocol's reference. This crate knows the bucket only as a [`store::Store`], time only
 //! as a [`clock::Clock`] and chance only as [`clock::Randomness`]; it starts no threads and no tasks.
 
+mod animator;
 pub mod assemble;
+mod build;
+mod checkpoint;
 pub mod clock;
 mod error;
 pub mod failure;
@@ -25,13 +28,14 @@ pub mod sweep;
 mod tests;
 mod wakings;
 
-pub use assemble::{Animator, Encoding, Unfit, assemble};
+pub use animator::{Animator, Encoding, Unfit};
+pub use assemble::assemble;
 pub use clock::{Clock, Randomness, SystemClock, Timestamp};
 pub use error::{Cause, Error, Result, found};
 pub use failure::record_failure;
 pub use fold::fold;
 pub use invocation::{Invocation, Mutation, Policy};
 pub use reconcile::reconcile;
-pub use render::{Drawing, Renderer, render_frame};
+pub use render::{Drawing, Joining, Renderer, render_frame};
 pub use retry::retry;
 pub use sweep::sweep;

@@ -78,9 +78,21 @@ pub struct Head {
     /// When a script was last found to be gone, by the clock of the function that found it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub removed_at: Option<Timestamp>,
+    /// The last GIF that an assembler has seen or put; another one that says it is of the same generation is not that one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gif: Option<Gif>,
     /// Every 1,000th script's name: where listings in ranges start.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub marks: Vec<ScriptName>,
+}
+
+/// A GIF that was built.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Gif {
+    /// What it was made of.
+    pub generation: Generation,
+    /// Its version.
+    pub version: ETag,
 }
 
 /// Where an animation stands.
@@ -212,6 +224,11 @@ impl Head {
     /// Every expected frame is done or failed: nothing will come unless the user changes something.
     pub fn is_terminal(&self) -> bool {
         !matches!(self.status, Status::Waiting | Status::Rendering)
+    }
+
+    /// The version of this generation's GIF, if an assembler has seen it.
+    pub fn gif_version(&self) -> Option<&ETag> {
+        self.gif.as_ref().filter(|gif| gif.generation == self.generation).map(|gif| &gif.version)
     }
 
     /// How many frames are expected and not there yet.

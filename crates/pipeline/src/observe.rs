@@ -176,10 +176,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             stream::iter(listings).buffered(self.policy.concurrency).try_collect().await?;
         let parts = listed.into_iter().flatten().filter_map(|listed| receipt(animation, listed));
         results.receipts.extend(parts.filter(|found| match &found.receipt {
-            Receipt::Frame { part, .. } | Receipt::Fault { part, .. } | Receipt::Begun { part, .. } => {
-                part.is_some()
-            }
-            _ => false,
+            Receipt::Frame { part, .. }
+            | Receipt::Fault { part, .. }
+            | Receipt::Begun { part, .. }
+            | Receipt::Cut { part, .. }
+            | Receipt::Band { part, .. } => part.is_some(),
+            Receipt::Split { .. } | Receipt::Refusal { .. } => false,
         }));
         Ok(())
     }
@@ -318,14 +320,14 @@ pub(crate) enum Standing {
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// What has come of a script's version, or of a part of it: one request.
-    pub(crate) async fn standing(
+    /// What there is of a script's version, or of a part of it: one request, unless it is cut into very many bands.
+    pub(crate) async fn receipts_of(
         &self,
         animation: &Animation,
         name: &ScriptName,
         version: &ETag,
         part: Part,
-    ) -> Result<Option<Standing>> {
+    ) -> Result<Vec<ReceiptFound>> {
         let frames = animation.frames();
         let request = match part {
             None => ListRequest::level(format!("{frames}{}", Tag::receipts_of(name, version))),
@@ -337,7 +339,6 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let listed = self.list_ranges(request, Vec::new()).await?;
         let receipts = listed.into_iter().filter_map(|listed| receipt(animation, listed));
         // The receipts of a script that is called like this one's receipts start the same.
-        let receipts: Vec<_> = receipts.filter(|found| found.receipt.is_of(name, version)).collect();
-        Ok(standing(&receipts, part))
+        Ok(receipts.filter(|found| found.receipt.is_of(name, version)).collect())
     }
 }

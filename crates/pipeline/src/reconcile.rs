@@ -145,6 +145,7 @@ pub fn reconcile(
         refusal: refusal.filter(|_| status == Status::Refused),
         excess: None,
         removed_at: None,
+        gif: None,
         marks: marks(scripts),
     };
     Manifest { head, frames }
@@ -176,7 +177,7 @@ fn resolve(results: &Results) -> BTreeMap<(&ScriptName, &ETag), Resolution<'_>> 
                 let outcome = resolutions.entry((name, &tag.version)).or_default().outcome(*part);
                 outcome.fault = outcome.fault.max(Some((tag.pixels, etag)));
             }
-            Receipt::Begun { .. } | Receipt::Refusal { .. } => {}
+            Receipt::Begun { .. } | Receipt::Cut { .. } | Receipt::Band { .. } | Receipt::Refusal { .. } => {}
         }
     }
     resolutions

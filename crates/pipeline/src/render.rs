@@ -2,7 +2,8 @@
 //!
 //! An event only says where to look. The invocation reads the script as it is now, so that a superseded event is an
 //! event for the current version; looks whether that version has a result already; draws it, puts the result under a
-//! key that names script and version, only if it is not there yet; and folds.
+//! key that names script and version, only if it is not there yet; and folds. A frame that is too big for one invocation is
+//! drawn in bands (`bands`).
 
 use std::collections::BTreeSet;
 use std::future::Future;
@@ -16,18 +17,28 @@ use futures_util::stream::{self, StreamExt, TryStreamExt};
 
 use crate::fold::{Age, Folded};
 use crate::invocation::{Glimpse, Invocation};
-use crate::keys::{Animation, Key, Part, Receipt, ScriptName, Tag};
+use crate::keys::{Animation, Band, Key, Part, Receipt, ScriptName, Tag};
 use crate::manifest::{Fact, Reason};
-use crate::observe::Standing;
+use crate::observe::{Standing, standing};
 use crate::store::{ETag, ListRequest, Object, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
+pub(crate) mod bands;
+
+use bands::{Bands, Woken};
+
+pub use bands::Joining;
+
 /// What draws. The render function brings a ray tracer, the simulation something smaller.
 pub trait Renderer: Send + Sync {
+    /// A frame being put together of its bands.
+    type Joining: Joining;
+
     /// How large a script may be. Of a larger one no more than the first bytes are read, one more than these.
     fn most_bytes(&self) -> u64;
 
-    /// Draws the script's one frame (`part` is `None`) or one of several.
+    /// Draws the script's one frame (`part` is `None`) or one of several, or says that it is too big: that drawing it takes
+    /// most of the time that is `left`, or more memory than there is.
     ///
     /// # Errors
     ///
@@ -38,7 +49,34 @@ pub trait Renderer: Send + Sync {
         name: &ScriptName,
         script: Bytes,
         part: Part,
+        left: Option<Duration>,
     ) -> impl Future<Output = Result<Drawing>> + Send;
+
+    /// Draws a band of a frame that was found too big, as a file that [`Joining`] reads; the reason if that cannot be done.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfTime`] when it was stopped before the deadline.
+    fn draw_band(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+        band: Band,
+    ) -> impl Future<Output = Result<Result<Bytes, Reason>>> + Send;
+
+    /// Begins to put a frame together of so many bands; the reason if there is no such frame.
+    ///
+    /// # Errors
+    ///
+    /// What may pass.
+    fn join(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+        count: NonZeroU64,
+    ) -> impl Future<Output = Result<Result<Self::Joining, Reason>>> + Send;
 }
 
 /// What came of a script.
@@ -48,6 +86,8 @@ pub enum Drawing {
     Frame(Bytes),
     /// The script is this many frames, two or more; only when no part was asked for.
     Split(NonZeroU64),
+    /// The frame is too big for one invocation: it is to be drawn in this many bands, two or more.
+    Cut(NonZeroU64),
     /// There is no frame and never will be.
     Fault(Reason),
 }
@@ -82,6 +122,10 @@ pub enum Outcome {
     Drawn,
     /// The script was split into this many parts.
     Split(NonZeroU64),
+    /// The frame is drawn in this many bands, for which invocations were woken.
+    Cut(NonZeroU64),
+    /// This band of the frame is there; others are to come.
+    Band(Band),
     /// The script gives no frame, as the receipt now says.
     Faulty(Reason),
     /// Nothing was drawn: the animation has more frames than it may have.
@@ -123,22 +167,24 @@ pub async fn render_frame<S: Store, C: Clock, R: Renderer>(
 
 /// Which frame an event is about.
 #[derive(Debug, Clone, PartialEq)]
-struct Subject {
-    animation: Animation,
-    name: ScriptName,
-    part: Part,
-    /// The version that a part belongs to: of another one there is nothing to draw.
+pub(crate) struct Subject {
+    pub(crate) animation: Animation,
+    pub(crate) name: ScriptName,
+    pub(crate) part: Part,
+    /// Which rows of it, if not all.
+    woken: Option<Woken>,
+    /// The version that a part or a band belongs to: of another one there is nothing to draw.
     only: Option<ETag>,
     /// The retry that woke it, and the version that this was for.
-    retry: Option<(NonZeroU64, ETag)>,
+    pub(crate) retry: Option<(NonZeroU64, ETag)>,
 }
 
 /// A script as it is now.
 #[derive(Debug, PartialEq)]
-struct Script {
-    version: ETag,
-    uploaded: Timestamp,
-    body: Bytes,
+pub(crate) struct Script {
+    pub(crate) version: ETag,
+    pub(crate) uploaded: Timestamp,
+    pub(crate) body: Bytes,
 }
 
 /// What a script as it is now asks for.
@@ -155,15 +201,20 @@ impl Subject {
     fn of(key: Key) -> Option<Self> {
         match key {
             Key::Script { animation, name } => {
-                Some(Subject { animation, name, part: None, only: None, retry: None })
+                Some(Subject { animation, name, part: None, woken: None, only: None, retry: None })
             }
             Key::Retry { animation, name, tag, part, attempt } => {
                 let only = part.map(|_| tag.version.clone());
-                Some(Subject { animation, name, part, only, retry: Some((attempt, tag.version)) })
+                let retry = Some((attempt, tag.version));
+                Some(Subject { animation, name, part, woken: None, only, retry })
             }
             Key::Part { animation, name, tag, number } => {
                 let only = Some(tag.version);
-                Some(Subject { animation, name, part: Some(number), only, retry: None })
+                Some(Subject { animation, name, part: Some(number), woken: None, only, retry: None })
+            }
+            Key::Band { animation, name, tag, part, band, attempt } => {
+                let woken = Some(Woken { band, pixels: tag.pixels, attempt });
+                Some(Subject { animation, name, part, woken, only: Some(tag.version), retry: None })
             }
             Key::Settings { .. }
             | Key::Receipt { .. }
@@ -171,6 +222,7 @@ impl Subject {
             | Key::Manifest { .. }
             | Key::SetAside { .. }
             | Key::Claim { .. }
+            | Key::Checkpoint { .. }
             | Key::Gif { .. } => None,
         }
     }
@@ -192,9 +244,13 @@ impl Outcome {
     fn age(&self) -> Age {
         match self {
             Outcome::Drawn | Outcome::Split(_) | Outcome::Faulty(_) => Age::New,
-            Outcome::Gone | Outcome::Settings | Outcome::Superseded | Outcome::Present | Outcome::TooMany => {
-                Age::Old
-            }
+            Outcome::Gone
+            | Outcome::Settings
+            | Outcome::Superseded
+            | Outcome::Present
+            | Outcome::Cut(_)
+            | Outcome::Band(_)
+            | Outcome::TooMany => Age::Old,
         }
     }
 }
@@ -216,24 +272,34 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let key = subject.animation.script(&subject.name);
         let script = self.get_start(&key, renderer.most_bytes()).await?;
         let (outcome, fact) = match subject.due(script) {
-            Due::Nothing(outcome, fact) => (outcome, fact),
-            Due::Version(script) => match self.standing_of(&subject, &script.version).await? {
-                Some(Standing::Split { tag, count }) => {
-                    stages.read = self.clock.now().since(start);
-                    return self.follow_split(subject, tag, count, script.uploaded, stages).await;
+            Due::Nothing(outcome, fact) => (outcome, Some(fact)),
+            Due::Version(script) => {
+                let Subject { animation, name, part, .. } = &subject;
+                let receipts = self.receipts_of(animation, name, &script.version, *part).await?;
+                match standing(&receipts, *part) {
+                    Some(Standing::Split { tag, count }) => {
+                        stages.read = self.clock.now().since(start);
+                        return self.follow_split(subject, tag, count, script.uploaded, stages).await;
+                    }
+                    Some(standing) => {
+                        (Outcome::Present, Some(standing.fact(name.clone(), script.version, *part)))
+                    }
+                    None if self.has_too_many(animation).await? => {
+                        (Outcome::TooMany, Some(Fact::Version(name.clone(), script.version)))
+                    }
+                    None => {
+                        let bands = Bands::of(&receipts, *part, self.policy.pixels);
+                        self.work_on(renderer, &subject, script, bands, &mut stages).await?
+                    }
                 }
-                Some(standing) => {
-                    (Outcome::Present, standing.fact(subject.name.clone(), script.version, subject.part))
-                }
-                None if self.has_too_many(&subject.animation).await? => {
-                    (Outcome::TooMany, Fact::Version(subject.name.clone(), script.version))
-                }
-                None => self.draw_and_put(renderer, &subject, script, &mut stages).await?,
-            },
+            }
         };
         let before_fold = self.clock.now();
         stages.read = before_fold.since(start).saturating_sub(stages.draw + stages.put);
-        let folded = self.fold(&subject.animation, &fact, outcome.age()).await?;
+        let folded = match fact {
+            Some(fact) => self.fold(&subject.animation, &fact, outcome.age()).await?,
+            None => Folded::Untouched,
+        };
         stages.fold = self.clock.now().since(before_fold);
         Ok(Rendered { animation: subject.animation, script: Some(subject.name), outcome, folded, stages })
     }
@@ -246,8 +312,25 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(self.glimpse(animation).await?.head().is_some_and(|head| head.excess.is_some()))
     }
 
-    async fn standing_of(&self, subject: &Subject, version: &ETag) -> Result<Option<Standing>> {
-        self.standing(&subject.animation, &subject.name, version, subject.part).await
+    /// Works on a frame of which there is no result: on the band that the event is about, or on all of it. Whoever was woken
+    /// for a band by a renderer of other pixels looks at the frame anew.
+    async fn work_on<R: Renderer>(
+        &self,
+        renderer: &R,
+        subject: &Subject,
+        script: Script,
+        bands: Bands,
+        stages: &mut Stages,
+    ) -> Result<(Outcome, Option<Fact>)> {
+        let woken = subject.woken.filter(|woken| woken.pixels == self.policy.pixels);
+        match (woken, bands.cut()) {
+            (Some(woken), _) => self.work_on_band(renderer, subject, script, (woken, bands), stages).await,
+            (None, Some(count)) => self.follow_cut(renderer, subject, script, (bands, count), stages).await,
+            (None, None) => {
+                let (outcome, fact) = self.draw_and_put(renderer, subject, script, stages).await?;
+                Ok((outcome, Some(fact)))
+            }
+        }
     }
 
     async fn draw_and_put<R: Renderer>(
@@ -257,7 +340,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         script: Script,
         stages: &mut Stages,
     ) -> Result<(Outcome, Fact)> {
-        self.begin(subject, &script.version).await?;
+        if let Some((attempt, _)) = subject.retry.as_ref().filter(|(_, meant)| *meant == script.version) {
+            self.put_begun(subject, &script.version, *attempt).await?;
+        }
         let before = self.clock.now();
         let drawing = self.draw(renderer, &subject.name, script.body, subject.part).await?;
         let drawn = self.clock.now();
@@ -268,15 +353,18 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 
     /// Says that the attempt has begun: the sweep counts those alone, for others may still wait to be tried.
-    async fn begin(&self, subject: &Subject, version: &ETag) -> Result<()> {
-        let Subject { animation, name, part, retry, .. } = subject;
-        let Some((attempt, _)) = retry.as_ref().filter(|(_, meant)| meant == version) else { return Ok(()) };
+    pub(crate) async fn put_begun(
+        &self,
+        subject: &Subject,
+        version: &ETag,
+        attempt: NonZeroU64,
+    ) -> Result<()> {
+        let Subject { animation, name, part, .. } = subject;
         let tag = Tag { version: version.clone(), pixels: self.policy.pixels };
-        let begun = Receipt::Begun { name: name.clone(), tag, part: *part, attempt: *attempt };
+        let begun = Receipt::Begun { name: name.clone(), tag, part: *part, attempt };
         self.put_receipt(&animation.receipt(&begun), Bytes::new(), "text/plain").await.map(drop)
     }
 
-    /// Draws, but not beyond the deadline: what is killed cannot say why.
     async fn draw<R: Renderer>(
         &self,
         renderer: &R,
@@ -284,15 +372,30 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         script: Bytes,
         part: Part,
     ) -> Result<Drawing> {
-        let Some(deadline) = self.deadline else { return renderer.draw(name, script, part).await };
-        let left = deadline.since(self.clock.now()).saturating_sub(self.policy.draw_margin);
-        let drawing = pin!(renderer.draw(name, script, part));
+        let drawing = renderer.draw(name, script, part, self.time_to_draw());
+        self.in_time(drawing, || format!("{name} is not drawn")).await
+    }
+
+    /// How long a drawing may take from now on, if there is a deadline.
+    fn time_to_draw(&self) -> Option<Duration> {
+        let deadline = self.deadline?;
+        Some(deadline.since(self.clock.now()).saturating_sub(self.policy.draw_margin))
+    }
+
+    /// Works, but not beyond the deadline: what is killed cannot say why.
+    pub(crate) async fn in_time<T>(
+        &self,
+        work: impl Future<Output = Result<T>>,
+        late: impl FnOnce() -> String,
+    ) -> Result<T> {
+        let Some(left) = self.time_to_draw() else { return work.await };
+        let work = pin!(work);
         let alarm = pin!(self.clock.sleep(left));
-        match select(drawing, alarm).await {
-            Either::Left((drawing, _)) => drawing,
+        match select(work, alarm).await {
+            Either::Left((done, _)) => done,
             Either::Right(_) => {
                 let milliseconds = left.as_millis();
-                Err(Error::OutOfTime { what: format!("{name} is not drawn after {milliseconds} ms") })
+                Err(Error::OutOfTime { what: format!("{} after {milliseconds} ms", late()) })
             }
         }
     }
@@ -326,11 +429,15 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 self.put_receipt(&animation.receipt(&receipt), Bytes::new(), "text/plain").await?;
                 (Outcome::Split(count), Fact::Split(name, version))
             }
+            Drawing::Cut(count) => {
+                self.cut(subject, &tag, count).await?;
+                (Outcome::Cut(count), Fact::Version(name, version))
+            }
             Drawing::Fault(reason) => return self.put_drawing_fault(subject, version, &tag, reason).await,
         })
     }
 
-    async fn put_drawing_fault(
+    pub(crate) async fn put_drawing_fault(
         &self,
         subject: &Subject,
         version: ETag,
@@ -482,6 +589,8 @@ mod tests {
         assert_eq!(of("retries/a/1@v-p1/2"), Some((one(), None, None)));
         assert_eq!(of("retries/a/1@v-p1/3/2"), Some((one(), Some(3), Some("v".into()))));
         assert_eq!(of("parts/a/1@v-p1/3.json"), Some((one(), Some(3), Some("v".into()))));
+        assert_eq!(of("parts/a/1@v-p1/2-of-5.band-0.json"), Some((one(), None, Some("v".into()))));
+        assert_eq!(of("parts/a/1@v-p1/3/2-of-5.band-0.json"), Some((one(), Some(3), Some("v".into()))));
         assert_eq!(of("frames/a/1@v-p1.png"), None);
         assert_eq!(of("manifests/a.json"), None);
     }

@@ -74,6 +74,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let wanted: Vec<_> = manifest.frames.iter().filter(|frame| scope.has(frame)).collect();
         let named: BTreeSet<_> =
             wanted.iter().map(|frame| (&frame.script, &frame.version, frame.part)).collect();
+        let stopped = wanted.iter().filter(|frame| frame.state != FrameState::Pending);
+        let stopped: BTreeSet<_> = stopped.map(|frame| (&frame.script, &frame.version, frame.part)).collect();
         let (mut doomed, mut counted) = (Vec::new(), Vec::new());
         for found in &observation.results.receipts {
             let (name, tag, part, drawn) = match &found.receipt {
@@ -86,6 +88,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 // Attempts are counted anew.
                 Receipt::Begun { name, tag, part, .. } => {
                     if named.contains(&(name, &tag.version, *part)) {
+                        counted.push(animation.receipt(&found.receipt));
+                    }
+                    continue;
+                }
+                // A frame that failed is looked at from the beginning; of one that is on its way the bands stay.
+                Receipt::Cut { name, tag, part, .. } | Receipt::Band { name, tag, part, .. } => {
+                    if stopped.contains(&(name, &tag.version, *part)) {
                         counted.push(animation.receipt(&found.receipt));
                     }
                     continue;

@@ -204,6 +204,18 @@ pub struct ListPage {
     pub next: Option<String>,
 }
 
+/// An upload that was left before its end: where it stands, for whoever takes it up.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct UnfinishedUpload {
+    /// The store's name for it; `None` before the first part.
+    pub id: Option<String>,
+    /// The entity tags of the parts that the store has, in order.
+    pub parts: Vec<ETag>,
+    /// What follows them: less than a part.
+    #[serde(skip)]
+    pub tail: Bytes,
+}
+
 /// A bucket. See the [module](self) for what it guarantees.
 pub trait Store: Send + Sync {
     /// An object being written piece by piece.
@@ -231,11 +243,18 @@ pub trait Store: Send + Sync {
     /// Begins an object that is too large to hold in memory. Nothing is visible before [`Upload::finish`], where
     /// the condition is checked.
     fn upload(&self, key: &str, options: PutOptions) -> impl Future<Output = Result<Self::Upload>> + Send;
+
+    /// Goes on with an object that was [left](Upload::leave) by this process or another one. `options` are those that it
+    /// began with. No request: whether the upload is still there shows at the next one. One that is gone, because somebody
+    /// has finished or aborted it, is `NotFound` where a part is sent, and that or `Ambiguous` at its end.
+    ///
+    /// Who takes up the same upload twice and writes the same bytes does no harm.
+    fn take_up(&self, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> Self::Upload;
 }
 
 /// An object being written piece by piece, with memory that does not grow with its size.
 ///
-/// It ends with [`finish`](Upload::finish) or [`abort`](Upload::abort); one that is merely dropped, as by a killed
+/// It ends with [`finish`](Upload::finish) or [`abort`](Upload::abort), or is [left](Upload::leave) to be taken up later; one that is merely dropped, as by a killed
 /// process, leaves nothing visible, only parts for the bucket's lifecycle rule to clear.
 pub trait Upload: Send {
     /// Adds bytes, of any length. The store gathers them into parts of the size that it likes.
@@ -247,4 +266,7 @@ pub trait Upload: Send {
 
     /// Gives up; nothing becomes visible.
     fn abort(self) -> impl Future<Output = Result<()>> + Send;
+
+    /// Stops here; [`Store::take_up`] goes on. No request.
+    fn leave(self) -> UnfinishedUpload;
 }

@@ -128,11 +128,10 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.wake(animation, &observation, &mut visit).await?;
         let is_healed = self.heal_receipts(animation, &observation, &mut visit).await?;
         let head = &observation.manifest.head;
-        let manifest_differs =
-            !known.as_ref().is_some_and(|known| known.manifest.agrees_with(&observation.manifest));
-        let gif_differs = due(head, gif.as_ref()) != Due::Nothing;
+        let stands = known.as_ref().filter(|known| known.manifest.agrees_with(&observation.manifest));
+        let is_right = stands.is_some_and(|known| due(&known.manifest.head, gif.as_ref()) == Due::Nothing);
         let nothing_at_all = known.is_none() && head.status == Status::Empty && gif.is_none();
-        if (manifest_differs || gif_differs || is_healed || visit.given_up > 0) && !nothing_at_all {
+        if (!is_right || is_healed || visit.given_up > 0) && !nothing_at_all {
             self.claim(&claimable(&observation.manifest, known.as_ref())).await?;
             visit.claimed = true;
         }
@@ -276,6 +275,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let used = used_pixels(&observation.manifest);
         let superseded = |found: &&ReceiptFound| match &found.receipt {
             Receipt::Refusal { generation } => *generation != observation.manifest.head.generation,
+            Receipt::Cut { name, tag, .. } | Receipt::Band { name, tag, .. } => {
+                current.get(name) != Some(&&tag.version)
+            }
             Receipt::Split { name, tag, .. }
             | Receipt::Fault { name, tag, .. }
             | Receipt::Begun { name, tag, .. } => current.get(name) != Some(&&tag.version),
@@ -288,24 +290,38 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let old = |modified: Timestamp| now.since(modified) >= self.policy.superseded_after;
         let mut doomed: Vec<Key> = Vec::new();
         let mut split_before = false;
-        for found in observation.results.receipts.iter().filter(superseded) {
-            if old(found.modified) {
-                split_before |= matches!(found.receipt, Receipt::Split { .. });
-                doomed.push(Key::Receipt { animation: animation.clone(), receipt: found.receipt.clone() });
+        // Bands have done what they were for once their frame is there.
+        let is_used_up = |found: &&ReceiptFound| match &found.receipt {
+            Receipt::Cut { name, tag, part, .. } | Receipt::Band { name, tag, part, .. } => {
+                current.get(name) == Some(&&tag.version) && used.contains_key(&(name, *part))
             }
+            _ => false,
+        };
+        let receipts = || observation.results.receipts.iter();
+        let gone = receipts().filter(superseded).filter(|found| old(found.modified));
+        let used_up: BTreeSet<_> = receipts().filter(is_used_up).filter_map(banded_frame).collect();
+        for found in gone.chain(receipts().filter(is_used_up)) {
+            split_before |= matches!(found.receipt, Receipt::Split { .. } | Receipt::Cut { .. });
+            doomed.push(Key::Receipt { animation: animation.clone(), receipt: found.receipt.clone() });
         }
         if split_before {
             let parts = self.list_ranges(ListRequest::all(animation.parts()), Vec::new()).await?;
             let frames = self.list_ranges(ListRequest::all(animation.frames()), Vec::new()).await?;
-            for listed in parts.into_iter().chain(frames).filter(|listed| old(listed.modified)) {
-                if let Ok(key) = listed.key.parse::<Key>()
-                    && key.animation() == animation
-                    && let Some((name, version)) = part_of(&key)
-                    && current.get(name) != Some(&version)
-                {
+            for listed in parts.into_iter().chain(frames) {
+                let Ok(key) = listed.key.parse::<Key>() else { continue };
+                if key.animation() != animation {
+                    continue;
+                }
+                let is_superseded =
+                    part_of(&key).is_some_and(|(name, version)| current.get(name) != Some(&version));
+                let has_woken = matches!(&key, Key::Band { name, tag, part, .. }
+                    if used_up.contains(&(name, &tag.version, *part)));
+                if is_superseded && old(listed.modified) || has_woken {
                     doomed.push(key);
                 }
             }
+            doomed.sort();
+            doomed.dedup();
         }
         visit.deleted += doomed.len() as u64;
         let deletions: Vec<_> =
@@ -328,6 +344,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 receipt:
                     Receipt::Frame { name, tag, part: None }
                     | Receipt::Fault { name, tag, part: None }
+                    | Receipt::Cut { name, tag, part: None, .. }
+                    | Receipt::Band { name, tag, part: None, .. }
                     | Receipt::Split { name, tag, .. },
                 ..
             } => Some((name, &tag.version)),
@@ -366,14 +384,26 @@ fn used_pixels(manifest: &Manifest) -> BTreeMap<(&ScriptName, Part), u32> {
 /// The script and version that a part, or a part's receipt, belongs to.
 fn part_of(key: &Key) -> Option<(&ScriptName, &ETag)> {
     match key {
-        Key::Part { name, tag, .. } => Some((name, &tag.version)),
+        Key::Part { name, tag, .. } | Key::Band { name, tag, .. } => Some((name, &tag.version)),
         Key::Receipt {
             receipt:
                 Receipt::Frame { name, tag, part: Some(_) }
                 | Receipt::Fault { name, tag, part: Some(_) }
-                | Receipt::Begun { name, tag, part: Some(_), .. },
+                | Receipt::Begun { name, tag, part: Some(_), .. }
+                | Receipt::Cut { name, tag, part: Some(_), .. }
+                | Receipt::Band { name, tag, part: Some(_), .. },
             ..
         } => Some((name, &tag.version)),
+        _ => None,
+    }
+}
+
+/// The frame that a cut or a band belongs to.
+fn banded_frame(found: &ReceiptFound) -> Option<(&ScriptName, &ETag, Part)> {
+    match &found.receipt {
+        Receipt::Cut { name, tag, part, .. } | Receipt::Band { name, tag, part, .. } => {
+            Some((name, &tag.version, *part))
+        }
         _ => None,
     }
 }

@@ -1,5 +1,8 @@
 //! Steps on a store in memory in which somebody meddles at the worst moment: one test for each rule that only then shows.
 
+mod bands;
+
+use std::num::NonZeroU64;
 use std::ops::Range;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,12 +11,14 @@ use std::time::Duration;
 use bytes::Bytes;
 
 use crate::failure::{End, Failure, Recorded};
-use crate::keys::{Animation, Key, Part, ScriptName};
+use crate::keys::{Animation, Key, ScriptName};
 use crate::manifest::{FrameState, Manifest, Reason, Status};
-use crate::render::{Drawing, Outcome, Renderer};
+use crate::render::Outcome;
 use crate::retry::{Scope, retry};
-use crate::simulation::acting::{Play, film, picture};
-use crate::store::{Bucket, ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, Upload};
+use crate::simulation::acting::{Drawer, film, picture};
+use crate::store::{
+    Bucket, ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, UnfinishedUpload, Upload,
+};
 use crate::sweep::{Visit, visit};
 use crate::{
     Animator, Clock, Encoding, Error, Invocation, Policy, Randomness, Result, Timestamp, Unfit, assemble,
@@ -84,6 +89,10 @@ impl Store for Meddled {
     async fn upload(&self, _: &str, _: PutOptions) -> Result<Pieces> {
         Ok(Pieces)
     }
+
+    fn take_up(&self, _: &str, _: PutOptions, _: UnfinishedUpload) -> Pieces {
+        Pieces
+    }
 }
 
 /// What is uploaded in pieces: here only whether it comes to an end.
@@ -101,25 +110,14 @@ impl Upload for Pieces {
     async fn abort(self) -> Result<()> {
         Ok(())
     }
-}
 
-struct Drawer;
-
-impl Renderer for Drawer {
-    fn most_bytes(&self) -> u64 {
-        1_000
-    }
-
-    async fn draw(&self, name: &ScriptName, script: Bytes, part: Part) -> Result<Drawing> {
-        Ok(match (Play::of(&script), part) {
-            (Play::Frame, None) | (Play::Split(_), Some(_)) => {
-                Drawing::Frame(picture(name, &script, part).into())
-            }
-            (Play::Split(count), None) => Drawing::Split(count),
-            _ => Drawing::Fault(Reason::new("bad")),
-        })
+    fn leave(self) -> UnfinishedUpload {
+        UnfinishedUpload::default()
     }
 }
+
+/// Of a frame that is too big.
+const BANDS: NonZeroU64 = NonZeroU64::new(3).unwrap();
 
 struct Joiner(Vec<String>);
 
@@ -128,6 +126,10 @@ impl Animator for Joiner {
 
     fn begin(&self, _: &rayfold_scene::AnimationSettings) -> Result<Joiner, Reason> {
         Ok(Joiner(Vec::new()))
+    }
+
+    async fn resume(&self, _: Bytes) -> Result<Joiner, Reason> {
+        Err(Reason::new("nothing is suspended here"))
     }
 }
 
@@ -139,6 +141,10 @@ impl Encoding for Joiner {
 
     async fn finish(self) -> Result<Bytes, Reason> {
         Ok(film(&Default::default(), &self.0).into())
+    }
+
+    async fn suspend(self) -> Result<Bytes, Reason> {
+        Err(Reason::new("nothing is suspended here"))
     }
 }
 
@@ -181,7 +187,10 @@ impl World {
     }
 
     async fn render(&self, key: &str) -> Outcome {
-        self.with(async |invocation| render_frame(invocation, &Drawer, key).await.unwrap().outcome).await
+        self.with(async |invocation| {
+            render_frame(invocation, &Drawer { bands: BANDS }, key).await.unwrap().outcome
+        })
+        .await
     }
 
     async fn upload(&self, file: &str, text: &str) -> Outcome {
@@ -348,8 +357,11 @@ async fn a_reason_that_cannot_be_had_is_waited_for_and_not_left_out() {
     });
     world.put("scripts/film/1.txt", "bad 2");
     let before = world.store.clock.now();
-    let rendering =
-        world.with(async |invocation| render_frame(invocation, &Drawer, "scripts/film/1.txt").await).await;
+    let rendering = world
+        .with(async |invocation| {
+            render_frame(invocation, &Drawer { bands: BANDS }, "scripts/film/1.txt").await
+        })
+        .await;
     assert!(rendering.unwrap_err().is_retryable());
     assert!(world.store.clock.now().since(before) > Duration::from_millis(500));
 }

@@ -75,8 +75,8 @@ run "bucket" {
 run "lifecycle" {
   assert {
     condition = sort([for rule in aws_s3_bucket_lifecycle_configuration.this.rule : rule.id]) == tolist([
-      "noncurrent-animations", "noncurrent-assemblies", "noncurrent-frames", "noncurrent-manifests", "noncurrent-parts",
-      "noncurrent-retries", "noncurrent-scripts", "spent-assemblies", "spent-retries",
+      "noncurrent-animations", "noncurrent-assemblies", "noncurrent-checkpoints", "noncurrent-frames", "noncurrent-manifests", "noncurrent-parts",
+      "noncurrent-retries", "noncurrent-scripts", "spent-assemblies", "spent-checkpoints", "spent-retries",
       "unfinished-uploads-and-lone-delete-markers",
     ])
     error_message = "there must be these rules and no other"
@@ -92,15 +92,15 @@ run "lifecycle" {
     condition = {
       for rule in aws_s3_bucket_lifecycle_configuration.this.rule : one(rule.filter).prefix => one(rule.expiration).days
       if length(rule.expiration) > 0 ? one(rule.expiration).days != null && one(rule.expiration).days != 0 : false
-    } == { "assemblies/" = 7, "retries/" = 7 }
-    error_message = "only claims and retry orders may expire by age: every other current object is a receipt"
+    } == { "assemblies/" = 7, "retries/" = 7, "checkpoints/" = 1 }
+    error_message = "only claims, retry orders and checkpoints may expire by age: every other current object is a receipt"
   }
   assert {
     condition = {
       for rule in aws_s3_bucket_lifecycle_configuration.this.rule : one(rule.filter).prefix => one(rule.noncurrent_version_expiration).noncurrent_days
       if length(rule.noncurrent_version_expiration) > 0
       } == {
-      "scripts/" = 30, "animations/" = 30, "parts/" = 1, "frames/" = 1, "manifests/" = 1, "assemblies/" = 1, "retries/" = 1
+      "scripts/" = 30, "animations/" = 30, "parts/" = 1, "frames/" = 1, "manifests/" = 1, "assemblies/" = 1, "retries/" = 1, "checkpoints/" = 1
     }
     error_message = "old versions must go, below every prefix"
   }
@@ -175,6 +175,7 @@ run "limits_fit_the_memory" {
     condition = aws_lambda_function.this["render"].environment[0].variables == tomap({
       RAYFOLD_BUCKET               = "demo-123456789012-eu-central-1"
       RAYFOLD_MAX_ANIMATION_FRAMES = "100000"
+      RAYFOLD_MAX_BANDS            = "64"
       RAYFOLD_MAX_FRAMES           = "10000"
       RAYFOLD_MAX_LIGHTS           = "1024"
       RAYFOLD_MAX_OBJECTS          = "1817300"

@@ -149,7 +149,7 @@ run "retention" {
       for rule in aws_s3_bucket_lifecycle_configuration.this.rule : one(rule.filter).prefix => one(rule.noncurrent_version_expiration).noncurrent_days
       if length(rule.noncurrent_version_expiration) > 0
       } == {
-      "scripts/" = 90, "animations/" = 90, "parts/" = 1, "frames/" = 1, "manifests/" = 1, "assemblies/" = 1, "retries/" = 1
+      "scripts/" = 90, "animations/" = 90, "parts/" = 1, "frames/" = 1, "manifests/" = 1, "assemblies/" = 1, "retries/" = 1, "checkpoints/" = 1
     }
     error_message = "people's objects are kept for longer, the pipeline's own are not"
   }
@@ -157,7 +157,7 @@ run "retention" {
     condition = {
       for rule in aws_s3_bucket_lifecycle_configuration.this.rule : one(rule.filter).prefix => one(rule.expiration).days
       if startswith(rule.id, "spent-")
-    } == { "assemblies/" = 2, "retries/" = 2 }
+    } == { "assemblies/" = 2, "retries/" = 2, "checkpoints/" = 1 }
     error_message = "claims and retry orders must expire after the days given"
   }
   assert {
@@ -667,6 +667,7 @@ run "limits" {
   variables {
     limits = {
       max_animation_frames = 70
+      max_bands            = 6
       max_frames           = 50
       max_pixels           = 1000000
       max_objects          = 2000
@@ -680,6 +681,7 @@ run "limits" {
       for name, value in aws_lambda_function.this["render"].environment[0].variables : name => value if name != "RAYFOLD_BUCKET"
       } == {
       RAYFOLD_MAX_ANIMATION_FRAMES = "70"
+      RAYFOLD_MAX_BANDS            = "6"
       RAYFOLD_MAX_FRAMES           = "50"
       RAYFOLD_MAX_LIGHTS           = "4"
       RAYFOLD_MAX_OBJECTS          = "2000"

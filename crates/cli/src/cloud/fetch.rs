@@ -8,13 +8,14 @@ use rayfold_client::{FetchedFrame, Frames, Output, frame_name, frames};
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Manifest, Status};
 
+use super::age::Age;
 use super::{BucketArgs, Client, Watch, address, named, parse_animation, report, with_bucket};
 use crate::console::Console;
 use crate::outcome::{Outcome, Usage};
 use crate::output::{OutputFile, probe};
 use crate::progress::Progress;
 use crate::render::target::{Container, Format, Pattern, Place, Target};
-use crate::wording::{Age, Size, number};
+use crate::wording::{Size, number};
 
 /// Download the GIF of an animation, or its frames
 #[derive(Debug, clap::Args)]

@@ -15,6 +15,7 @@ use rayfold_pipeline::{Error, SystemClock};
 use crate::console::{Console, visible};
 use crate::interrupt;
 
+mod age;
 pub(crate) mod fetch;
 pub(crate) mod remove;
 pub(crate) mod report;

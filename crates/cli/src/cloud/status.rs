@@ -8,10 +8,11 @@ use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Head, Reason};
 use serde::Serialize;
 
+use super::age::Age;
 use super::{BucketArgs, Client, Watch, parse_animation, report, with_bucket};
 use crate::console::{Console, Format, visible};
 use crate::outcome::Outcome;
-use crate::wording::{Age, Size};
+use crate::wording::Size;
 
 /// Between two looks at a whole bucket.
 const APART: Duration = Duration::from_secs(2);

@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::ValueEnum;
 use rayfold_client::cost::{Prices, Section, Workload, estimate};
+use rayfold_pipeline::assemble::MOST_PIECES;
 use rayfold_scene::Screen;
 use serde::Serialize;
 
@@ -18,8 +19,8 @@ use crate::outcome::Outcome;
 use crate::values;
 use measure::measure;
 
-/// The longest that the assemble function can run, in seconds: the stack's default, and the most that Lambda allows.
-const ASSEMBLE_TIMEOUT_S: f64 = 900.0;
+/// The longest that assembling may take, in seconds: invocations of the assemble function, of 15 minutes each.
+const MOST_ASSEMBLING_S: f64 = MOST_PIECES as f64 * 900.0;
 
 /// US dollars that are shown as 0.0001; what costs less is summed up.
 const LEAST_SHOWN: f64 = 0.000_05;
@@ -44,31 +45,31 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", value_parser = values::count::<u64>, conflicts_with = "input", requires = "ms")]
     frames: Option<u64>,
     /// Milliseconds that the render function takes for one, as its log says, with this --memory [default: measured]
-    #[arg(long, value_name = "MS", value_parser = values::positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MS", value_parser = positive, allow_negative_numbers = true)]
     ms: Option<f64>,
     /// The frames' size in pixels [default: 512x512, or that of the scripts]
     #[arg(long, value_name = "WxH", value_parser = values::size, conflicts_with = "input")]
     size: Option<Screen>,
     /// Memory of the render function, in MB
-    #[arg(long, value_name = "MB", default_value = "1769", value_parser = values::positive)]
+    #[arg(long, value_name = "MB", default_value = "1769", value_parser = positive)]
     memory: f64,
     /// Memory of the assemble function, in MB
-    #[arg(long, value_name = "MB", default_value = "3008", value_parser = values::positive)]
+    #[arg(long, value_name = "MB", default_value = "3008", value_parser = positive)]
     assemble_memory: f64,
     /// What the functions run on
     #[arg(long, value_enum, default_value_t)]
     architecture: Architecture,
     /// Milliseconds that the assemble function takes for a frame, if you know better than from the size
-    #[arg(long, value_name = "MS", value_parser = values::positive)]
+    #[arg(long, value_name = "MS", value_parser = positive)]
     assemble_ms: Option<f64>,
     /// Size of a frame's PNG in kB, if you know better than what is measured, or from the size
-    #[arg(long, value_name = "KB", value_parser = values::positive)]
+    #[arg(long, value_name = "KB", value_parser = positive)]
     frame_kb: Option<f64>,
     /// Size of the GIF in MB, if you know better
-    #[arg(long, value_name = "MB", value_parser = values::positive)]
+    #[arg(long, value_name = "MB", value_parser = positive)]
     gif_mb: Option<f64>,
     /// Minutes between two sweeps
-    #[arg(long, value_name = "MIN", default_value = "15", value_parser = values::positive)]
+    #[arg(long, value_name = "MIN", default_value = "15", value_parser = positive)]
     sweep_minutes: f64,
     /// With a key of the stack's own
     #[arg(long)]
@@ -108,11 +109,12 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let work = workload(args, console)?;
     let sections = estimate(&work, &prices);
     let assembling_s = work.assembling_s();
-    if assembling_s > ASSEMBLE_TIMEOUT_S {
+    if assembling_s > MOST_ASSEMBLING_S {
         console.warn(format_args!(
-            "assembling takes about {} s, and the function that does it is stopped after {ASSEMBLE_TIMEOUT_S} s: expected \
+            "assembling takes about {} s, and what takes more than {} s is refused: expected \
              fewer or smaller frames; or fetch the frames, and assemble them by rayfold encode",
-            amount(assembling_s)
+            amount(assembling_s),
+            amount(MOST_ASSEMBLING_S)
         ));
     }
     match args.format {
@@ -226,6 +228,17 @@ fn amount(value: f64) -> String {
         text.push(digit);
     }
     text
+}
+
+/// A number above 0.
+///
+/// # Errors
+/// What was expected.
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("expected a number greater than 0".into()),
+    }
 }
 
 #[cfg(test)]

@@ -26,6 +26,7 @@ fn rejects(text: &str, expected: &str) {
 fn every_kind_of_key_reads_back() {
     let name = ScriptName::new("00 1@x").unwrap();
     let number = NonZeroU64::new(12).unwrap();
+    let band = Band::all(number).last().unwrap();
     let generation = Generation::new(&"0a".repeat(16)).unwrap();
     let a = || animation("films/ä+b");
     let t = || tag("\"d41d8cd9-2\"", 3);
@@ -52,11 +53,30 @@ fn every_kind_of_key_reads_back() {
             Receipt::Begun { name: name.clone(), tag: t(), part: Some(number), attempt: number },
         ),
         ("00 1@x@d41d8cd9-2-p3.split-12", Receipt::Split { name: name.clone(), tag: t(), count: number }),
+        (
+            "00 1@x@d41d8cd9-2-p3.cut-12",
+            Receipt::Cut { name: name.clone(), tag: t(), part: None, count: number },
+        ),
+        (
+            "00 1@x@d41d8cd9-2-p3/12.cut-12",
+            Receipt::Cut { name: name.clone(), tag: t(), part: Some(number), count: number },
+        ),
+        (
+            "00 1@x@d41d8cd9-2-p3.12-of-12.band",
+            Receipt::Band { name: name.clone(), tag: t(), part: None, band },
+        ),
+        (
+            "00 1@x@d41d8cd9-2-p3/12.12-of-12.band",
+            Receipt::Band { name: name.clone(), tag: t(), part: Some(number), band },
+        ),
         ("@0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a.error.json", Receipt::Refusal { generation: generation.clone() }),
     ] {
         assert_eq!(text.parse::<Receipt>().unwrap(), receipt);
         check(&format!("frames/films/ä+b/{text}"), Key::Receipt { animation: a(), receipt });
     }
+    let woken = |part| Key::Band { animation: a(), name: name.clone(), tag: t(), part, band, attempt: 0 };
+    check("parts/films/ä+b/00 1@x@d41d8cd9-2-p3/12-of-12.band-0.json", woken(None));
+    check("parts/films/ä+b/00 1@x@d41d8cd9-2-p3/12/12-of-12.band-0.json", woken(Some(number)));
     check("manifests/films/ä+b.json", Key::Manifest { animation: a() });
     check(
         "assemblies/films/ä+b/17-0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a.json",
@@ -65,6 +85,7 @@ fn every_kind_of_key_reads_back() {
     let retry = |part| Key::Retry { animation: a(), name: name.clone(), tag: t(), part, attempt: number };
     check("retries/films/ä+b/00 1@x@d41d8cd9-2-p3/12", retry(None));
     check("retries/films/ä+b/00 1@x@d41d8cd9-2-p3/12/12", retry(Some(number)));
+    check("checkpoints/films/ä+b.state", Key::Checkpoint { animation: a() });
     check("animations/films/ä+b.gif", Key::Gif { animation: a() });
 }
 
@@ -72,6 +93,7 @@ fn every_kind_of_key_reads_back() {
 #[test]
 fn names_that_start_with_an_at_sign_have_receipts_like_all_others() {
     let generation = "0a".repeat(16);
+    let band = Band::all(NonZeroU64::MIN).next().unwrap();
     for name in ["@", "@1", "@@", &format!("@{generation}"), &format!("{generation}.error.json")] {
         let (name, tag) = (ScriptName::new(name).unwrap(), tag("v", 1));
         for part in [None, NonZeroU64::new(2)] {
@@ -80,6 +102,8 @@ fn names_that_start_with_an_at_sign_have_receipts_like_all_others() {
                 Receipt::Fault { name: name.clone(), tag: tag.clone(), part },
                 Receipt::Begun { name: name.clone(), tag: tag.clone(), part, attempt: NonZeroU64::MIN },
                 Receipt::Split { name: name.clone(), tag: tag.clone(), count: NonZeroU64::MIN },
+                Receipt::Cut { name: name.clone(), tag: tag.clone(), part, count: NonZeroU64::MIN },
+                Receipt::Band { name: name.clone(), tag: tag.clone(), part, band },
             ];
             for receipt in receipts {
                 check(&animation("a").receipt(&receipt), Key::Receipt { animation: animation("a"), receipt });
@@ -114,6 +138,33 @@ fn tags_may_hold_anything() {
     }
 }
 
+/// A script that was called like another one's cut, and was split, was never done: its own receipt was not understood.
+#[test]
+fn names_that_end_like_receipts_have_receipts_of_their_own() {
+    let two = NonZeroU64::new(2).unwrap();
+    let band = Band::all(two).last().unwrap();
+    let tag = || tag("d41", 3);
+    let ends = ["png", "error.json", "begun-1", "cut-450", "split-2", "1-of-2.band", "x"];
+    for end in ends.iter().flat_map(|end| [format!("x@vmp4-p3.{end}"), format!("@{end}"), format!("x.{end}")])
+    {
+        let name = || ScriptName::new(&end).unwrap();
+        for part in [None, Some(two)] {
+            let receipts = [
+                Receipt::Frame { name: name(), tag: tag(), part },
+                Receipt::Fault { name: name(), tag: tag(), part },
+                Receipt::Begun { name: name(), tag: tag(), part, attempt: two },
+                Receipt::Split { name: name(), tag: tag(), count: two },
+                Receipt::Cut { name: name(), tag: tag(), part, count: two },
+                Receipt::Band { name: name(), tag: tag(), part, band },
+            ];
+            for receipt in receipts {
+                let key = Key::Receipt { animation: animation("a"), receipt };
+                assert_eq!(key.to_string().parse::<Key>().ok(), Some(key));
+            }
+        }
+    }
+}
+
 #[test]
 fn script_keys_say_what_is_wrong() {
     rejects("scripts/a//b.txt", "an animation's name has an empty segment");
@@ -130,7 +181,14 @@ fn script_keys_say_what_is_wrong() {
     rejects("other/a/b.txt", "not a key of the pipeline");
     rejects("frames/a/b.png", "not a key of the pipeline");
     rejects("frames/a/b@c-p1/01.png", "not a key of the pipeline");
+    rejects("frames/a/b@c-p1.6-of-5.band", "not a key of the pipeline");
+    rejects("frames/a/b@c-p1.band", "not a key of the pipeline");
+    rejects("parts/a/b@c-p1/1-of-2.band-.json", "not a key of the pipeline");
+    rejects("parts/a/b@c-p1/01/1-of-2.band-0.json", "not a key of the pipeline");
+    rejects("parts/a/1/1-of-2.band-0.json", "not a key of the pipeline");
     rejects("assemblies/a/+1-x.json", "not a key of the pipeline");
+    rejects("checkpoints/a.gif", "not a key of the pipeline");
+    rejects("checkpoints/.state", "an animation's name has an empty segment");
 }
 
 #[test]
@@ -143,8 +201,18 @@ fn script_keys_end_at_900_bytes() {
     let most = NonZeroU64::new(99_999_999).unwrap();
     let tag = tag(&format!("{}-10000", "0".repeat(32)), 9_999);
     let receipt = Receipt::Fault { name: name.clone(), tag: tag.clone(), part: Some(most) };
-    let retry = Key::Retry { animation: animation.clone(), name, tag, part: Some(most), attempt: most };
-    for key in [animation.receipt(&receipt), retry.to_string()] {
+    let (band, part) = (Band::all(NonZeroU64::new(1_000).unwrap()).last().unwrap(), Some(most));
+    let banded = Receipt::Band { name: name.clone(), tag: tag.clone(), part, band };
+    let retry = Key::Retry {
+        animation: animation.clone(),
+        name: name.clone(),
+        tag: tag.clone(),
+        part,
+        attempt: most,
+    };
+    let woken = Key::Band { animation: animation.clone(), name, tag, part, band, attempt: most.get() };
+    let receipts = [receipt, banded].map(|receipt| animation.receipt(&receipt));
+    for key in receipts.into_iter().chain([retry.to_string(), woken.to_string()]) {
         assert!(key.len() <= 1024, "{} bytes", key.len());
     }
 }

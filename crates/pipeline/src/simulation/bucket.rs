@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -13,9 +13,10 @@ use bytes::{Bytes, BytesMut};
 
 use super::engine::{Engine, WorldClock, lock};
 use crate::store::{
-    Bucket, Condition, ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, Upload,
+    Bucket, Condition, ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, UnfinishedUpload,
+    Upload,
 };
-use crate::{Clock, Error, Randomness, Result};
+use crate::{Clock, Error, Randomness, Result, Timestamp};
 
 /// How often things go wrong: once in so many; never when 0.
 #[derive(Debug, Clone, Copy, Default)]
@@ -31,6 +32,9 @@ pub(super) struct Faults {
     /// A request takes up to eight times as long.
     pub(super) slow: u64,
 }
+
+/// Bytes of an upload's part; the simulated files are small.
+const PART: usize = 256;
 
 /// What S3 bears of one bucket, and how fast bytes come.
 #[derive(Debug, Clone, Copy)]
@@ -146,6 +150,8 @@ pub(super) struct Grounds {
     /// None: the bucket bears anything.
     pub(super) limits: Mutex<Option<Limits>>,
     second: Mutex<Second>,
+    /// Bytes of an upload's part.
+    pub(super) part: AtomicUsize,
     /// Requests that were one too many.
     pub(super) throttled: AtomicU64,
     pub(super) bucket: Mutex<Bucket>,
@@ -156,6 +162,8 @@ pub(super) struct Grounds {
     gifs: Mutex<BTreeMap<ETag, u64>>,
     /// A GIF gave way to one from an older listing.
     pub(super) set_back: Mutex<Option<String>>,
+    /// Where some frames are too big for one invocation: by which lot.
+    pub(super) big: Mutex<Option<u64>>,
     /// What users have overwritten or deleted, and where.
     pub(super) past: Mutex<Vec<(String, Option<String>)>>,
     /// A write took effect after its sender was killed.
@@ -181,12 +189,14 @@ impl Grounds {
             faults: Mutex::default(),
             limits: Mutex::default(),
             second: Mutex::default(),
+            part: AtomicUsize::new(PART),
             throttled: AtomicU64::new(0),
             bucket: Mutex::default(),
             notify: Mutex::new(None),
             moments: Mutex::new(None),
             gifs: Mutex::default(),
             set_back: Mutex::default(),
+            big: Mutex::default(),
             past: Mutex::default(),
             late_writes: AtomicU64::new(0),
             seen: Mutex::default(),
@@ -236,7 +246,9 @@ impl Grounds {
                 let size = lock(&self.bucket).head(key).map_or(0, |info| info.size);
                 range.end.min(size).saturating_sub(range.start)
             }
-            Effect::Delete(_) | Effect::List(_) | Effect::Nothing(_) => 0,
+            Effect::Part { body, .. } => body.len() as u64,
+            Effect::Complete { tail, .. } => tail.len() as u64,
+            Effect::Delete(_) | Effect::List(_) | Effect::Begin(_) | Effect::Abort(..) => 0,
         };
         Duration::from_micros(bytes / limits.bytes_a_microsecond.max(1))
     }
@@ -286,6 +298,8 @@ enum Answer {
     ETag(ETag),
     Deleted,
     Page(ListPage),
+    /// Of an upload that has begun.
+    Id(u64),
 }
 
 /// What a request does to the bucket.
@@ -295,15 +309,33 @@ enum Effect {
     Put(String, Bytes, PutOptions),
     Delete(String),
     List(ListRequest),
-    /// Takes time and changes nothing: beginning an upload, sending a part of one.
-    Nothing(String),
+    /// Begins an upload.
+    Begin(String),
+    Part {
+        key: String,
+        id: u64,
+        number: usize,
+        body: Bytes,
+    },
+    Complete {
+        key: String,
+        id: u64,
+        parts: Vec<ETag>,
+        tail: Bytes,
+        options: PutOptions,
+    },
+    Abort(String, u64),
 }
 
 impl Effect {
     fn action(&self) -> Action {
         match self {
             Effect::Get(..) => Action::Get,
-            Effect::Put(..) | Effect::Nothing(_) => Action::Put,
+            Effect::Put(..)
+            | Effect::Begin(_)
+            | Effect::Part { .. }
+            | Effect::Complete { .. }
+            | Effect::Abort(..) => Action::Put,
             Effect::Delete(_) => Action::Delete,
             Effect::List(_) => Action::List,
         }
@@ -311,7 +343,13 @@ impl Effect {
 
     fn key(&self) -> &str {
         match self {
-            Effect::Get(key, _) | Effect::Put(key, ..) | Effect::Delete(key) | Effect::Nothing(key) => key,
+            Effect::Get(key, _)
+            | Effect::Put(key, ..)
+            | Effect::Delete(key)
+            | Effect::Begin(key)
+            | Effect::Part { key, .. }
+            | Effect::Complete { key, .. }
+            | Effect::Abort(key, _) => key,
             Effect::List(request) => &request.prefix,
         }
     }
@@ -320,13 +358,23 @@ impl Effect {
     fn latency_ms(&self) -> Range<u64> {
         match self {
             Effect::Get(..) => 10..25,
-            Effect::Put(..) | Effect::Delete(_) | Effect::Nothing(_) => 25..60,
+            Effect::Put(..)
+            | Effect::Delete(_)
+            | Effect::Begin(_)
+            | Effect::Part { .. }
+            | Effect::Complete { .. }
+            | Effect::Abort(..) => 25..60,
             Effect::List(_) => 20..40,
         }
     }
 
     fn is_conditional(&self) -> bool {
-        matches!(self, Effect::Put(_, _, options) if options.condition != Condition::Always)
+        match self {
+            Effect::Put(_, _, options) | Effect::Complete { options, .. } => {
+                options.condition != Condition::Always
+            }
+            _ => false,
+        }
     }
 }
 
@@ -367,7 +415,7 @@ impl WorldStore {
                 self.fate.listed_us.store(grounds.engine.now_us(), Ordering::Relaxed);
                 grounds.tell(Moment::Listing);
             }
-            Effect::Nothing(_) => grounds.tell(Moment::Building),
+            Effect::Begin(_) | Effect::Part { .. } | Effect::Abort(..) => grounds.tell(Moment::Building),
             _ => {}
         }
 
@@ -451,7 +499,7 @@ impl WorldStore {
                 }
                 return;
             }
-            if late && matches!(effect, Effect::Put(..) | Effect::Delete(_)) {
+            if late && matches!(effect, Effect::Put(..) | Effect::Complete { .. } | Effect::Delete(_)) {
                 store.grounds.late_writes.fetch_add(1, Ordering::Relaxed);
             }
             let line = store.grounds.log.as_ref().map(|_| describe(&effect));
@@ -489,18 +537,19 @@ impl WorldStore {
                 }
                 Ok(Answer::Page(page))
             }
-            Effect::Nothing(_) => Ok(Answer::Deleted),
-            Effect::Put(key, body, options) => {
-                let now = WorldClock::exact(&grounds.engine).now();
-                let before = lock(&grounds.bucket).head(&key).ok().map(|info| info.etag);
-                let etag = lock(&grounds.bucket).put(now, &key, body, options)?;
-                if key.starts_with("animations/") {
-                    let listed_us = self.fate.listed_us.load(Ordering::Relaxed);
-                    grounds.replace_gif(&key, before.as_ref(), &etag, listed_us);
-                }
-                grounds.changed(self.actor, &key, true);
-                Ok(Answer::ETag(etag))
+            Effect::Begin(_) => Ok(Answer::Id(lock(&grounds.bucket).begin_upload())),
+            Effect::Part { key, id, number, body } => {
+                lock(&grounds.bucket).put_part(&key, id, number, body).map(Answer::ETag)
             }
+            Effect::Abort(_, id) => {
+                lock(&grounds.bucket).abort_upload(id);
+                Ok(Answer::Deleted)
+            }
+            Effect::Put(key, body, options) => {
+                self.replace(&key, |bucket, now| bucket.put(now, &key, body, options))
+            }
+            Effect::Complete { key, id, parts, tail, options } => self
+                .replace(&key, |bucket, now| bucket.complete_upload(now, &key, id, (&parts, &tail), options)),
             Effect::Delete(key) => {
                 if lock(&grounds.bucket).delete(&key) {
                     grounds.changed(self.actor, &key, false);
@@ -508,6 +557,22 @@ impl WorldStore {
                 Ok(Answer::Deleted)
             }
         }
+    }
+}
+
+impl WorldStore {
+    /// Makes an object, and tells of it.
+    fn replace(&self, key: &str, put: impl FnOnce(&mut Bucket, Timestamp) -> Result<ETag>) -> Result<Answer> {
+        let grounds = &self.grounds;
+        let now = WorldClock::exact(&grounds.engine).now();
+        let before = lock(&grounds.bucket).head(key).ok().map(|info| info.etag);
+        let etag = put(&mut lock(&grounds.bucket), now)?;
+        if key.starts_with("animations/") {
+            let listed_us = self.fate.listed_us.load(Ordering::Relaxed);
+            grounds.replace_gif(key, before.as_ref(), &etag, listed_us);
+        }
+        grounds.changed(self.actor, key, true);
+        Ok(Answer::ETag(etag))
     }
 }
 
@@ -521,7 +586,12 @@ fn describe(effect: &Effect) -> String {
         Effect::Get(key, _) => format!("get {key}"),
         Effect::Delete(key) => format!("delete {key}"),
         Effect::List(request) => format!("list {}", request.prefix),
-        Effect::Nothing(key) => format!("part of {key}"),
+        Effect::Begin(key) => format!("begin upload of {key}"),
+        Effect::Part { key, id, number, .. } => format!("part {number} of {key} in upload {id}"),
+        Effect::Complete { key, id, options, .. } => {
+            format!("put {key} of upload {id} {:?}", options.condition)
+        }
+        Effect::Abort(key, id) => format!("abort upload {id} of {key}"),
     }
 }
 
@@ -590,44 +660,70 @@ impl Store for WorldStore {
     }
 
     async fn upload(&self, key: &str, options: PutOptions) -> Result<WorldUpload> {
-        self.request(Effect::Nothing(key.to_owned())).await?;
-        let (body, sent) = (BytesMut::new(), 0);
-        let part = if lock(&self.grounds.limits).is_some() { PART_OF_S3 } else { PART };
-        Ok(WorldUpload { store: self.clone(), key: key.to_owned(), options, body, sent, part })
+        let Answer::Id(id) = self.request(Effect::Begin(key.to_owned())).await? else {
+            return Err(wrong_answer(key));
+        };
+        let begun = UnfinishedUpload { id: Some(id.to_string()), ..UnfinishedUpload::default() };
+        Ok(self.take_up(key, options, begun))
+    }
+
+    fn take_up(&self, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> WorldUpload {
+        let UnfinishedUpload { id, parts, tail } = unfinished;
+        let part = self.grounds.part.load(Ordering::Relaxed);
+        let id = id.and_then(|id| id.parse().ok()).unwrap_or_default();
+        WorldUpload {
+            store: self.clone(),
+            key: key.to_owned(),
+            options,
+            id,
+            parts,
+            gathered: tail.into(),
+            part,
+        }
     }
 }
-
-/// Bytes of a part; the simulated files are small.
-const PART: usize = 256;
-
-/// Bytes of a part where the bucket has S3's limits.
-const PART_OF_S3: usize = 8 * 1024 * 1024;
 
 /// An object being written to the simulated bucket.
 pub(super) struct WorldUpload {
     store: WorldStore,
     key: String,
     options: PutOptions,
-    body: BytesMut,
-    sent: usize,
+    id: u64,
+    parts: Vec<ETag>,
+    gathered: BytesMut,
+    /// Bytes of a part.
     part: usize,
 }
 
 impl Upload for WorldUpload {
     async fn write(&mut self, bytes: Bytes) -> Result<()> {
-        self.body.extend_from_slice(&bytes);
-        while self.body.len() - self.sent >= self.part {
-            self.store.request(Effect::Nothing(self.key.clone())).await?;
-            self.sent += self.part;
+        self.gathered.extend_from_slice(&bytes);
+        while self.gathered.len() >= self.part {
+            let (key, body) = (self.key.clone(), self.gathered.split_to(self.part).freeze());
+            let part = Effect::Part { key, id: self.id, number: self.parts.len() + 1, body };
+            match self.store.request(part).await? {
+                Answer::ETag(etag) => self.parts.push(etag),
+                _ => return Err(wrong_answer(&self.key)),
+            }
         }
         Ok(())
     }
 
     async fn finish(self) -> Result<ETag> {
-        self.store.put(&self.key, self.body.freeze(), self.options).await
+        let WorldUpload { store, key, options, id, parts, gathered, .. } = self;
+        let tail = gathered.freeze();
+        match store.request(Effect::Complete { key: key.clone(), id, parts, tail, options }).await? {
+            Answer::ETag(etag) => Ok(etag),
+            _ => Err(wrong_answer(&key)),
+        }
     }
 
     async fn abort(self) -> Result<()> {
-        self.store.request(Effect::Nothing(self.key.clone())).await.map(drop)
+        self.store.request(Effect::Abort(self.key, self.id)).await.map(drop)
+    }
+
+    fn leave(self) -> UnfinishedUpload {
+        let (id, parts, tail) = (Some(self.id.to_string()), self.parts, self.gathered.freeze());
+        UnfinishedUpload { id, parts, tail }
     }
 }

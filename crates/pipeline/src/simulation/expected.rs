@@ -1,4 +1,5 @@
-//! What a bucket must hold once everything has come to rest, worked out from its scripts alone.
+//! What a bucket must hold once everything has come to rest, worked out from its scripts alone; and what may follow on a
+//! manifest.
 
 use std::num::NonZeroU64;
 
@@ -6,7 +7,7 @@ use rayfold_scene::{AnimationSettings, SETTINGS_FILE, parse_settings};
 
 use super::acting::{Play, film, picture};
 use crate::keys::{Animation, Key, Part, ScriptName};
-use crate::manifest::{FrameState, Manifest, Status};
+use crate::manifest::{FrameState, Head, Manifest, Status};
 use crate::store::{Bucket, ETag, Object};
 
 /// What an animation must have come to.
@@ -139,4 +140,17 @@ impl Expected {
             _ => Ok(()),
         }
     }
+}
+
+/// A manifest takes another one's place as its next revision, or with nothing new but which GIF is there.
+pub(super) fn follows(next: &Manifest, before: Option<&Manifest>) -> Result<(), String> {
+    let revision = before.map_or(0, |before| before.head.revision);
+    let is_record = before.is_some_and(|before| {
+        let head = Head { gif: next.head.gif.clone(), ..before.head.clone() };
+        next.head.gif != before.head.gif && next.head == head && next.frames == before.frames
+    });
+    if next.head.revision == revision + 1 || is_record {
+        return Ok(());
+    }
+    Err(format!("revision {} follows {revision}", next.head.revision))
 }

@@ -25,12 +25,14 @@ mod bucket;
 mod engine;
 mod expected;
 pub mod explore;
+mod pieces;
 mod platform;
 mod scale;
 mod slow;
 mod story;
 
 pub use bucket::Limits;
+pub use pieces::{Pieces, PiecesReport, in_pieces};
 pub use scale::{Scale, ScaleReport, measure};
 pub use slow::{Slow, SlowReport, slowly};
 
@@ -58,6 +60,8 @@ pub struct Run {
     pub without_sweep: bool,
     /// Events that the platform gave up.
     pub given_up: u64,
+    /// GIFs that an invocation left unfinished to the next one.
+    pub left: u64,
     /// Writes that landed after their writer was killed.
     pub late_writes: u64,
     /// Who was seen doing what below which prefix, as `function action prefix`.

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
-use super::acting::{Actress, Lister};
+use super::acting::{Actress, Lister, Pace};
 use super::bucket::{Actor, Fate, Grounds, WorldStore};
 use super::engine::{TaskId, WorldClock, lock};
 use crate::failure::{End, Failure};
@@ -68,6 +68,8 @@ pub(super) struct Diary {
     pub(super) needs_sweep: Option<&'static str>,
     /// Events that were given up.
     pub(super) given_up: u64,
+    /// GIFs that an invocation left unfinished to the next one.
+    pub(super) left: u64,
     /// What the last sweep did.
     pub(super) last_sweep: Vec<Visit>,
     /// An error that no invocation should have.
@@ -131,8 +133,7 @@ pub(super) struct Platform {
     pub(super) ramp: Mutex<Option<usize>>,
     pub(super) timeout: Duration,
     pub(super) draw_ms: (u64, u64),
-    /// How long the assembler takes for a frame.
-    pub(super) push: Duration,
+    pub(super) pace: Pace,
     state: Mutex<State>,
     me: Weak<Platform>,
 }
@@ -145,7 +146,7 @@ impl Platform {
         concurrency: usize,
         timeout: Duration,
         draw_ms: (u64, u64),
-        push: Duration,
+        pace: Pace,
     ) -> Arc<Self> {
         Arc::new_cyclic(|me| Platform {
             grounds,
@@ -157,7 +158,7 @@ impl Platform {
             ramp: Mutex::default(),
             timeout,
             draw_ms,
-            push,
+            pace,
             state: Mutex::new(State { queue: VecDeque::new(), running: BTreeSet::new(), tokens: 0 }),
             me: me.clone(),
         })
@@ -312,10 +313,11 @@ impl Platform {
                 }
             }
             Work::Assemble(key) => {
-                let lister = Lister { engine: grounds.engine.clone(), push: self.push };
+                let lister = Lister { engine: grounds.engine.clone(), pace: self.pace };
                 let start_us = grounds.engine.now_us();
                 lock(&self.diary).assembler_begins();
-                assemble(&invocation, &lister, key).await?;
+                let assembled = assemble(&invocation, &lister, key).await?;
+                lock(&self.diary).left += u64::from(assembled.left_after.is_some());
                 lock(&self.diary).assembler_ends(grounds.engine.now_us() - start_us);
             }
             Work::Sweep => {

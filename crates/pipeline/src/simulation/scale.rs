@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 
+use super::acting::Pace;
 use super::bucket::{Actor, Grounds, Limits};
 use super::engine::{Engine, WorldClock, lock};
 use super::expected::Expected;
@@ -60,6 +61,9 @@ impl Scale {
     }
 }
 
+/// Bytes of a part that the store for S3 sends.
+const PART_OF_S3: usize = 8 << 20;
+
 /// What Lambda adds to its places every 10 seconds.
 const RAMP: usize = 1_000;
 
@@ -74,7 +78,7 @@ pub struct ScaleReport {
     pub beyond_drawing: Duration,
     /// Bytes that the render function read, divided by the frames.
     pub bytes_a_frame: f64,
-    /// From the last result's put to the last claim's.
+    /// From the last result's put to the render function's last claim.
     pub tail: Duration,
     /// Claims that were put.
     pub claims: u64,
@@ -102,6 +106,8 @@ pub struct ScaleReport {
     pub throttled: f64,
     /// Bytes of the largest manifest.
     pub manifest: u64,
+    /// How often an assembler left a GIF unfinished to the next one.
+    pub left: u64,
 }
 
 #[derive(Default)]
@@ -132,8 +138,11 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
         scale.concurrency,
         TIMEOUT,
         scale.draw_ms,
-        scale.push,
+        Pace { push: scale.push, is_eager: true },
     );
+    if scale.limits.is_some() {
+        grounds.part.store(PART_OF_S3, Ordering::Relaxed);
+    }
     *lock(&platform.ramp) = scale.limits.map(|_| RAMP);
     let names = (1..=scale.animations).map(|number| Animation::new(&format!("long{number}")));
     let animations: Vec<Animation> =
@@ -141,13 +150,14 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
     let moments: Shared<Moments> = Shared::default();
     {
         let (platform, moments, engine) = (Arc::downgrade(&platform), moments.clone(), engine.clone());
-        *lock(&grounds.notify) = Some(Arc::new(move |_: Actor, key: &str, there: bool, bucket: &Bucket| {
-            lock(&moments).see(key, bucket, engine.now_us());
-            if let Some(platform) = platform.upgrade() {
-                let etag = bucket.head(key).ok().filter(|_| there).map(|info| info.etag);
-                platform.object_event(key, etag);
-            }
-        }));
+        *lock(&grounds.notify) =
+            Some(Arc::new(move |actor: Actor, key: &str, there: bool, bucket: &Bucket| {
+                lock(&moments).see((actor, key), bucket, engine.now_us());
+                if let Some(platform) = platform.upgrade() {
+                    let etag = bucket.head(key).ok().filter(|_| there).map(|info| info.etag);
+                    platform.object_event(key, etag);
+                }
+            }));
     }
     for animation in &animations {
         let settings = format!(r#"{{"frames": {}}}"#, scale.frames);
@@ -226,6 +236,7 @@ impl Platform {
             waits: [0, 1]
                 .map(|function| [mean(diary.waits[function], function), diary.longest_wait[function]]),
             invocations: diary.invocations,
+            left: diary.left,
             at_once: diary.at_once,
             throttled: a_frame(&grounds.throttled),
             ..ScaleReport::default()
@@ -234,11 +245,14 @@ impl Platform {
 }
 
 impl Moments {
-    fn see(&mut self, key: &str, bucket: &Bucket, now_us: u64) {
+    fn see(&mut self, (actor, key): (Actor, &str), bucket: &Bucket, now_us: u64) {
         match key.parse() {
             Ok(Key::Receipt { receipt: Receipt::Frame { .. }, .. }) => self.last_result_us = now_us,
             Ok(Key::Claim { .. }) => {
-                self.last_claim_us = now_us;
+                // An assembler's is that of a GIF that it left unfinished.
+                if actor == Actor::Render {
+                    self.last_claim_us = now_us;
+                }
                 self.claims += 1;
             }
             Ok(Key::Manifest { .. }) => {

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use super::acting::Pace;
 use super::bucket::{Actor, Grounds};
 use super::engine::{Engine, lock};
 use super::expected::Expected;
@@ -62,7 +63,7 @@ pub fn slowly(slow: Slow) -> Result<SlowReport, String> {
     let grounds = Grounds::new(engine.clone(), slow.seed, false);
     let timeout = slow.timeout.unwrap_or(TIMEOUT);
     let policy = Policy::new(PIXELS);
-    let platform = Platform::new(grounds.clone(), policy, None, 1_000, timeout, (100, 300), Duration::ZERO);
+    let platform = Platform::new(grounds.clone(), policy, None, 1_000, timeout, (100, 300), Pace::default());
     let animation = Animation::new("slow").map_err(|error| error.to_string())?;
     let counted: Shared<SlowReport> = Shared::default();
     {

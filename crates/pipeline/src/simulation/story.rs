@@ -6,15 +6,15 @@ use std::time::Duration;
 
 use bytes::Bytes;
 
-use super::acting::GARBLED;
+use super::acting::{BIG, GARBLED, Pace};
 use super::bucket::{Actor, Faults, Grounds, Moment};
 use super::engine::{Engine, WorldClock, lock};
-use super::expected::Expected;
+use super::expected::{Expected, follows};
 use super::platform::{Chaos, Platform, Work};
 use super::{PIXELS, Run, Shared};
 use crate::keys::{Animation, Key};
 use crate::manifest::Manifest;
-use crate::store::{Bucket, PutOptions};
+use crate::store::{Bucket, Object, PutOptions};
 use crate::sweep::Visit;
 use crate::{Clock, Mutation, Policy, Randomness};
 
@@ -30,8 +30,19 @@ const TROUBLES: Duration = Duration::from_secs(45);
 /// Sets apart what strangers do from the rest of a story.
 const STRANGERS: u64 = 0x0067_6172_626c_6572;
 
+/// Sets apart which frames are too big from the rest of a story.
+const BIG_FRAMES: u64 = 0x0062_6967;
+/// Sets apart how little time the assembler has.
+const HURRY: u64 = 0x0068_7572_7279;
+
 /// How many sweeps a run may need.
 const MOST_SWEEPS: u32 = 24;
+
+/// How often `retry` is asked for, at most.
+const MOST_RETRIES: u32 = 4;
+
+/// Bytes of an upload's part where GIFs are built in pieces: two or three frames.
+const SMALL_PART: usize = 32;
 
 /// Scripts of the stories: their natural order is not their byte order, and one name looks like a receipt's.
 const NAMES: [&str; 4] = ["2", "10", "1", "3@0-p1"];
@@ -43,7 +54,11 @@ pub(super) fn run(
     log: Option<&mut Vec<String>>,
 ) -> Result<Run, String> {
     let random = Randomness::seeded(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x5eed);
-    let judge = begin(&random, mutation, log.is_some())?;
+    let judge = begin(&random, &Randomness::seeded(seed ^ HURRY), mutation, log.is_some())?;
+    let lots = Randomness::seeded(seed ^ BIG_FRAMES);
+    if lots.one_in(3) {
+        *lock(&judge.grounds.big) = Some(lots.bits());
+    }
     let strangers = Randomness::seeded(seed ^ STRANGERS);
     if strangers.one_in(8) {
         judge.garble(&strangers);
@@ -62,14 +77,26 @@ pub(super) fn run(
 }
 
 /// A world with its story, before anything has happened.
-fn begin(random: &Randomness, mutation: Option<Mutation>, is_logged: bool) -> Result<Judge, String> {
+fn begin(
+    random: &Randomness,
+    hurry: &Randomness,
+    mutation: Option<Mutation>,
+    is_logged: bool,
+) -> Result<Judge, String> {
     let engine = Engine::default();
     let grounds = Grounds::new(engine.clone(), random.bits(), is_logged);
-    let policy = policy(random);
+    let mut policy = policy(random);
     let concurrency = [1, 2, 4, 100][pick(random, 4)];
     let draw_ms = (1, [20, 300, 3_000][pick(random, 3)]);
     let push = Duration::from_millis([0, 0, 100, 400][pick(random, 4)]);
-    let platform = Platform::new(grounds.clone(), policy, mutation, concurrency, TIMEOUT, draw_ms, push);
+    let mut pace = Pace { push, is_eager: false };
+    if hurry.one_in(4) {
+        // A GIF takes several invocations, of one to three frames each.
+        pace = Pace { push: Duration::from_millis([2_000, 3_000, 8_000][pick(hurry, 3)]), is_eager: true };
+        policy.margin = Duration::from_secs(1);
+        grounds.part.store(SMALL_PART, Ordering::Relaxed);
+    }
+    let platform = Platform::new(grounds.clone(), policy, mutation, concurrency, TIMEOUT, draw_ms, pace);
     if !random.one_in(4) {
         *lock(&platform.chaos) = chaos(random);
         *lock(&grounds.faults) = faults(random);
@@ -244,6 +271,7 @@ fn content(random: &Randomness) -> String {
 fn act(grounds: &Arc<Grounds>, delay: Duration, key: String, text: Option<String>) {
     let world = grounds.clone();
     grounds.engine.after(delay, move || {
+        let text = text.map(|text| perhaps_big(&world, &key, text));
         let now = WorldClock::exact(&world.engine).now();
         let there = text.is_some();
         let before = lock(&world.bucket).get(&key).ok();
@@ -261,10 +289,20 @@ fn act(grounds: &Arc<Grounds>, delay: Duration, key: String, text: Option<String
     });
 }
 
+/// In a world with big frames half of the texts of scripts have some, always the same ones.
+fn perhaps_big(world: &Grounds, key: &str, text: String) -> String {
+    let Some(lot) = *lock(&world.big) else { return text };
+    let number = text.bytes().fold(lot, |number, byte| number.wrapping_mul(31) ^ u64::from(byte));
+    if key.ends_with(".txt") && !text.starts_with(BIG) && Randomness::seeded(number).one_in(2) {
+        return format!("{BIG}{text}");
+    }
+    text
+}
+
 /// What must hold at every moment.
 #[derive(Default)]
 struct Watch {
-    revision: u64,
+    manifest: Option<Manifest>,
     violation: Option<String>,
 }
 
@@ -287,14 +325,12 @@ impl Watch {
             Key::Manifest { animation }
                 if actor == Actor::User && Manifest::decode(&animation, &body).is_err() =>
             {
-                self.revision = 0;
+                self.manifest = None;
             }
             Key::Manifest { animation } => {
                 let manifest = Manifest::decode(&animation, &body).map_err(|error| error.to_string())?;
-                let before = std::mem::replace(&mut self.revision, manifest.head.revision);
-                if !there || manifest.head.revision != before + 1 {
-                    return Err(format!("revision {} follows {before}", manifest.head.revision));
-                }
+                let before = self.manifest.replace(manifest.clone());
+                follows(&manifest, before.as_ref())?;
             }
             Key::Gif { .. } if there => {
                 let text = String::from_utf8_lossy(&body);
@@ -310,6 +346,10 @@ impl Watch {
         }
         Ok(())
     }
+}
+
+fn is_image(key: &str) -> bool {
+    key.ends_with(".png") || key.ends_with(".band")
 }
 
 /// Where a picture belongs: the number that its script's name starts with, the name, the part.
@@ -330,31 +370,52 @@ struct Judge {
 }
 
 impl Judge {
-    /// Someone overwrites the manifest with what is none. No function is woken by that.
+    /// Someone overwrites the manifest, a frame or the GIF with what is none. No function is woken by that.
     fn garble(&self, random: &Randomness) {
         let delay = Duration::from_micros(random.below(TROUBLES.as_micros() as u64));
-        if random.one_in(2) {
-            self.garble_a_frame(random.bits(), delay);
-            return;
+        match random.below(3) {
+            0 => return self.garble_a_frame(random.bits(), delay),
+            1 => return self.cut_off_the_gif(delay),
+            _ => {}
         }
         let text = ["", "garbage\n", "{\"schema\":9},\n\"frames\":[\n\n]}\n"][pick(random, 3)];
         act(&self.grounds, delay, self.animation.manifest(), Some(text.to_owned()));
         self.platform.only_the_sweep_heals("the manifest was garbled");
     }
 
-    /// Someone overwrites a frame with what is none.
+    /// Someone overwrites a frame, or a band of one, with what is none.
     fn garble_a_frame(&self, lot: u64, delay: Duration) {
-        let world = self.grounds.clone();
+        let (world, platform) = (self.grounds.clone(), self.platform.clone());
         self.engine.after(delay, move || {
             let now = WorldClock::exact(&world.engine).now();
             let mut bucket = lock(&world.bucket);
-            let frames: Vec<String> =
-                bucket.keys().filter(|key| key.ends_with(".png")).map(str::to_owned).collect();
+            let frames: Vec<String> = bucket.keys().filter(|key| is_image(key)).map(str::to_owned).collect();
             let Some(key) = frames.get(pick(&Randomness::seeded(lot), frames.len().max(1))) else { return };
             world.note(|| format!("someone garbles {key}"));
             let _ = bucket.put(now, key, GARBLED.into(), PutOptions::always());
+            platform.only_the_sweep_heals("a frame was garbled");
         });
-        self.platform.only_the_sweep_heals("a frame was garbled");
+    }
+
+    /// Someone puts half of the GIF in its place, with its metadata, once the manifest says which one it is.
+    fn cut_off_the_gif(&self, delay: Duration) {
+        let (world, platform, animation) =
+            (self.grounds.clone(), self.platform.clone(), self.animation.clone());
+        self.engine.after(delay, move || {
+            let now = WorldClock::exact(&world.engine).now();
+            let mut bucket = lock(&world.bucket);
+            let (key, manifest) = (animation.gif(), bucket.get(&animation.manifest()).ok());
+            let manifest = manifest.and_then(|object| Manifest::decode(&animation, &object.body).ok());
+            let recorded = manifest.and_then(|manifest| manifest.head.gif);
+            let Ok(Object { info, body }) = bucket.get(&key) else { return };
+            if recorded.is_none_or(|recorded| recorded.version != info.etag) {
+                return;
+            }
+            world.note(|| format!("someone cuts off {key}"));
+            let options = PutOptions { metadata: info.metadata, ..PutOptions::always() };
+            let _ = bucket.put(now, &key, body.slice(..body.len() / 2), options);
+            platform.only_the_sweep_heals("the GIF was cut off");
+        });
     }
 
     /// From now on nothing goes wrong.
@@ -371,7 +432,11 @@ impl Judge {
             self.check().map_err(|what| format!("without a sweep: {what}"))?;
         }
         self.sweep_until_rest()?;
-        if self.wrongly_given_up() > 0 {
+        // A user may change the script while the command looks: then it has retried what is gone.
+        for _ in 0..MOST_RETRIES {
+            if self.wrongly_given_up() == 0 {
+                break;
+            }
             if lock(&self.platform.diary).needs_sweep.is_none() {
                 return Err("a frame was given up that nothing had happened to".to_owned());
             }
@@ -387,6 +452,7 @@ impl Judge {
             invocations: diary.invocations,
             without_sweep,
             given_up: diary.given_up,
+            left: diary.left,
             late_writes: self.grounds.late_writes.load(Ordering::Relaxed),
             permissions: seen
                 .iter()
@@ -433,6 +499,11 @@ impl Judge {
 
     fn check(&self) -> Result<(), String> {
         let bucket = lock(&self.grounds.bucket);
+        let torn =
+            |key: &&str| bucket.get(key).is_ok_and(|image| image.body.windows(4).any(|text| text == b"torn"));
+        if let Some(key) = bucket.keys().find(torn) {
+            return Err(format!("{key} was put together of what does not belong together"));
+        }
         Expected::of(&bucket, &self.animation).check(&bucket, &self.animation)
     }
 }

@@ -15,6 +15,9 @@ use crate::{Error, Result};
 #[derive(Debug, Clone, Default)]
 pub struct Bucket {
     objects: BTreeMap<String, Object>,
+    /// By id; parts by number, counted from 1.
+    uploads: BTreeMap<u64, BTreeMap<usize, Bytes>>,
+    last_upload: u64,
 }
 
 impl Bucket {
@@ -54,6 +57,54 @@ impl Bucket {
         };
         self.objects.insert(key.to_owned(), Object { info, body });
         Ok(etag)
+    }
+
+    /// Begins an upload, and names it.
+    pub fn begin_upload(&mut self) -> u64 {
+        self.last_upload += 1;
+        self.uploads.insert(self.last_upload, BTreeMap::new());
+        self.last_upload
+    }
+
+    /// Takes a part of an upload, in the place of one with the same number.
+    pub fn put_part(&mut self, key: &str, id: u64, number: usize, body: Bytes) -> Result<ETag> {
+        let gone = || Error::NotFound { key: key.to_owned() };
+        let etag = etag_of(&body);
+        self.uploads.get_mut(&id).ok_or_else(gone)?.insert(number, body);
+        Ok(etag)
+    }
+
+    /// Makes an object of an upload's parts and what follows them. When the condition does not hold the upload is gone.
+    pub fn complete_upload(
+        &mut self,
+        now: Timestamp,
+        key: &str,
+        id: u64,
+        (parts, tail): (&[ETag], &[u8]),
+        options: PutOptions,
+    ) -> Result<ETag> {
+        let gone =
+            || Error::Ambiguous { key: key.to_owned(), source: "the upload is not there any more".into() };
+        let sent = self.uploads.remove(&id).ok_or_else(gone)?;
+        let mut body = Vec::new();
+        for (number, etag) in (1..).zip(parts) {
+            match sent.get(&number).filter(|part| etag_of(part) == *etag) {
+                Some(part) => body.extend_from_slice(part),
+                None => return Err(Error::Refused { key: key.to_owned(), source: "no such part".into() }),
+            }
+        }
+        body.extend_from_slice(tail);
+        self.put(now, key, body.into(), options)
+    }
+
+    /// Gives up an upload; it is no error that it is gone.
+    pub fn abort_upload(&mut self, id: u64) {
+        self.uploads.remove(&id);
+    }
+
+    /// How many uploads are neither finished nor given up.
+    pub fn unfinished_uploads(&self) -> usize {
+        self.uploads.len()
     }
 
     /// Removes an object; says whether there was one.

@@ -11,7 +11,7 @@
 use bytes::Bytes;
 use futures_util::future::join_all;
 
-use super::{ListPage, ListRequest, PAGE, PutOptions, Store, Upload};
+use super::{ListPage, ListRequest, PAGE, PutOptions, Store, UnfinishedUpload, Upload};
 use crate::Error;
 
 /// Runs the whole suite below `prefix`, which must be empty; it leaves objects behind.
@@ -30,6 +30,9 @@ pub async fn check<S: Store>(store: &S, prefix: &str) {
     long_listings_with_delimiter_go_on(store, prefix).await;
     uploads_appear_whole(store, prefix).await;
     uploads_keep_their_condition(store, prefix).await;
+    uploads_are_left_and_taken_up(store, prefix).await;
+    uploads_are_taken_up_twice_without_harm(store, prefix).await;
+    uploads_that_are_gone_are_told_apart(store, prefix).await;
 }
 
 /// Body, size, tag and metadata, by `get` and by `head`; a later put replaces them; a delete removes them.
@@ -287,6 +290,76 @@ pub async fn uploads_keep_their_condition<S: Store>(store: &S, prefix: &str) {
         assert!(error.is_not_found() || error.is_conflict(), "the object is gone: {error:?}");
         assert!(store.head(&key).await.unwrap_err().is_not_found());
     }
+}
+
+/// Left after any number of bytes, by way of what a process can write down, the body is the same; the condition holds still.
+pub async fn uploads_are_left_and_taken_up<S: Store>(store: &S, prefix: &str) {
+    let key = format!("{prefix}/upload-left");
+    let body: Vec<u8> = (0..26_000_000_u32).map(|n| (n % 253) as u8).collect();
+    let options = PutOptions::if_absent().content_type("image/gif").metadata("generation", "g");
+    let mut upload = store.upload(&key, options.clone()).await.unwrap();
+    let mut rest = &body[..];
+    for size in [0, 10, 9_000_000, 0, 8_000_000, 500_000, 20_000_000] {
+        let (piece, after) = rest.split_at(size.min(rest.len()));
+        upload.write(Bytes::copy_from_slice(piece)).await.unwrap();
+        rest = after;
+        upload = store.take_up(&key, options.clone(), written_down(upload.leave()));
+    }
+    assert!(rest.is_empty() && store.head(&key).await.unwrap_err().is_not_found(), "nothing is visible yet");
+    let etag = upload.finish().await.unwrap();
+    let object = store.get(&key).await.unwrap();
+    assert!(object.body == body, "the body comes back");
+    assert_eq!(
+        (object.info.etag, object.info.metadata.get("generation").map(String::as_str)),
+        (etag, Some("g"))
+    );
+
+    for size in [10, 9_000_000] {
+        let mut late = store.upload(&key, PutOptions::if_absent()).await.unwrap();
+        late.write(Bytes::from(vec![1; size])).await.unwrap();
+        let late = store.take_up(&key, PutOptions::if_absent(), written_down(late.leave()));
+        assert!(late.finish().await.unwrap_err().is_conflict(), "there is one already");
+    }
+}
+
+/// Two processes that go on from the same place with the same bytes: one finishes, and what is there is whole.
+pub async fn uploads_are_taken_up_twice_without_harm<S: Store>(store: &S, prefix: &str) {
+    let key = format!("{prefix}/upload-twice");
+    let piece = |byte: u8| Bytes::from(vec![byte; 9_000_000]);
+    let mut upload = store.upload(&key, PutOptions::if_absent()).await.unwrap();
+    upload.write(piece(1)).await.unwrap();
+    let left = upload.leave();
+    let mut first = store.take_up(&key, PutOptions::if_absent(), left.clone());
+    let mut second = store.take_up(&key, PutOptions::if_absent(), left);
+    first.write(piece(2)).await.unwrap();
+    second.write(piece(2)).await.unwrap();
+    first.finish().await.unwrap();
+    let error = second.finish().await.unwrap_err();
+    assert!(error.is_conflict() || error.is_ambiguous() || error.is_not_found(), "{error:?}");
+    assert!(store.get(&key).await.unwrap().body == [piece(1), piece(2)].concat());
+}
+
+/// Aborted by whoever took it up; the other one learns that at its next part, or at its end.
+pub async fn uploads_that_are_gone_are_told_apart<S: Store>(store: &S, prefix: &str) {
+    let key = format!("{prefix}/upload-gone");
+    let piece = || Bytes::from(vec![1; 9_000_000]);
+    let mut upload = store.upload(&key, PutOptions::always()).await.unwrap();
+    upload.write(piece()).await.unwrap();
+    let left = upload.leave();
+    store.take_up(&key, PutOptions::always(), left.clone()).abort().await.unwrap();
+    let mut late = store.take_up(&key, PutOptions::always(), left.clone());
+    assert!(late.write(piece()).await.unwrap_err().is_not_found());
+    let error = store.take_up(&key, PutOptions::always(), left.clone()).finish().await.unwrap_err();
+    assert!(error.is_ambiguous() || error.is_not_found(), "{error:?}");
+    store.take_up(&key, PutOptions::always(), left).abort().await.expect("it may be gone");
+    assert!(store.head(&key).await.unwrap_err().is_not_found());
+}
+
+/// As another process finds it.
+fn written_down(unfinished: UnfinishedUpload) -> UnfinishedUpload {
+    let text = serde_json::to_string(&unfinished).unwrap();
+    let tail = unfinished.tail;
+    UnfinishedUpload { tail, ..serde_json::from_str(&text).unwrap() }
 }
 
 /// All keys and folders of a listing, page by page.

@@ -5,7 +5,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bytes::{Bytes, BytesMut};
 
-use super::{Bucket, ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, Upload};
+use super::{
+    Bucket, ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, UnfinishedUpload, Upload,
+};
 use crate::clock::Clock;
 use crate::{Error, Result};
 
@@ -60,9 +62,18 @@ impl<C: Clock + Clone + 'static> Store for MemoryStore<C> {
     }
 
     async fn upload(&self, key: &str, options: PutOptions) -> Result<Self::Upload> {
-        Ok(MemoryUpload { store: self.clone(), key: key.to_owned(), options, body: BytesMut::new() })
+        Ok(self.take_up(key, options, UnfinishedUpload::default()))
+    }
+
+    fn take_up(&self, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> Self::Upload {
+        let UnfinishedUpload { id, parts, tail } = unfinished;
+        let id = id.and_then(|id| id.parse().ok());
+        MemoryUpload { store: self.clone(), key: key.to_owned(), options, id, parts, gathered: tail.into() }
     }
 }
+
+/// Bytes of a part.
+const PART: usize = 1 << 20;
 
 /// An object being written to a [`MemoryStore`].
 #[derive(Debug)]
@@ -70,21 +81,41 @@ pub struct MemoryUpload<C> {
     store: MemoryStore<C>,
     key: String,
     options: PutOptions,
-    body: BytesMut,
+    id: Option<u64>,
+    parts: Vec<ETag>,
+    gathered: BytesMut,
 }
 
 impl<C: Clock + Clone + 'static> Upload for MemoryUpload<C> {
     async fn write(&mut self, bytes: Bytes) -> Result<()> {
-        self.body.extend_from_slice(&bytes);
+        self.gathered.extend_from_slice(&bytes);
+        while self.gathered.len() >= PART {
+            let part = self.gathered.split_to(PART).freeze();
+            let mut bucket = self.store.bucket();
+            let id = *self.id.get_or_insert_with(|| bucket.begin_upload());
+            self.parts.push(bucket.put_part(&self.key, id, self.parts.len() + 1, part)?);
+        }
         Ok(())
     }
 
     async fn finish(self) -> Result<ETag> {
-        self.store.put(&self.key, self.body.freeze(), self.options).await
+        let Some(id) = self.id else {
+            return self.store.put(&self.key, self.gathered.freeze(), self.options).await;
+        };
+        let now = self.store.clock.now();
+        self.store.bucket().complete_upload(now, &self.key, id, (&self.parts, &self.gathered), self.options)
     }
 
     async fn abort(self) -> Result<()> {
+        if let Some(id) = self.id {
+            self.store.bucket().abort_upload(id);
+        }
         Ok(())
+    }
+
+    fn leave(self) -> UnfinishedUpload {
+        let id = self.id.map(|id| id.to_string());
+        UnfinishedUpload { id, parts: self.parts, tail: self.gathered.freeze() }
     }
 }
 

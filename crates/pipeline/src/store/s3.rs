@@ -37,7 +37,9 @@ use aws_smithy_http_client::tls::{Provider, rustls_provider::CryptoMode};
 use aws_types::service_config::ServiceConfigKey;
 use bytes::{Bytes, BytesMut};
 
-use super::{ETag, ListPage, ListRequest, Listed, Object, ObjectInfo, PAGE, PutOptions, Store};
+use super::{
+    ETag, ListPage, ListRequest, Listed, Object, ObjectInfo, PAGE, PutOptions, Store, UnfinishedUpload,
+};
 use crate::clock::Timestamp;
 use crate::{Error, Result};
 
@@ -253,7 +255,11 @@ impl Store for S3Store {
     }
 
     async fn upload(&self, key: &str, options: PutOptions) -> Result<Self::Upload> {
-        Ok(S3Upload::new(self.clone(), key, options))
+        Ok(S3Upload::new(self.clone(), key, options, UnfinishedUpload::default()))
+    }
+
+    fn take_up(&self, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> Self::Upload {
+        S3Upload::new(self.clone(), key, options, unfinished)
     }
 }
 

@@ -88,7 +88,7 @@ const SCHEDULES: usize = 2;
 pub fn provoke(worlds: &[World], seed: u64, mutation: Option<Mutation>) -> Result<(), Box<Counterexample>> {
     let random = Randomness::seeded(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x70_6374);
     worlds.iter().try_for_each(|world| {
-        let mut memo = Memo::new(mutation);
+        let mut memo = Memo::new(world, mutation);
         let begin = State::begin(world, &mut memo);
         let begin = begin.map_err(|what| counterexample_of_schedule(world, what, &[]))?;
         let kinds = Kind::ALL.repeat(SCHEDULES);

@@ -8,6 +8,7 @@
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::num::NonZeroU64;
 use std::ops::Range;
 use std::pin::Pin;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,17 +19,24 @@ use std::time::Duration;
 use bytes::{Bytes, BytesMut};
 use rayfold_scene::AnimationSettings;
 
-use crate::assemble::{Animator, Encoding, Unfit};
-use crate::keys::{Part, ScriptName};
+use crate::animator::{Animator, Encoding, Unfit};
 use crate::manifest::Reason;
-use crate::render::{Drawing, Renderer};
 use crate::simulation::PIXELS;
-use crate::simulation::acting::{Play, film, picture};
+use crate::simulation::acting::{Drawer, Listed};
 use crate::simulation::engine::lock;
-use crate::store::{ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, Upload};
+use crate::simulation::explore::World;
+use crate::store::{
+    ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, UnfinishedUpload, Upload,
+};
 use crate::{
     Clock, Error, Invocation, Mutation, Policy, Randomness, Result, Timestamp, assemble, render_frame, sweep,
 };
+
+/// How long an invocation may run.
+const TIMEOUT: Duration = Duration::from_secs(900);
+
+/// What a frame takes where there is no time for a second one.
+const LONG_PUSH: Duration = Duration::from_secs(300);
 
 /// What an invocation works on.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -116,12 +124,20 @@ pub(super) struct Process {
 #[derive(Debug)]
 pub(super) struct Memo {
     standings: BTreeMap<u64, Arc<Standing>>,
+    manner: Manner,
+}
+
+/// How the steps work in a world.
+#[derive(Debug, Clone, Copy)]
+struct Manner {
     mutation: Option<Mutation>,
+    /// Whether an assembler has time for one frame and no more.
+    is_cut: bool,
 }
 
 impl Memo {
-    pub(super) fn new(mutation: Option<Mutation>) -> Self {
-        Memo { standings: BTreeMap::new(), mutation }
+    pub(super) fn new(world: &World, mutation: Option<Mutation>) -> Self {
+        Memo { standings: BTreeMap::new(), manner: Manner { mutation, is_cut: world.is_cut } }
     }
 
     /// Begins an invocation.
@@ -180,7 +196,7 @@ impl Memo {
         if let Some(known) = self.standings.get(&process.hash) {
             return known.clone();
         }
-        let standing = Arc::new(relive(process, self.mutation));
+        let standing = Arc::new(relive(process, self.manner));
         self.standings.insert(process.hash, standing.clone());
         standing
     }
@@ -236,9 +252,9 @@ impl Answer {
 }
 
 /// Runs the real step again from its beginning, giving it the answers in their order.
-fn relive(process: &Process, mutation: Option<Mutation>) -> Standing {
+fn relive(process: &Process, manner: Manner) -> Standing {
     let board = Board(Arc::new(Mutex::new(Slots { now: process.start, ..Slots::default() })));
-    let mut task = step(process.work.clone(), process.request_id.clone(), board.clone(), mutation);
+    let mut task = step(process.work.clone(), process.request_id.clone(), board.clone(), manner);
     let mut end = poll(&mut task);
     for Event { slot, answer, now, .. } in &process.history {
         board.answer(*slot, answer.clone(), *now);
@@ -251,17 +267,20 @@ fn relive(process: &Process, mutation: Option<Mutation>) -> Standing {
 
 type Task = Pin<Box<dyn Future<Output = Result<(), End>> + Send>>;
 
-fn step(work: Work, request_id: Arc<str>, board: Board, mutation: Option<Mutation>) -> Task {
+fn step(work: Work, request_id: Arc<str>, board: Board, manner: Manner) -> Task {
     Box::pin(async move {
         let (random, policy) = (Randomness::seeded(1), Policy::new(PIXELS));
         let clock = BoardClock(board.clone());
+        let joiner =
+            Joiner { board: board.clone(), push: if manner.is_cut { LONG_PUSH } else { Duration::ZERO } };
         let store = BoardStore(board);
-        let deadline = clock.now().after(Duration::from_secs(900));
-        let invocation =
-            Invocation::new(&store, &clock, &random, &policy, &request_id).until(deadline).breaking(mutation);
+        let deadline = clock.now().after(TIMEOUT);
+        let invocation = Invocation::new(&store, &clock, &random, &policy, &request_id)
+            .until(deadline)
+            .breaking(manner.mutation);
         let result = match &work {
-            Work::Render(key) => render_frame(&invocation, &Drawer, key).await.map(drop),
-            Work::Assemble(key) => assemble(&invocation, &Joiner, key).await.map(drop),
+            Work::Render(key) => render_frame(&invocation, &Drawer { bands: BANDS }, key).await.map(drop),
+            Work::Assemble(key) => assemble(&invocation, &joiner, key).await.map(drop),
             Work::Sweep => match sweep(&invocation).await {
                 Ok(swept) => swept.visits.into_iter().try_for_each(|(_, visit)| visit.map(drop)),
                 Err(error) => Err(error),
@@ -400,8 +419,12 @@ impl Store for BoardStore {
 
     /// Beginning an upload and sending its parts changes nothing that anyone sees, so it is no request here.
     async fn upload(&self, key: &str, options: PutOptions) -> Result<BoardUpload> {
+        Ok(self.take_up(key, options, UnfinishedUpload::default()))
+    }
+
+    fn take_up(&self, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> BoardUpload {
         let (store, key) = (BoardStore(self.0.clone()), key.to_owned());
-        Ok(BoardUpload { store, key, options, body: BytesMut::new() })
+        BoardUpload { store, key, options, body: unfinished.tail.into() }
     }
 }
 
@@ -425,52 +448,59 @@ impl Upload for BoardUpload {
     async fn abort(self) -> Result<()> {
         Ok(())
     }
-}
 
-/// Draws at once.
-struct Drawer;
-
-impl Renderer for Drawer {
-    fn most_bytes(&self) -> u64 {
-        1_000
-    }
-
-    async fn draw(&self, name: &ScriptName, script: Bytes, part: Part) -> Result<Drawing> {
-        Ok(match (Play::of(&script), part) {
-            (Play::Frame, None) | (Play::Split(_), Some(_)) => {
-                Drawing::Frame(picture(name, &script, part).into())
-            }
-            (Play::Split(count), None) => Drawing::Split(count),
-            (Play::Bad | Play::Hang | Play::Crash | Play::Frame, _) => {
-                Drawing::Fault(Reason::new(format!("{name}.txt:1:1: bad")))
-            }
-        })
+    /// No part has been sent.
+    fn leave(self) -> UnfinishedUpload {
+        UnfinishedUpload { tail: self.body.freeze(), ..UnfinishedUpload::default() }
     }
 }
 
-/// Lists frames at once.
-struct Joiner;
+/// Of a frame that is too big.
+const BANDS: NonZeroU64 = NonZeroU64::new(2).expect("two is not zero");
+
+/// Lists frames, at once or in the time of one.
+struct Joiner {
+    board: Board,
+    push: Duration,
+}
 
 struct Joined {
-    settings: AnimationSettings,
-    pictures: Vec<String>,
+    board: Board,
+    push: Duration,
+    listed: Listed,
+}
+
+impl Joiner {
+    fn joined(&self, listed: Listed) -> Joined {
+        Joined { board: self.board.clone(), push: self.push, listed }
+    }
 }
 
 impl Animator for Joiner {
     type Encoding = Joined;
 
     fn begin(&self, settings: &AnimationSettings) -> Result<Joined, Reason> {
-        Ok(Joined { settings: *settings, pictures: Vec::new() })
+        Ok(self.joined(Listed::new(settings)))
+    }
+
+    async fn resume(&self, state: Bytes) -> Result<Joined, Reason> {
+        Listed::resume(&state).map(|listed| self.joined(listed))
     }
 }
 
 impl Encoding for Joined {
     async fn push(&mut self, frame: Bytes) -> Result<Bytes, Unfit> {
-        self.pictures.push(String::from_utf8_lossy(&frame).into_owned());
+        let mut slots = lock(&self.board.0);
+        slots.now = slots.now.after(self.push);
+        self.listed.push(&frame);
         Ok(Bytes::new())
     }
 
-    async fn finish(self) -> Result<Bytes, Reason> {
-        Ok(film(&self.settings, &self.pictures).into())
+    async fn finish(mut self) -> Result<Bytes, Reason> {
+        Ok(self.listed.take())
+    }
+
+    async fn suspend(self) -> Result<Bytes, Reason> {
+        self.listed.suspend()
     }
 }

@@ -72,7 +72,7 @@ pub fn explore(
     mutation: Option<Mutation>,
     most: u64,
 ) -> Result<Explored, Box<Counterexample>> {
-    let mut memo = Memo::new(mutation);
+    let mut memo = Memo::new(world, mutation);
     let failed =
         |what| Box::new(Counterexample { world: world.name, what, steps: Vec::new(), states: 0, price: 0 });
     let begin = State::begin(world, &mut memo).map_err(failed)?;
@@ -146,7 +146,7 @@ impl Search<'_> {
             choices.push(*choice);
             step = self.steps.get(*from).and_then(Option::as_ref);
         }
-        let mut memo = Memo::new(self.mutation);
+        let mut memo = Memo::new(self.world, self.mutation);
         let mut told = Vec::new();
         let mut state = State::begin(self.world, &mut memo).ok();
         for choice in choices.into_iter().rev() {

@@ -12,7 +12,7 @@ use super::process::{Answer, End, Memo, Process, Request, Work};
 use super::{Budget, World};
 use crate::keys::{Animation, Key};
 use crate::manifest::Manifest;
-use crate::simulation::expected::Expected;
+use crate::simulation::expected::{Expected, follows};
 use crate::store::{Bucket, ETag, PutOptions};
 use crate::{Error, Timestamp};
 
@@ -399,17 +399,10 @@ impl State {
         match key.parse::<Key>() {
             Err(_) => Err(format!("{key} was written, which is no key")),
             Ok(Key::Manifest { animation }) => {
-                let revision = |body: &[u8]| {
-                    Manifest::decode(&animation, body)
-                        .map(|manifest| manifest.head.revision)
-                        .unwrap_or_default()
-                };
-                let before = before.map_or(0, |(_, body)| revision(&body));
+                let before = before.and_then(|(_, body)| Manifest::decode(&animation, &body).ok());
                 let body = self.contents.bucket.get(key).map(|object| object.body).unwrap_or_default();
-                match revision(&body) {
-                    next if next == before + 1 => Ok(()),
-                    next => Err(format!("revision {next} follows {before}")),
-                }
+                let next = Manifest::decode(&animation, &body).map_err(|error| error.to_string())?;
+                follows(&next, before.as_ref())
             }
             Ok(Key::Gif { .. }) => {
                 let is_same = before.as_ref().is_some_and(|(of, _)| of == etag);

@@ -13,6 +13,8 @@ pub struct World {
     pub(super) past: usize,
     /// Whether the event of the past's last claim comes once more.
     pub(super) is_claimed_again: bool,
+    /// Whether an assembler has time for one frame, so that a GIF of several takes as many invocations.
+    pub(super) is_cut: bool,
     /// What may go wrong.
     pub budget: Budget,
 }
@@ -26,17 +28,24 @@ const A: Option<&str> = Some("frame 0");
 const B: Option<&str> = Some("frame 1");
 /// A third one.
 const C: Option<&str> = Some("frame 2");
+/// One frame that is drawn in bands.
+const BIG: Option<&str> = Some("big frame 0");
 /// It goes.
 const GONE: Option<&str> = None;
 
 fn world(name: &'static str, past: usize, budget: Budget, acts: &[(&str, Option<&'static str>)]) -> World {
     let acts = acts.iter().map(|(file, text)| (format!("scripts/a/{file}"), *text)).collect();
-    World { name, acts, past, is_claimed_again: false, budget }
+    World { name, acts, past, is_claimed_again: false, is_cut: false, budget }
 }
 
 /// Between the past and what follows an assembler is woken that has nothing to do: events may come late, and again.
 fn claimed_again(world: World) -> World {
     World { is_claimed_again: true, ..world }
+}
+
+/// Every frame of a GIF takes an invocation of its own.
+fn cut(world: World) -> World {
+    World { is_cut: true, ..world }
 }
 
 /// All of them.
@@ -67,6 +76,10 @@ pub fn worlds() -> Vec<World> {
         ("2.txt", GONE),
         ("2.txt", A),
     ];
+    let big = [("1.txt", BIG)];
+    let big_overwrite = [("1.txt", BIG), ("1.txt", A)];
+    let big_revert = [("1.txt", BIG), ("1.txt", A), ("1.txt", BIG)];
+    let joined = [("1.txt", A), ("2.txt", A), ("1.txt", B)];
     let announced = [("animation.json", Some("{\"frames\": 2}")), ("1.txt", A), ("2.txt", A)];
     vec![
         world("one frame, a kill", 0, kill, &one),
@@ -104,12 +117,28 @@ pub fn worlds() -> Vec<World> {
         world("the second of two frames comes, goes and comes back", 2, CALM, &returning),
         world("three frames, the last one new", 2, kill, &three),
         world("three frames", 1, CALM, &three),
+        world("a frame in bands", 0, CALM, &big),
+        world("a frame in bands, a kill", 0, kill, &big),
+        world("a frame in bands, a kill and a late write", 0, late, &big),
+        world("a frame in bands, a lost answer", 0, loss, &big),
+        world("a frame in bands, an event twice", 0, twice, &big),
+        world("a frame in bands, an event lost", 0, lost, &big),
+        world("a frame in bands, overwritten", 0, CALM, &big_overwrite),
+        world("a frame in bands, changed and changed back", 0, CALM, &big_revert),
+        cut(world("two frames in two pieces, a kill", 1, kill, &two)),
+        cut(world("two frames in two pieces, a kill and a late write", 1, late, &two)),
+        cut(world("two frames in two pieces, a lost answer", 1, loss, &two)),
+        cut(world("two frames in two pieces, an event twice", 1, twice, &two)),
+        cut(world("two frames in two pieces, the first overwritten", 1, CALM, &joined)),
+        cut(world("two frames in two pieces, one deleted", 1, CALM, &delete)),
+        cut(world("two frames in two pieces, one changed and changed back when done", 2, CALM, &flicker)),
+        cut(world("three frames in pieces", 2, CALM, &three)),
     ]
 }
 
 /// Those in which few schedules show much: what [`super::provoke`] is best given.
 pub fn provoking() -> Vec<World> {
-    const NAMES: [&str; 10] = [
+    const NAMES: [&str; 12] = [
         "one frame, a kill",
         "one frame, an event twice",
         "one frame, deleted when done, a lost answer",
@@ -120,6 +149,8 @@ pub fn provoking() -> Vec<World> {
         "one frame, changed and changed back while an assembler looks",
         "one of two frames, changed and changed back",
         "the second of two frames comes, goes and comes back",
+        "a frame in bands",
+        "two frames in two pieces, the first overwritten",
     ];
     worlds().into_iter().filter(|world| NAMES.contains(&world.name)).collect()
 }

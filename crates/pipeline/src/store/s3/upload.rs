@@ -8,7 +8,7 @@ use bytes::{Bytes, BytesMut};
 
 use super::S3Store;
 use super::answers::error_of;
-use crate::store::{Condition, ETag, PutOptions, Store, Upload};
+use crate::store::{Condition, ETag, PutOptions, Store, UnfinishedUpload, Upload};
 use crate::{Error, Result};
 
 /// Of all parts but the last. S3 allows 10,000 parts of at least 5 MiB: this allows objects of 78 GiB.
@@ -26,8 +26,12 @@ pub struct S3Upload {
 }
 
 impl S3Upload {
-    pub(super) fn new(store: S3Store, key: &str, options: PutOptions) -> Self {
-        Self { store, key: key.to_owned(), options, gathered: BytesMut::new(), id: None, parts: Vec::new() }
+    /// As far as it has come already.
+    pub(super) fn new(store: S3Store, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> Self {
+        let UnfinishedUpload { id, parts, tail } = unfinished;
+        let parts = (1..).zip(parts).map(|(number, etag)| part(number, Some(etag.as_str().to_owned())));
+        let (key, parts) = (key.to_owned(), parts.collect());
+        Self { store, key, options, gathered: tail.into(), id, parts }
     }
 
     async fn begun(&mut self) -> Result<String> {
@@ -65,8 +69,7 @@ impl S3Upload {
             .send()
             .await
             .map_err(|error| error_of(&self.key, error))?;
-        let part = CompletedPart::builder().part_number(number).set_e_tag(answer.e_tag);
-        self.parts.push(part.build());
+        self.parts.push(part(number, answer.e_tag));
         Ok(())
     }
 
@@ -147,6 +150,15 @@ impl Upload for S3Upload {
             None => Ok(()),
         }
     }
+
+    fn leave(self) -> UnfinishedUpload {
+        let etags = self.parts.iter().map(|part| ETag::new(part.e_tag().unwrap_or_default()));
+        UnfinishedUpload { id: self.id, parts: etags.collect(), tail: self.gathered.freeze() }
+    }
+}
+
+fn part(number: i32, etag: Option<String>) -> CompletedPart {
+    CompletedPart::builder().part_number(number).set_e_tag(etag).build()
 }
 
 /// `If-None-Match` and `If-Match`.

@@ -1,0 +1,72 @@
+//! What a program without the feature `network` says of the subcommands that it lacks.
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+
+/// What `network` has.
+const SUBCOMMANDS: [&str; 8] = ["studio", "cost", "submit", "status", "fetch", "retry", "remove", "dev"];
+
+/// Ends the page of help.
+pub(crate) const HELP: &str = "\
+Examples:
+  rayfold render scenes/hello -o hello.gif
+      render a folder of scripts to an animation
+  rayfold check scenes/hello
+      show what is wrong with its scripts
+
+This is the renderer alone. studio, cost, submit, status, fetch, retry, remove and dev come with the
+whole program: `cargo install --path crates/cli`, or `cargo rayfold` in place of `cargo render`.
+
+Exit codes: 0 done, 1 the input or the rendering failed, 2 wrong usage, 130 interrupted.";
+
+/// Where to find the subcommand that was asked for, if it is one that this program could have.
+pub(crate) fn missing(error: &clap::Error) -> Option<String> {
+    let name = match error.get(ContextKind::InvalidSubcommand) {
+        Some(ContextValue::String(name)) if error.kind() == ErrorKind::InvalidSubcommand => name,
+        _ => return None,
+    };
+    SUBCOMMANDS.contains(&name.as_str()).then(|| {
+        format!(
+            "error: this program is the renderer alone, without `{name}`\n\n  tip: `cargo rayfold {name}` builds the \
+             whole where the sources are, `cargo install --path crates/cli` installs it"
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Command;
+
+    use super::*;
+
+    fn asked_for(name: &str) -> clap::Error {
+        let renderer = Command::new("rayfold").subcommand_required(true).subcommand(Command::new("render"));
+        renderer.try_get_matches_from(["rayfold", name]).unwrap_err()
+    }
+
+    #[test]
+    #[cfg(all(unix, feature = "network"))]
+    fn these_are_the_subcommands_of_the_whole_program() {
+        let whole =
+            <crate::network::Command as clap::Subcommand>::augment_subcommands(Command::new("rayfold"));
+        let names: Vec<_> = whole.get_subcommands().map(Command::get_name).collect();
+        assert_eq!(names, SUBCOMMANDS);
+    }
+
+    #[test]
+    fn each_is_in_the_help_and_told_where_it_is() {
+        for name in SUBCOMMANDS {
+            assert!(HELP.contains(name), "{name}");
+            assert!(
+                missing(&asked_for(name)).unwrap().contains(&format!("`cargo rayfold {name}`")),
+                "{name}"
+            );
+        }
+    }
+
+    #[test]
+    fn of_what_no_program_has_it_says_nothing() {
+        for name in ["rendr", "", "--studio"] {
+            assert_eq!(missing(&asked_for(name)), None, "{name}");
+        }
+    }
+}

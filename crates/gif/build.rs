@@ -1,0 +1,31 @@
+//! Tells one encoder from another: a hash of the sources, and of the versions of what they use, which a suspended animation
+//! carries.
+//!
+//! What one encoder wrote down is to be taken up by the same one alone. Nobody has to remember to raise a number.
+
+use std::path::Path;
+use std::{fs, io};
+
+/// FNV-1a, 64 bits.
+const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+const PRIME: u64 = 0x0000_0100_0000_01b3;
+
+fn main() -> io::Result<()> {
+    let (sources, versions) = (Path::new("src"), Path::new("../../Cargo.lock"));
+    println!("cargo::rerun-if-changed={}", sources.display());
+    println!("cargo::rerun-if-changed={}", versions.display());
+    let mut files = fs::read_dir(sources)?.map(|entry| Ok(entry?.path())).collect::<io::Result<Vec<_>>>()?;
+    files.sort();
+    files.push(versions.into());
+    let mut hash = OFFSET;
+    for file in files {
+        let name = file.file_name().unwrap_or_default().as_encoded_bytes();
+        // Git may have written lines with carriage returns.
+        let text = fs::read(&file)?;
+        for byte in name.iter().chain(text.iter().filter(|byte| **byte != b'\r')) {
+            hash = (hash ^ u64::from(*byte)).wrapping_mul(PRIME);
+        }
+    }
+    println!("cargo::rustc-env=RAYFOLD_GIF_SOURCES={hash}");
+    Ok(())
+}

@@ -1,0 +1,124 @@
+//! An animation between two frames as bytes, so that another process can go on with it.
+//!
+//! Says how numbers and pixels are written; what an encoder has to write, its parts say themselves. A state begins with a
+//! mark and the hash of the encoder's sources: another version might go on with other bytes, so it refuses. The rest is
+//! compressed by gzip, whose checksum finds damage.
+
+use std::io::{self, Read, Write};
+
+use flate2::Compression;
+use flate2::read::GzDecoder;
+use flate2::write::GzEncoder;
+
+use crate::error::Error;
+
+const MARK: [u8; 8] = *b"rayfgif\n";
+
+/// The hash of the encoder's sources, by `build.rs`.
+const SOURCES: &str = env!("RAYFOLD_GIF_SOURCES");
+
+/// Most pixels are seen as they are meant, or nearly: little effort makes them small.
+const EFFORT: Compression = Compression::fast();
+
+/// Writes a state.
+pub(crate) struct StateWriter(GzEncoder<Vec<u8>>);
+
+impl StateWriter {
+    pub(crate) fn new() -> Self {
+        let mut bytes = MARK.to_vec();
+        bytes.extend_from_slice(&version().to_le_bytes());
+        Self(GzEncoder::new(bytes, EFFORT))
+    }
+
+    pub(crate) fn bytes(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.0.write_all(bytes)
+    }
+
+    pub(crate) fn u16(&mut self, number: u16) -> io::Result<()> {
+        self.bytes(&number.to_le_bytes())
+    }
+
+    pub(crate) fn u64(&mut self, number: u64) -> io::Result<()> {
+        self.bytes(&number.to_le_bytes())
+    }
+
+    pub(crate) fn f32(&mut self, number: f32) -> io::Result<()> {
+        self.bytes(&number.to_le_bytes())
+    }
+
+    pub(crate) fn f64(&mut self, number: f64) -> io::Result<()> {
+        self.bytes(&number.to_le_bytes())
+    }
+
+    pub(crate) fn finish(self) -> io::Result<Vec<u8>> {
+        self.0.finish()
+    }
+}
+
+/// Reads a state. What cannot be read is [`Error::State`].
+pub(crate) struct StateReader<'a>(GzDecoder<&'a [u8]>);
+
+impl<'a> StateReader<'a> {
+    pub(crate) fn new(state: &'a [u8]) -> Result<Self, Error> {
+        let Some(rest) = state.strip_prefix(&MARK) else { return Err(damaged("it is none of this encoder")) };
+        let Some((found, rest)) = rest.split_first_chunk() else { return Err(damaged("it is cut off")) };
+        if *found != version().to_le_bytes() {
+            return Err(Error::StateVersion);
+        }
+        Ok(Self(GzDecoder::new(rest)))
+    }
+
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], Error> {
+        let mut array = [0; N];
+        self.0.read_exact(&mut array).map_err(unreadable)?;
+        Ok(array)
+    }
+
+    /// So many bytes; memory grows with what is there, not with what is asked for.
+    pub(crate) fn bytes(&mut self, count: usize) -> Result<Vec<u8>, Error> {
+        let mut bytes = Vec::new();
+        self.0.by_ref().take(count as u64).read_to_end(&mut bytes).map_err(unreadable)?;
+        if bytes.len() == count { Ok(bytes) } else { Err(damaged("it is cut off")) }
+    }
+
+    pub(crate) fn u8(&mut self) -> Result<u8, Error> {
+        self.array().map(|[byte]| byte)
+    }
+
+    pub(crate) fn u16(&mut self) -> Result<u16, Error> {
+        self.array().map(u16::from_le_bytes)
+    }
+
+    pub(crate) fn u64(&mut self) -> Result<u64, Error> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    pub(crate) fn f32(&mut self) -> Result<f32, Error> {
+        self.array().map(f32::from_le_bytes)
+    }
+
+    pub(crate) fn f64(&mut self) -> Result<f64, Error> {
+        self.array().map(f64::from_le_bytes)
+    }
+
+    /// Checks that nothing follows, and with it the checksum.
+    pub(crate) fn finish(mut self) -> Result<(), Error> {
+        match self.0.read(&mut [0]).map_err(unreadable)? {
+            0 => Ok(()),
+            _ => Err(damaged("something follows its end")),
+        }
+    }
+}
+
+fn version() -> u64 {
+    // A number, as `build.rs` wrote it.
+    SOURCES.parse().unwrap_or_default()
+}
+
+fn unreadable(source: io::Error) -> Error {
+    Error::State { source }
+}
+
+pub(crate) fn damaged(problem: &'static str) -> Error {
+    unreadable(io::Error::new(io::ErrorKind::InvalidData, problem))
+}

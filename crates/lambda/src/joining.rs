@@ -1,0 +1,128 @@
+//! Bands of a frame, each a PNG, to the PNG of the frame: row by row through the encoder that draws in one piece, so that the
+//! bytes are the same. Holds the file that it writes, and one band.
+
+use std::num::NonZeroU64;
+
+use bytes::Bytes;
+use rayfold_pipeline::Joining;
+use rayfold_pipeline::keys::Band;
+use rayfold_pipeline::manifest::Reason;
+
+use crate::{png, pool};
+
+/// A frame being put together.
+pub struct PngJoining {
+    size: (u32, u32),
+    /// Those to come.
+    bands: Vec<Band>,
+    /// `None` while a band is worked on, and after a failure.
+    rows: Option<png::Rows>,
+}
+
+impl PngJoining {
+    /// A frame of so many columns and rows, in so many bands.
+    pub(crate) fn begin(size: (u32, u32), count: NonZeroU64) -> Result<Self, Reason> {
+        if count.get() > u64::from(size.1) {
+            return Err(Reason::new(format!("a frame of {} rows has no {count} bands", size.1)));
+        }
+        let rows = png::Rows::begin(size.0, size.1).map_err(|error| Reason::new(error.to_string()))?;
+        let mut bands: Vec<Band> = Band::all(count).collect();
+        bands.reverse();
+        Ok(Self { size, bands, rows: Some(rows) })
+    }
+}
+
+impl Joining for PngJoining {
+    async fn push(&mut self, band: Bytes) -> Result<(), Reason> {
+        let failed = || Reason::new("the encoder failed on an earlier band");
+        let next = *self.bands.last().ok_or_else(|| Reason::new("the frame has all its bands"))?;
+        let mut rows = self.rows.take().ok_or_else(failed)?;
+        let (width, height) = self.size;
+        let work = move || {
+            let expected = (width, next.rows(height).len() as u32);
+            let most_pixels = u64::from(expected.0) * u64::from(expected.1);
+            let image = match png::decode(&band, most_pixels) {
+                Ok(image) if image.dimensions() == expected => image,
+                Ok(image) => {
+                    let (across, down) = image.dimensions();
+                    let (width, height) = expected;
+                    let what = format!("it has {across} x {down} pixels: expected {width} x {height}");
+                    return (Some(rows), Err(Reason::new(what)));
+                }
+                Err(error) => return (Some(rows), Err(Reason::new(error.to_string()))),
+            };
+            match rows.push(image.as_raw()) {
+                Ok(()) => (Some(rows), Ok(())),
+                Err(error) => (None, Err(Reason::new(error.to_string()))),
+            }
+        };
+        let (rows, pushed) = pool::run(work).await.unwrap_or_else(|| (None, Err(failed())));
+        self.rows = rows;
+        pushed?;
+        self.bands.pop();
+        Ok(())
+    }
+
+    async fn finish(mut self) -> Result<Bytes, Reason> {
+        let rows = self.rows.take().ok_or_else(|| Reason::new("the encoder failed on a band"))?;
+        rows.finish().map_err(|error| Reason::new(error.to_string()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use image::RgbImage;
+
+    use super::*;
+
+    fn picture() -> RgbImage {
+        RgbImage::from_fn(23, 17, |x, y| image::Rgb([(x * y) as u8, x as u8, (y * 31) as u8]))
+    }
+
+    fn bands(count: NonZeroU64) -> Vec<Bytes> {
+        let picture = picture();
+        let cut = |band: Band| {
+            let rows = band.rows(17);
+            let band = image::imageops::crop_imm(&picture, 0, rows.start, 23, rows.end - rows.start);
+            png::encode(&band.to_image()).unwrap()
+        };
+        Band::all(count).map(cut).collect()
+    }
+
+    #[tokio::test]
+    async fn bands_put_together_are_the_file_of_the_whole() {
+        for count in 1..=17 {
+            let count = NonZeroU64::new(count).unwrap();
+            let mut joining = PngJoining::begin((23, 17), count).unwrap();
+            for band in bands(count) {
+                joining.push(band).await.unwrap();
+            }
+            assert!(joining.finish().await.unwrap() == png::encode(&picture()).unwrap(), "{count}");
+        }
+    }
+
+    #[tokio::test]
+    async fn what_is_no_such_band_adds_nothing() {
+        let count = NonZeroU64::new(2).unwrap();
+        let right = bands(count);
+        let mut joining = PngJoining::begin((23, 17), count).unwrap();
+        // The second one has a row more; others are none at all.
+        for wrong in [right[1].clone(), right[0].slice(..40), Bytes::from("garbage"), Bytes::new()] {
+            assert!(joining.push(wrong).await.is_err());
+        }
+        joining.push(right[0].clone()).await.unwrap();
+        assert!(joining.push(right[0].clone()).await.is_err());
+        joining.push(right[1].clone()).await.unwrap();
+        assert!(joining.push(right[1].clone()).await.is_err(), "it has all its bands");
+        assert!(joining.finish().await.unwrap() == png::encode(&picture()).unwrap());
+    }
+
+    #[tokio::test]
+    async fn a_frame_with_bands_missing_is_none() {
+        let count = NonZeroU64::new(3).unwrap();
+        let mut joining = PngJoining::begin((23, 17), count).unwrap();
+        joining.push(bands(count)[0].clone()).await.unwrap();
+        assert!(joining.finish().await.is_err());
+        assert!(PngJoining::begin((23, 17), NonZeroU64::new(18).unwrap()).is_err());
+    }
+}

@@ -1,0 +1,54 @@
+//! What makes a GIF of frames: the traits that whoever runs the assembler implements. Knows no bucket.
+
+use std::future::Future;
+
+use bytes::Bytes;
+use rayfold_scene::AnimationSettings;
+
+use crate::manifest::Reason;
+
+/// What encodes. The assemble function brings a GIF encoder, the simulation something smaller.
+pub trait Animator: Send + Sync {
+    /// An animation being encoded.
+    type Encoding: Encoding;
+
+    /// Starts an animation; the reason when it cannot be.
+    fn begin(&self, settings: &AnimationSettings) -> Result<Self::Encoding, Reason>;
+
+    /// Goes on with an animation that was [suspended](Encoding::suspend), with the bytes that it would have had; the reason
+    /// when that cannot be: the state is damaged, or of another version of the encoder.
+    fn resume(&self, state: Bytes) -> impl Future<Output = Result<Self::Encoding, Reason>> + Send;
+}
+
+/// An animation being encoded: frames in, pieces of the file out.
+pub trait Encoding: Send {
+    /// Adds the next frame, a PNG, and gives what of the file is ready.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with this frame, or with all of them together.
+    fn push(&mut self, frame: Bytes) -> impl Future<Output = Result<Bytes, Unfit>> + Send;
+
+    /// Gives the rest of the file.
+    ///
+    /// # Errors
+    ///
+    /// The reason why these frames make no animation; it would be the same next time.
+    fn finish(self) -> impl Future<Output = Result<Bytes, Reason>> + Send;
+
+    /// Stops between two frames: gives a state that another process can go on with.
+    ///
+    /// # Errors
+    ///
+    /// The reason why these frames make no animation.
+    fn suspend(self) -> impl Future<Output = Result<Bytes, Reason>> + Send;
+}
+
+/// Why a frame cannot be added to an animation.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Unfit {
+    /// The frame is none: someone has put something else in its place. Drawn again it may be one.
+    Corrupt(Reason),
+    /// The frame does not go with the others; it would be the same next time.
+    Unlike(Reason),
+}

@@ -1,0 +1,264 @@
+//! Building a GIF, in one piece or in several.
+//!
+//! Memory does not grow with the number of frames: they are fetched a few ahead of the encoder, and what it writes goes
+//! out part by part. When the time of an invocation would not do for one more frame, the GIF is written down as it stands
+//! ([`checkpoint`](crate::checkpoint)) and left to the next invocation; both together write the bytes that one would have
+//! written. Each takes a frame at least; a set of which not even one fits, or that takes a day, is refused.
+
+use std::time::Duration;
+
+use futures_util::stream::{self, StreamExt};
+
+use crate::animator::{Animator, Encoding, Unfit};
+use crate::checkpoint::{Checkpoint, CheckpointHead, TakenUp};
+use crate::invocation::{Invocation, Mutation};
+use crate::keys::{Animation, Receipt, Tag};
+use crate::lease::Held;
+use crate::manifest::{Frame, FrameState, Head, Manifest, Reason};
+use crate::store::{Condition, ETag, ObjectInfo, PutOptions, Store, Upload};
+use crate::{Clock, Error, Result, Timestamp};
+
+/// The name of the GIF's metadata that holds its generation.
+pub const GENERATION: &str = "generation";
+
+/// The most invocations that may build a GIF, one after the other. 15 minutes each are 22 hours and a half: after a day the
+/// bucket's rules remove the unfinished upload, and all would begin anew.
+pub const MOST_PIECES: u32 = 90;
+
+/// How a build ended.
+pub(crate) enum Built<'a> {
+    /// The GIF is put, as this version.
+    Put(ETag),
+    /// It is left after so many frames, for the next invocation to go on with.
+    Left(u64),
+    /// A frame is gone, or someone else's GIF came first: look again.
+    Stale,
+    /// This frame cannot be read.
+    Corrupt(&'a Frame, Reason),
+    /// These frames make no GIF.
+    Refused(Reason),
+}
+
+/// How far the encoder came.
+enum Encoded<'a> {
+    /// It has taken all frames.
+    All,
+    /// It has taken so many, and there is no time for more.
+    SoFar(u64),
+    /// This ends the build.
+    No(Built<'a>),
+}
+
+impl<S: Store, C: Clock> Invocation<'_, S, C> {
+    /// Writes the GIF of a manifest that is done over the version that was there, or fails to. `held`: the lease.
+    pub(crate) async fn build<'m, A: Animator>(
+        &self,
+        animator: &A,
+        manifest: &'m Manifest,
+        gif: Option<ObjectInfo>,
+        began: Timestamp,
+        held: &mut Held,
+    ) -> Result<Built<'m>> {
+        let head = &manifest.head;
+        let replaces = gif.map(|gif| gif.etag);
+        let condition = match &replaces {
+            _ if self.breaks(Mutation::DropGifCondition) => Condition::Always,
+            None => Condition::IfAbsent,
+            Some(etag) => Condition::IfMatch(etag.clone()),
+        };
+        let options = PutOptions { condition, ..PutOptions::always() }
+            .content_type("image/gif")
+            .metadata(GENERATION, head.generation.as_str());
+        let mut taken_up = match self.take_up(animator, head, replaces.as_ref(), &options, held).await? {
+            Some(taken_up) => taken_up,
+            None => {
+                let encoding = match animator.begin(&head.settings.value.unwrap_or_default()) {
+                    Ok(encoding) => encoding,
+                    Err(reason) => return Ok(Built::Refused(reason)),
+                };
+                let upload = self.store.upload(&head.animation.gif(), options).await?;
+                TakenUp { encoding, upload, frames: 0, pieces: 0 }
+            }
+        };
+        let ended = match self.encode(&mut taken_up, manifest, began).await {
+            Ok(Encoded::All) => return self.finish(taken_up, head, held).await,
+            Ok(Encoded::SoFar(frames)) => {
+                let TakenUp { encoding, upload, pieces, .. } = taken_up;
+                let pieces = pieces + 1;
+                if pieces == MOST_PIECES {
+                    let reason = Reason::new(format!(
+                        "{frames} of {} frames were assembled in {MOST_PIECES} invocations: give the assemble function \
+                         more time or memory and retry, or fetch the frames and assemble them locally",
+                        head.total
+                    ));
+                    return self.give_up(upload, head, held, Ok(Built::Refused(reason))).await;
+                }
+                let encoding = match encoding.suspend().await {
+                    Ok(encoding) => encoding,
+                    Err(reason) => return self.give_up(upload, head, held, Ok(Built::Refused(reason))).await,
+                };
+                let of = CheckpointHead { generation: head.generation.clone(), replaces, frames, pieces };
+                self.put_checkpoint(head, Checkpoint { head: of, upload: upload.leave(), encoding }).await?;
+                held.has_checkpoint = true;
+                return Ok(Built::Left(frames));
+            }
+            Ok(Encoded::No(ended)) => Ok(ended),
+            // What is written down stands: the next attempt goes on from there.
+            Err(error) if held.has_checkpoint && (error.is_retryable() || error.is_out_of_time()) => {
+                return Err(error);
+            }
+            // The upload that was taken up is gone.
+            Err(error) if held.has_checkpoint && error.is_not_found() => Ok(Built::Stale),
+            Err(error) => Err(error),
+        };
+        self.give_up(taken_up.upload, head, held, ended).await
+    }
+
+    async fn give_up<'m>(
+        &self,
+        upload: S::Upload,
+        head: &Head,
+        held: &mut Held,
+        ended: Result<Built<'m>>,
+    ) -> Result<Built<'m>> {
+        upload.abort().await?;
+        self.drop_checkpoint(head, held).await?;
+        ended
+    }
+
+    async fn finish<'m, E: Encoding>(
+        &self,
+        made: TakenUp<E, S::Upload>,
+        head: &Head,
+        held: &mut Held,
+    ) -> Result<Built<'m>> {
+        let TakenUp { encoding, mut upload, .. } = made;
+        let rest = match encoding.finish().await {
+            Ok(rest) => rest,
+            Err(reason) => return self.give_up(upload, head, held, Ok(Built::Refused(reason))).await,
+        };
+        if let Err(error) = upload.write(rest).await {
+            return match error.is_retryable() {
+                // What is written down stands.
+                true => Err(error),
+                false if held.has_checkpoint && error.is_not_found() => {
+                    self.give_up(upload, head, held, Ok(Built::Stale)).await
+                }
+                false => self.give_up(upload, head, held, Err(error)).await,
+            };
+        }
+        let finished = upload.finish().await;
+        // Whatever came of it, nobody goes on with this upload.
+        self.drop_checkpoint(head, held).await?;
+        match finished {
+            Ok(etag) => Ok(Built::Put(etag)),
+            Err(error) if error.is_conflict() || error.is_not_found() || error.is_retryable() => {
+                Ok(Built::Stale)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Fetches the frames that the encoder has not taken, a few ahead of it, and sends what it writes.
+    async fn encode<'m, E: Encoding>(
+        &self,
+        made: &mut TakenUp<E, S::Upload>,
+        manifest: &'m Manifest,
+        began: Timestamp,
+    ) -> Result<Encoded<'m>> {
+        let TakenUp { encoding, upload, frames: before, .. } = made;
+        let animation = &manifest.head.animation;
+        let keys = manifest.frames.iter().filter_map(|frame| Some((frame, frame_key(animation, frame)?)));
+        let keys = keys.skip(usize::try_from(*before).unwrap_or(usize::MAX));
+        let fetches: Vec<_> =
+            keys.map(|(frame, key)| async move { Ok::<_, Error>((frame, self.get(&key).await?)) }).collect();
+        let to_come = fetches.len() as u64;
+        let mut images = stream::iter(fetches).buffered(self.policy.prefetch);
+        let start = self.clock.now();
+        let (mut pushed, mut last, mut longest) = (0_u64, start, Duration::ZERO);
+        while let Some(image) = images.next().await {
+            let (frame, Some(image)) = image? else { return Ok(Encoded::No(Built::Stale)) };
+            match encoding.push(image.body).await {
+                Ok(piece) if piece.is_empty() => {}
+                Ok(piece) => upload.write(piece).await?,
+                Err(Unfit::Corrupt(reason)) => return Ok(Encoded::No(Built::Corrupt(frame, reason))),
+                Err(Unfit::Unlike(reason)) => return Ok(Encoded::No(Built::Refused(reason))),
+            }
+            pushed += 1;
+            let now = self.clock.now();
+            (last, longest) = (now, longest.max(now.since(last)));
+            let is_late = self.is_out_of_time_in(Duration::ZERO);
+            if is_late && pushed == 1 {
+                // The next invocation would come no further.
+                let reason = out_of_time(&manifest.head, pushed, start.since(began), now.since(start))?;
+                return Ok(Encoded::No(Built::Refused(reason)));
+            }
+            if is_late
+                || pushed < to_come
+                    && self.is_out_of_time_in(longest.saturating_mul(self.policy.spare_frames))
+            {
+                return Ok(Encoded::SoFar(*before + pushed));
+            }
+        }
+        Ok(Encoded::All)
+    }
+
+    /// Whether no time will be left to go on after `wait`.
+    pub(crate) fn is_out_of_time_in(&self, wait: Duration) -> bool {
+        let then = self.clock.now().after(wait).after(self.policy.margin);
+        self.deadline.is_some_and(|deadline| then >= deadline)
+    }
+}
+
+/// What it means that an invocation has come to its end with its first frame. A set of which no frame fits the function's
+/// time is refused, but only by an invocation that had most of its time for that; one that spent more `before`, waiting and
+/// building other sets, leaves it to its next attempt.
+fn out_of_time(head: &Head, pushed: u64, before: Duration, building: Duration) -> Result<Reason> {
+    if before > building {
+        let what = format!("{} became whole too late to assemble it", head.animation);
+        return Err(Error::OutOfTime { what });
+    }
+    let (total, seconds) = (head.total, building.as_secs());
+    Ok(Reason::new(format!(
+        "{pushed} of {total} frames were assembled in the {seconds} s that the assemble function had: give it more \
+         time or memory and retry, or fetch the frames and assemble them locally"
+    )))
+}
+
+/// The key of a frame that is drawn.
+pub fn frame_key(animation: &Animation, frame: &Frame) -> Option<String> {
+    let FrameState::Done { pixels } = frame.state else { return None };
+    let (name, version) = (frame.script.clone(), frame.version.clone());
+    Some(animation.receipt(&Receipt::Frame { name, tag: Tag { version, pixels }, part: frame.part }))
+}
+
+/// The generation that a GIF was made of.
+pub fn generation_of(gif: Option<&ObjectInfo>) -> Option<&str> {
+    gif?.metadata.get(GENERATION).map(String::as_str)
+}
+
+/// Whether a GIF is the one that was made of this set: of its generation, and not replaced by someone who copied the
+/// metadata.
+pub fn is_current(head: &Head, gif: Option<&ObjectInfo>) -> bool {
+    let is_built = |gif: &ObjectInfo| head.gif_version().is_none_or(|built| gif.etag == *built);
+    generation_of(gif) == Some(head.generation.as_str()) && gif.is_some_and(is_built)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::manifest::Settings;
+    use crate::reconcile::{Results, Scripts, reconcile};
+
+    #[test]
+    fn only_whoever_had_most_of_its_time_for_a_set_refuses_it() {
+        let animation = Animation::new("film").unwrap();
+        let manifest = reconcile(&animation, &Scripts::default(), &Results::default(), &Settings::absent());
+        let head = Head { total: 9, ..manifest.head };
+        let (short, long) = (Duration::from_secs(10), Duration::from_secs(20));
+        assert!(matches!(out_of_time(&head, 3, long, short), Err(Error::OutOfTime { .. })));
+        let reason = out_of_time(&head, 3, short, long).unwrap();
+        assert!(reason.message.starts_with("3 of 9 frames were assembled in the 20 s"), "{}", reason.message);
+        assert!(out_of_time(&head, 3, short, short).is_ok());
+    }
+}

@@ -1,0 +1,223 @@
+//! How far a GIF is that does not fit the time of one invocation, written down for the next one.
+//!
+//! Only what makes the same bytes is taken up: the same set of frames, to replace the same GIF, by the same version of the
+//! encoder. Whatever else is found, damage too, costs a build anew. That there is a checkpoint the lease says, so that who
+//! builds in one piece asks for none; one that no lease speaks of is litter, and the bucket's rules clear it away.
+//!
+//! The object: a line with the hash of the rest, a line of JSON, what is not sent yet of the GIF, and the encoder's state.
+
+use bytes::{Bytes, BytesMut};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::animator::Animator;
+use crate::invocation::{Invocation, Mutation};
+use crate::keys::Generation;
+use crate::lease::Held;
+use crate::manifest::Head;
+use crate::store::{ETag, PutOptions, Store, UnfinishedUpload, Upload};
+use crate::{Clock, Error, Result};
+
+/// Raised when the object is written in another way.
+const SCHEMA: u32 = 1;
+
+/// Bytes of the first line.
+const HASH: usize = 64;
+
+/// A GIF between two frames.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Checkpoint {
+    pub(crate) head: CheckpointHead,
+    pub(crate) upload: UnfinishedUpload,
+    /// The encoder's state.
+    pub(crate) encoding: Bytes,
+}
+
+/// What a checkpoint is of.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct CheckpointHead {
+    /// The set of frames.
+    pub(crate) generation: Generation,
+    /// The GIF that it is to replace.
+    pub(crate) replaces: Option<ETag>,
+    /// How many frames the encoder has taken.
+    pub(crate) frames: u64,
+    /// In how many invocations.
+    pub(crate) pieces: u32,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Line {
+    schema: u32,
+    #[serde(flatten)]
+    head: CheckpointHead,
+    upload: UnfinishedUpload,
+    /// Bytes of the upload's tail.
+    tail: usize,
+}
+
+impl Checkpoint {
+    fn encode(self, key: &str) -> Result<Bytes> {
+        let Checkpoint { head, upload, encoding } = self;
+        let tail = upload.tail.clone();
+        let line = Line { schema: SCHEMA, head, upload, tail: tail.len() };
+        let line = serde_json::to_vec(&line)
+            .map_err(|source| Error::Malformed { key: key.to_owned(), source: source.into() })?;
+        let mut body = BytesMut::with_capacity(HASH + 2 + line.len() + tail.len() + encoding.len());
+        let rest: [&[u8]; 4] = [&line, b"\n", &tail, &encoding];
+        body.extend_from_slice(hash(&rest).as_bytes());
+        body.extend_from_slice(b"\n");
+        rest.iter().for_each(|part| body.extend_from_slice(part));
+        Ok(body.freeze())
+    }
+
+    /// `None` for what is damaged, or of another schema.
+    fn decode(mut body: Bytes) -> Option<Self> {
+        if body.len() <= HASH {
+            return None;
+        }
+        let expected = body.split_to(HASH);
+        let rest = body.strip_prefix(b"\n")?;
+        if hash(&[rest]).as_bytes() != expected {
+            return None;
+        }
+        let mut rest = body.slice(1..);
+        let end = rest.iter().position(|byte| *byte == b'\n')?;
+        let line = rest.split_to(end);
+        let Line { schema, head, upload, tail } = serde_json::from_slice(&line).ok()?;
+        let mut encoding = rest.slice(1..);
+        if schema != SCHEMA || tail > encoding.len() {
+            return None;
+        }
+        let tail = encoding.split_to(tail);
+        Some(Checkpoint { head, upload: UnfinishedUpload { tail, ..upload }, encoding })
+    }
+}
+
+fn hash(parts: &[&[u8]]) -> String {
+    let mut hasher = Sha256::new();
+    parts.iter().for_each(|part| hasher.update(part));
+    hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// A GIF that is gone on with.
+pub(crate) struct TakenUp<E, U> {
+    pub(crate) encoding: E,
+    pub(crate) upload: U,
+    /// Frames that the encoder has taken.
+    pub(crate) frames: u64,
+    /// In how many invocations.
+    pub(crate) pieces: u32,
+}
+
+impl<S: Store, C: Clock> Invocation<'_, S, C> {
+    /// Goes on with the GIF that the lease's last holder has left, if it is one of this set over this GIF. Else its upload is
+    /// aborted, and the checkpoint goes.
+    pub(crate) async fn take_up<A: Animator>(
+        &self,
+        animator: &A,
+        head: &Head,
+        replaces: Option<&ETag>,
+        options: &PutOptions,
+        held: &mut Held,
+    ) -> Result<Option<TakenUp<A::Encoding, S::Upload>>> {
+        if !held.has_checkpoint {
+            return Ok(None);
+        }
+        let found = self.get(&head.animation.checkpoint()).await?;
+        if let Some(Checkpoint { head: of, upload, encoding }) =
+            found.and_then(|found| Checkpoint::decode(found.body))
+        {
+            let upload = self.store.take_up(&head.animation.gif(), options.clone(), upload);
+            let fits = of.generation == head.generation
+                && of.replaces.as_ref() == replaces
+                && of.frames <= head.total;
+            if (fits || self.breaks(Mutation::TakeUpAnyCheckpoint))
+                && let Ok(encoding) = animator.resume(encoding).await
+            {
+                return Ok(Some(TakenUp { encoding, upload, frames: of.frames, pieces: of.pieces }));
+            }
+            // What cannot be aborted is left to the bucket's rule for unfinished uploads.
+            let _ = upload.abort().await;
+        }
+        self.drop_checkpoint(head, held).await?;
+        Ok(None)
+    }
+
+    /// Writes down a GIF between two frames.
+    pub(crate) async fn put_checkpoint(&self, head: &Head, checkpoint: Checkpoint) -> Result<()> {
+        let key = head.animation.checkpoint();
+        let body = checkpoint.encode(&key)?;
+        self.put(&key, body).await.map(drop)
+    }
+
+    /// Removes what is written down, if there is something.
+    pub(crate) async fn drop_checkpoint(&self, head: &Head, held: &mut Held) -> Result<()> {
+        if std::mem::take(&mut held.has_checkpoint) {
+            self.delete(&head.animation.checkpoint()).await?;
+        }
+        Ok(())
+    }
+
+    /// Removes what is written down and aborts its upload: nobody will go on with it.
+    pub(crate) async fn abandon_checkpoint(&self, head: &Head, held: &mut Held) -> Result<()> {
+        if !held.has_checkpoint {
+            return Ok(());
+        }
+        let found = self.get(&head.animation.checkpoint()).await?;
+        if let Some(checkpoint) = found.and_then(|found| Checkpoint::decode(found.body)) {
+            let key = head.animation.gif();
+            // As above.
+            let _ = self.store.take_up(&key, PutOptions::always(), checkpoint.upload).abort().await;
+        }
+        self.drop_checkpoint(head, held).await
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checkpoint() -> Checkpoint {
+        let generation = Generation::new(&"0a".repeat(16)).unwrap();
+        let head = CheckpointHead { generation, replaces: Some(ETag::new("\"e\"")), frames: 7, pieces: 2 };
+        let (parts, tail) = (vec![ETag::new("p1"), ETag::new("p2")], Bytes::from_static(b"tail\n{}"));
+        let upload = UnfinishedUpload { id: Some("id".to_owned()), parts, tail };
+        Checkpoint { head, upload, encoding: Bytes::from_static(b"\nstate") }
+    }
+
+    #[test]
+    fn a_checkpoint_reads_back() {
+        let first = Checkpoint {
+            head: CheckpointHead { replaces: None, ..checkpoint().head },
+            upload: UnfinishedUpload::default(),
+            encoding: Bytes::new(),
+        };
+        for checkpoint in [checkpoint(), first] {
+            let body = checkpoint.clone().encode("key").unwrap();
+            assert_eq!(Checkpoint::decode(body), Some(checkpoint));
+        }
+    }
+
+    /// Whatever byte is missing or another one.
+    #[test]
+    fn a_damaged_checkpoint_is_none() {
+        let whole = checkpoint().encode("key").unwrap();
+        for end in 0..whole.len() {
+            assert_eq!(Checkpoint::decode(whole.slice(..end)), None, "cut off after {end}");
+        }
+        for at in 0..whole.len() {
+            let mut damaged = whole.to_vec();
+            damaged[at] ^= 1;
+            assert_eq!(Checkpoint::decode(damaged.into()), None, "byte {at}");
+        }
+    }
+
+    #[test]
+    fn a_checkpoint_of_another_schema_is_none() {
+        let whole = checkpoint().encode("key").unwrap();
+        let text = String::from_utf8_lossy(&whole[HASH + 1..]).replace("\"schema\":1", "\"schema\":2");
+        let body = format!("{}\n{text}", hash(&[text.as_bytes()]));
+        assert_eq!(Checkpoint::decode(body.into()), None);
+    }
+}

@@ -1,0 +1,293 @@
+//! A frame that is too big for one invocation is drawn in bands by several, and put together by whoever finds all of them.
+//!
+//! 1. Whoever finds a frame too big says so by a receipt, `cut-<k>`, and wakes an invocation for each band by an object below
+//!    `parts/`. Nobody who sees that receipt measures or cuts again; of two cuts that were made at once the finer one counts.
+//! 2. Each puts its band below `frames/`, only if absent, and lists what there is of the frame. If all bands of its cut are
+//!    there it puts them together, and puts the frame as if it had been drawn in one piece: nothing behind that knows of bands.
+//! 3. Whoever is woken for the frame itself wakes the bands that are missing, or puts together what is there.
+//!
+//! A band's key has its script's version and the pixel version, so that bands of different pictures cannot meet; and a band is
+//! never cut. Which rows a band has, and what is in it, is the renderer's to know.
+//!
+//! Invariant: whoever leaves has listed after its own band was put, so that the last one to put its band finds all of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::future::Future;
+use std::num::NonZeroU64;
+
+use bytes::Bytes;
+use futures_util::stream::{self, StreamExt, TryStreamExt};
+
+use super::{Outcome, Renderer, Script, Stages, Subject};
+use crate::invocation::{Invocation, Mutation};
+use crate::keys::{Band, Key, Part, Receipt, Tag};
+use crate::manifest::{Fact, Reason};
+use crate::observe::standing;
+use crate::reconcile::ReceiptFound;
+use crate::store::{ListRequest, Store};
+use crate::{Clock, Error, Result, Timestamp};
+
+/// A frame being put together: bands in from the top, the frame's file out.
+pub trait Joining: Send {
+    /// Adds the next band, as it was drawn.
+    ///
+    /// # Errors
+    ///
+    /// Why it is no such band; then nothing was added.
+    fn push(&mut self, band: Bytes) -> impl Future<Output = Result<(), Reason>> + Send;
+
+    /// Gives the frame: the very bytes that it has when it is drawn in one piece.
+    ///
+    /// # Errors
+    ///
+    /// The reason why there is none; it would be the same next time.
+    fn finish(self) -> impl Future<Output = Result<Bytes, Reason>> + Send;
+}
+
+/// Which rows an event is about, and who woke it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Woken {
+    pub(crate) band: Band,
+    /// Of the renderer that cut the frame.
+    pub(crate) pixels: u32,
+    /// The retry's; 0 for whoever cut the frame.
+    pub(crate) attempt: u64,
+}
+
+/// What the receipts of a frame say about its bands.
+#[derive(Debug, Default)]
+pub(crate) struct Bands {
+    cut: Option<NonZeroU64>,
+    there: BTreeSet<Band>,
+}
+
+impl Bands {
+    /// Those that were drawn with this pixel version.
+    pub(crate) fn of(receipts: &[ReceiptFound], of_part: Part, pixels: u32) -> Self {
+        let mut bands = Bands::default();
+        for found in receipts {
+            match &found.receipt {
+                Receipt::Cut { tag, part, count, .. } if *part == of_part && tag.pixels == pixels => {
+                    bands.cut = bands.cut.max(Some(*count));
+                }
+                Receipt::Band { tag, part, band, .. } if *part == of_part && tag.pixels == pixels => {
+                    bands.there.insert(*band);
+                }
+                _ => {}
+            }
+        }
+        bands
+    }
+
+    /// Into how many bands the frame is cut.
+    pub(crate) fn cut(&self) -> Option<NonZeroU64> {
+        self.cut
+    }
+
+    fn missing(&self, count: NonZeroU64) -> Vec<Band> {
+        Band::all(count).filter(|band| !self.there.contains(band)).collect()
+    }
+}
+
+/// What came of a band's event: there is nothing to fold as long as others are to come.
+type Came = (Outcome, Option<Fact>);
+
+impl<S: Store, C: Clock> Invocation<'_, S, C> {
+    /// Says that a frame is cut, and wakes an invocation for each band.
+    pub(crate) async fn cut(&self, subject: &Subject, tag: &Tag, count: NonZeroU64) -> Result<()> {
+        let Subject { animation, name, part, .. } = subject;
+        let cut = Receipt::Cut { name: name.clone(), tag: tag.clone(), part: *part, count };
+        self.put_receipt(&animation.receipt(&cut), Bytes::new(), "text/plain").await?;
+        self.wake_bands(subject, tag, Band::all(count).collect(), 0).await
+    }
+
+    /// Works on an event of a frame that is cut already: wakes what is missing of it, or puts it together.
+    pub(crate) async fn follow_cut<R: Renderer>(
+        &self,
+        renderer: &R,
+        subject: &Subject,
+        script: Script,
+        (bands, count): (Bands, NonZeroU64),
+        stages: &mut Stages,
+    ) -> Result<Came> {
+        let missing = bands.missing(count);
+        let retry = subject.retry.as_ref().filter(|(_, meant)| *meant == script.version);
+        if missing.is_empty() {
+            if let Some((attempt, _)) = retry {
+                self.put_begun(subject, &script.version, *attempt).await?;
+            }
+            return self.put_together(renderer, subject, script, count, stages).await;
+        }
+        let tag = Tag { version: script.version.clone(), pixels: self.policy.pixels };
+        let fact = Fact::Version(subject.name.clone(), script.version);
+        match retry {
+            Some((attempt, _)) => self.wake_bands(subject, &tag, missing, attempt.get()).await?,
+            None => {
+                let missing = self.not_woken(subject, &tag, missing, script.uploaded).await?;
+                self.wake_bands(subject, &tag, missing, 0).await?;
+            }
+        }
+        Ok((Outcome::Cut(count), Some(fact)))
+    }
+
+    /// Draws a band, unless it is there, and puts the frame together if it was the last one.
+    pub(crate) async fn work_on_band<R: Renderer>(
+        &self,
+        renderer: &R,
+        subject: &Subject,
+        script: Script,
+        (woken, mut bands): (Woken, Bands),
+        stages: &mut Stages,
+    ) -> Result<Came> {
+        let Woken { band, attempt, .. } = woken;
+        let Subject { animation, name, part, .. } = subject;
+        let version = &script.version;
+        if !bands.there.contains(&band) {
+            if let Some(attempt) = NonZeroU64::new(attempt) {
+                self.put_begun(subject, version, attempt).await?;
+            }
+            let drawn = self.draw_band(renderer, subject, &script, band, stages).await?;
+            let tag = Tag { version: version.clone(), pixels: self.policy.pixels };
+            let image = match drawn {
+                Ok(image) => image,
+                Err(reason) => {
+                    let version = script.version;
+                    let (outcome, fact) = self.put_drawing_fault(subject, version, &tag, reason).await?;
+                    return Ok((outcome, Some(fact)));
+                }
+            };
+            let receipt = Receipt::Band { name: name.clone(), tag, part: *part, band };
+            self.put_receipt(&animation.receipt(&receipt), image, "image/png").await?;
+            let receipts = self.receipts_of(animation, name, version, *part).await?;
+            if let Some(standing) = standing(&receipts, *part) {
+                let fact = standing.fact(name.clone(), script.version, *part);
+                return Ok((Outcome::Present, Some(fact)));
+            }
+            bands = Bands::of(&receipts, *part, self.policy.pixels);
+        }
+        let missing = bands.missing(band.of()).len();
+        if missing == 0 || missing == 1 && self.breaks(Mutation::JoinTooEarly) {
+            return self.put_together(renderer, subject, script, band.of(), stages).await;
+        }
+        Ok((Outcome::Band(band), None))
+    }
+
+    async fn draw_band<R: Renderer>(
+        &self,
+        renderer: &R,
+        subject: &Subject,
+        script: &Script,
+        band: Band,
+        stages: &mut Stages,
+    ) -> Result<Result<Bytes, Reason>> {
+        let before = self.clock.now();
+        let (name, body) = (&subject.name, script.body.clone());
+        let drawing = renderer.draw_band(name, body, subject.part, band);
+        let drawn = self.in_time(drawing, || format!("band {band} of {name} is not drawn")).await;
+        stages.draw += self.clock.now().since(before);
+        drawn
+    }
+
+    /// Puts the frame together of all its bands. One that cannot be read is drawn anew, here.
+    async fn put_together<R: Renderer>(
+        &self,
+        renderer: &R,
+        subject: &Subject,
+        script: Script,
+        count: NonZeroU64,
+        stages: &mut Stages,
+    ) -> Result<Came> {
+        let Subject { animation, name, part, .. } = subject;
+        let tag = Tag { version: script.version.clone(), pixels: self.policy.pixels };
+        let frame = match self.join(renderer, subject, &script, (&tag, count), stages).await? {
+            Ok(frame) => frame,
+            Err(reason) => {
+                let version = script.version;
+                let (outcome, fact) = self.put_drawing_fault(subject, version, &tag, reason).await?;
+                return Ok((outcome, Some(fact)));
+            }
+        };
+        let receipt = Receipt::Frame { name: name.clone(), tag, part: *part };
+        let put = self.put_receipt(&animation.receipt(&receipt), frame, "image/png").await?;
+        let fact = Fact::Drawn(name.clone(), script.version, *part, self.policy.pixels);
+        // Of two that put the last bands at once each may have found all of them.
+        Ok((put.map_or(Outcome::Present, |_| Outcome::Drawn), Some(fact)))
+    }
+
+    async fn join<R: Renderer>(
+        &self,
+        renderer: &R,
+        subject: &Subject,
+        script: &Script,
+        (tag, count): (&Tag, NonZeroU64),
+        stages: &mut Stages,
+    ) -> Result<Result<Bytes, Reason>> {
+        let Subject { animation, name, part, .. } = subject;
+        let late = || format!("{name} is not put together");
+        let mut joining = match renderer.join(name, script.body.clone(), *part, count).await? {
+            Ok(joining) => joining,
+            Err(reason) => return Ok(Err(reason)),
+        };
+        for band in Band::all(count) {
+            let receipt = Receipt::Band { name: name.clone(), tag: tag.clone(), part: *part, band };
+            let key = animation.receipt(&receipt);
+            let Some(object) = self.get(&key).await? else {
+                if self.breaks(Mutation::JoinTooEarly) {
+                    continue;
+                }
+                // It was deleted since: the frame is there, or is to be drawn again.
+                return Err(Error::Conflict { key });
+            };
+            let pushed = self.in_time(async { Ok(joining.push(object.body).await) }, late).await?;
+            if pushed.is_ok() {
+                continue;
+            }
+            let image = match self.draw_band(renderer, subject, script, band, stages).await? {
+                Ok(image) => image,
+                Err(reason) => return Ok(Err(reason)),
+            };
+            self.put_image(&key, image.clone()).await?;
+            if let Err(reason) = self.in_time(async { Ok(joining.push(image).await) }, late).await? {
+                let message = format!("band {band} does not fit: {}", reason.message);
+                return Ok(Err(Reason::new(message)));
+            }
+        }
+        self.in_time(async { Ok(joining.finish().await) }, late).await
+    }
+
+    async fn wake_bands(&self, subject: &Subject, tag: &Tag, bands: Vec<Band>, attempt: u64) -> Result<()> {
+        let wakings = bands.into_iter().map(|band| async move {
+            let Subject { animation, name, part, .. } = subject;
+            let (script, trace) = (animation.script(name), part.map_or(1, NonZeroU64::get));
+            let body = serde_json::json!({ "script": script, "version": tag.version, "trace": trace });
+            let (animation, name, tag) = (animation.clone(), name.clone(), tag.clone());
+            let key = Key::Band { animation, name, tag, part: *part, band, attempt }.to_string();
+            self.put(&key, body.to_string().into()).await.map(drop)
+        });
+        let concurrency = self.policy.concurrency;
+        stream::iter(wakings).map(Ok).try_for_each_concurrent(concurrency, |waking| waking).await
+    }
+
+    /// Those of the bands for which nobody was woken since the script was uploaded: earlier events may have come while
+    /// another version was current.
+    async fn not_woken(
+        &self,
+        subject: &Subject,
+        tag: &Tag,
+        mut bands: Vec<Band>,
+        uploaded: Timestamp,
+    ) -> Result<Vec<Band>> {
+        let Subject { animation, name, part, .. } = subject;
+        let number = part.map_or(String::new(), |number| format!("{number}/"));
+        let prefix = format!("{}{name}@{tag}/{number}", animation.parts());
+        let mut woken: BTreeMap<Band, Timestamp> = BTreeMap::new();
+        for listed in self.list_ranges(ListRequest::level(prefix), Vec::new()).await? {
+            if let Ok(Key::Band { band, .. }) = listed.key.parse() {
+                let last = woken.entry(band).or_default();
+                *last = listed.modified.max(*last);
+            }
+        }
+        bands.retain(|band| woken.get(band).is_none_or(|last| *last <= uploaded));
+        Ok(bands)
+    }
+}
