@@ -17,7 +17,7 @@ use rayfold_local::invoker::{Invoker, Settings};
 use rayfold_local::observation::{Observation, Requests, Seen};
 use rayfold_local::routes::Function;
 use rayfold_local::{Functions, Plan, Platform, StoreKind};
-use rayfold_pipeline::assemble::generation_of;
+use rayfold_pipeline::assemble::is_current;
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Manifest, Status};
 use rayfold_pipeline::store::{ObjectInfo, PutOptions, S3Store, Store};
@@ -148,8 +148,8 @@ impl Stage {
             let manifest = self.manifest(animation).await;
             if let Some(manifest) = manifest {
                 let gif = self.gif_info(animation).await;
-                let is_current = generation_of(gif.as_ref()) == Some(manifest.head.generation.as_str());
-                if manifest.head.status == wanted && (wanted != Status::Done || is_current) {
+                let is_there = wanted != Status::Done || is_current(&manifest.head, gif.as_ref());
+                if manifest.head.status == wanted && is_there {
                     break;
                 }
             }

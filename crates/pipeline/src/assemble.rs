@@ -175,6 +175,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             let gif = self.head(&animation.gif()).await?;
             let observation = self.observe(animation, known.as_ref()).await?;
             let observed = &observation.manifest;
+            if known.is_none() && observation.is_of_nothing() {
+                if self.clear(animation, gif.is_some(), &observation, &mut tally).await? {
+                    continue;
+                }
+                return Ok(tally.of(&observed.head));
+            }
             let (known, agrees) = match known {
                 Some(known) if known.manifest.agrees_with(observed) => (known, true),
                 known => match self.commit(animation, known.as_ref(), observed.clone()).await? {
@@ -227,6 +233,27 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 }
             }
         }
+    }
+
+    /// Of an animation that is gone, manifest and all, nothing is to stay, and nothing is to be written. Whether there was
+    /// something.
+    async fn clear(
+        &self,
+        animation: &Animation,
+        has_gif: bool,
+        observation: &Observation,
+        tally: &mut Tally,
+    ) -> Result<bool> {
+        if has_gif {
+            self.delete(&animation.gif()).await?;
+        }
+        if tally.lease.is_none() && observation.has_lease {
+            tally.lease = self.take_left_lease(animation).await?;
+        }
+        let Some(mut held) = tally.lease.take() else { return Ok(has_gif) };
+        self.abandon_checkpoint(&observation.manifest.head, &mut held).await?;
+        self.release_lease(animation).await?;
+        Ok(true)
     }
 
     /// Waits until the set is settled, or builds its GIF, unless another assembler does.

@@ -7,7 +7,7 @@
 
 use serde::Deserialize;
 
-use crate::assemble::generation_of;
+use crate::assemble::is_current;
 use crate::fold::{Age, Folded};
 use crate::invocation::Invocation;
 use crate::keys::{Animation, Band, Generation, Key, Part, Receipt, ScriptName, Tag, decode_event_key};
@@ -227,7 +227,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let manifest = self.observe(&animation, known.as_ref()).await?.manifest;
         let head = &manifest.head;
         let current = head.status == Status::Done && head.generation == claimed;
-        if !current || generation_of(gif.as_ref()) == Some(claimed.as_str()) {
+        if !current || is_current(head, gif.as_ref()) {
             return Ok(Recorded::LeftToSweep);
         }
         let tries = failure.attempts;

@@ -8,6 +8,7 @@
 //! 3. List, reconcile, and where the manifest differs put it on the condition that it is still the one that was read.
 //! 4. **List again**, and commit again until a listing agrees with what was committed: the first listing may be older
 //!    than a quick change and change back.
+//!    Where there is neither a manifest nor anything uploaded, nothing is put: an animation that was removed stays so.
 //! 5. If nothing is left to come, put the claim of that revision, whose name is new because only its writer claims.
 //!
 //! A manifest covers a fact if it shows it, or if it is at least the second revision after one that was read when the
@@ -143,7 +144,11 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         known: &mut Option<Known>,
     ) -> Result<Option<Folded>> {
         for _ in 0..MOST_COMMITS {
-            let observed = self.observe(animation, known.as_ref()).await?.manifest;
+            let observation = self.observe(animation, known.as_ref()).await?;
+            if known.is_none() && observation.is_of_nothing() {
+                return Ok(Some(Folded::Agreed));
+            }
+            let observed = observation.manifest;
             if let Some(known) = known.as_ref().filter(|known| known.manifest.agrees_with(&observed)) {
                 return self.end(known).await.map(Some);
             }

@@ -32,6 +32,11 @@ impl Observation {
     pub(crate) fn newest_script(&self) -> Option<Timestamp> {
         self.scripts.found.iter().map(|script| script.modified).max()
     }
+
+    /// Whether nothing is uploaded, neither scripts nor settings.
+    pub(crate) fn is_of_nothing(&self) -> bool {
+        self.scripts == Scripts::default() && self.manifest.head.settings == Settings::absent()
+    }
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {

@@ -233,6 +233,43 @@ async fn a_gif_skips_no_frame_that_is_gone() {
     assert_eq!((assembled.built, assembled.status), (0, Status::Rendering));
 }
 
+/// Deletes everything but this.
+fn delete_all_but(bucket: &mut Bucket, kept: &str) {
+    let keys: Vec<String> = bucket.keys().filter(|key| *key != kept).map(str::to_owned).collect();
+    for key in keys {
+        bucket.delete(&key);
+    }
+}
+
+#[tokio::test]
+async fn what_comes_after_a_removal_brings_nothing_back() {
+    let assemble_in = async |world: &World, claim: &str| {
+        world.with(async |invocation| assemble(invocation, &Joiner(Vec::new()), claim).await.unwrap()).await
+    };
+    let world = World::new();
+    world.upload("1.txt", "frame 1").await;
+    let claim = world.keys("assemblies/").pop().unwrap();
+    // An assembler is at its second round, and holds the lease.
+    let lease = Key::Lease { animation: World::film() }.to_string();
+    let mut reads = 0;
+    world.meddle(move |request, bucket, _| {
+        reads += u32::from(request == "get manifests/film.json");
+        if reads == 2 {
+            assert!(bucket.head(&lease).is_ok());
+            delete_all_but(bucket, &lease);
+            reads += 1;
+        }
+    });
+    assert_eq!(assemble_in(&world, &claim).await.built, 0);
+    assert_eq!(world.keys(""), [""; 0], "the lease is given up");
+    // Late events, of a script and of a set whose GIF came late, too.
+    world.render("scripts/film/1.txt").await;
+    assert_eq!(world.keys(""), [""; 0]);
+    world.put("animations/film.gif", "GIF");
+    assemble_in(&world, &claim).await;
+    assert_eq!(world.keys(""), [""; 0]);
+}
+
 #[tokio::test]
 async fn what_comes_back_while_its_results_are_tidied_away_is_woken() {
     let world = World::new();

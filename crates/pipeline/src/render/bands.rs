@@ -11,7 +11,7 @@
 //!
 //! Invariant: whoever leaves has listed after its own band was put, so that the last one to put its band finds all of them.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::future::Future;
 use std::num::NonZeroU64;
 
@@ -24,8 +24,8 @@ use crate::keys::{Band, Key, Part, Receipt, Tag};
 use crate::manifest::{Fact, Reason};
 use crate::observe::standing;
 use crate::reconcile::ReceiptFound;
-use crate::store::{ListRequest, Store};
-use crate::{Clock, Error, Result, Timestamp};
+use crate::store::Store;
+use crate::{Clock, Error, Result};
 
 /// A frame being put together: bands in from the top, the frame's file out.
 pub trait Joining: Send {
@@ -120,13 +120,10 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
         let tag = Tag { version: script.version.clone(), pixels: self.policy.pixels };
         let fact = Fact::Version(subject.name.clone(), script.version);
-        match retry {
-            Some((attempt, _)) => self.wake_bands(subject, &tag, missing, attempt.get()).await?,
-            None => {
-                let missing = self.not_woken(subject, &tag, missing, script.uploaded).await?;
-                self.wake_bands(subject, &tag, missing, 0).await?;
-            }
-        }
+        // Whoever was woken for them may be drawing. But whoever cut the frame may also have died over putting these objects,
+        // and a store need not tell of one that nobody was told is put; and they may have come while another version was current.
+        let attempt = retry.map_or(0, |(attempt, _)| attempt.get());
+        self.wake_bands(subject, &tag, missing, attempt).await?;
         Ok((Outcome::Cut(count), Some(fact)))
     }
 
@@ -266,28 +263,5 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         });
         let concurrency = self.policy.concurrency;
         stream::iter(wakings).map(Ok).try_for_each_concurrent(concurrency, |waking| waking).await
-    }
-
-    /// Those of the bands for which nobody was woken since the script was uploaded: earlier events may have come while
-    /// another version was current.
-    async fn not_woken(
-        &self,
-        subject: &Subject,
-        tag: &Tag,
-        mut bands: Vec<Band>,
-        uploaded: Timestamp,
-    ) -> Result<Vec<Band>> {
-        let Subject { animation, name, part, .. } = subject;
-        let number = part.map_or(String::new(), |number| format!("{number}/"));
-        let prefix = format!("{}{name}@{tag}/{number}", animation.parts());
-        let mut woken: BTreeMap<Band, Timestamp> = BTreeMap::new();
-        for listed in self.list_ranges(ListRequest::level(prefix), Vec::new()).await? {
-            if let Ok(Key::Band { band, .. }) = listed.key.parse() {
-                let last = woken.entry(band).or_default();
-                *last = listed.modified.max(*last);
-            }
-        }
-        bands.retain(|band| woken.get(band).is_none_or(|last| *last <= uploaded));
-        Ok(bands)
     }
 }
