@@ -223,3 +223,35 @@ fn event_keys_are_form_encoded() {
     assert_eq!(decode_event_key("100%25").unwrap(), "100%");
     assert!(decode_event_key("%ff").is_err());
 }
+
+#[test]
+fn prefixes_are_what_keys_start_with() {
+    let (a, name) = (animation("films/b"), ScriptName::new("c@d").unwrap());
+    assert_eq!(a.as_str(), "films/b");
+    let prefixes = [a.scripts(), a.frames(), a.retries(), a.parts()];
+    assert_eq!(prefixes, ["scripts/films/b/", "frames/films/b/", "retries/films/b/", "parts/films/b/"]);
+    assert_eq!(Tag::receipts_of(&name, &ETag::new("v/1")), "c@d@v~2f1-p");
+    assert_eq!(Generation::new(&"0a".repeat(16)).unwrap().as_str(), "0a".repeat(16));
+}
+
+#[test]
+fn a_receipt_is_of_one_version_of_one_script() {
+    let [c, d] = ["c", "d"].map(|name| ScriptName::new(name).unwrap());
+    let [v, w] = ["v", "w"].map(ETag::new);
+    let (number, band) = (NonZeroU64::MIN, Band::all(NonZeroU64::MIN).last().unwrap());
+    let (name, part) = (c.clone(), None);
+    let tag = || tag("v", 3);
+    let receipts = [
+        Receipt::Frame { name: name.clone(), tag: tag(), part },
+        Receipt::Fault { name: name.clone(), tag: tag(), part },
+        Receipt::Begun { name: name.clone(), tag: tag(), part, attempt: number },
+        Receipt::Cut { name: name.clone(), tag: tag(), part, count: number },
+        Receipt::Band { name: name.clone(), tag: tag(), part, band },
+        Receipt::Split { name, tag: tag(), count: number },
+    ];
+    for receipt in receipts {
+        assert!(receipt.is_of(&c, &v), "{receipt}");
+        assert!(!receipt.is_of(&c, &w) && !receipt.is_of(&d, &v) && !receipt.is_of(&d, &w), "{receipt}");
+    }
+    assert!(!Receipt::Refusal { generation: Generation::new(&"0a".repeat(16)).unwrap() }.is_of(&c, &v));
+}
