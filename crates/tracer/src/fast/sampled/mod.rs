@@ -248,7 +248,8 @@ impl<E: Real> Job<'_, E> {
                         stride: width,
                     };
                     if self.wanted.pixels.has_any(tile.columns(), tile.rows()) {
-                        tile::draw::<S, E, N>(simd, &pass, &tile, (pixels, band.first.as_mut()), workspace);
+                        let drawn = (pixels, band.first.as_mut(), &mut band.unsettled);
+                        tile::draw::<S, E, N>(simd, &pass, &tile, drawn, workspace);
                     }
                 }
             },

@@ -18,7 +18,7 @@ use crate::fast::rays::Rays;
 use crate::fast::real::{Lanes, Real, Vec3, constant};
 use crate::fast::tile::{Met, Scratch, shade};
 use crate::parallel::CHANNELS;
-use crate::sampling::film::{FirstRows, Pixel, Wanted, quantised};
+use crate::sampling::film::{BitRows, FirstRows, Pixel, Wanted, quantised};
 use crate::sampling::places::on_disc;
 use crate::sampling::{BATCH, Dimensions, Points, pixel_seed};
 
@@ -102,8 +102,8 @@ impl<'a, E: Real> Workspace<'a, E> {
     }
 }
 
-/// What has been summed up of a tile, and the first samples of its row of tiles.
-type Drawn<'a, 'b> = (&'a mut Vec<Pixel>, Option<&'a mut FirstRows<'b>>);
+/// What has been summed up of a tile, the first samples of its row of tiles, and who needs more there.
+type Drawn<'a, 'b> = (&'a mut Vec<Pixel>, Option<&'a mut FirstRows<'b>>, &'a mut BitRows<'b>);
 
 /// Draws the samples that a tile's pixels lack.
 #[inline(always)]
@@ -111,7 +111,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     simd: S,
     pass: &Pass<E>,
     tile: &SampledTile,
-    (pixels, mut first): Drawn,
+    (pixels, mut first, unsettled): Drawn,
     workspace: &mut Workspace<E>,
 ) {
     let mut items = core::mem::take(&mut workspace.items);
@@ -158,6 +158,12 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
         }
     }
     workspace.items = items;
+    if first.is_some() && !pass.wanted.is_first_look {
+        tile.each_wanted_pixel(pass.wanted, |at| {
+            let is_unsettled = pass.wanted.is_unsettled(&pixels[tile.in_tile(at)]);
+            unsettled.set(tile.left + at.0 as usize, at.1 as usize, is_unsettled);
+        });
+    }
 }
 
 impl SampledTile {

@@ -62,6 +62,12 @@ impl Bits {
         }
     }
 
+    /// In bands of so many rows.
+    pub(super) fn bands(&mut self, rows: usize) -> impl Iterator<Item = BitRows<'_>> {
+        let stride = self.stride;
+        self.words.chunks_mut(rows * stride).map(move |words| BitRows { words, stride })
+    }
+
     #[inline(always)]
     pub(super) fn row(&self, row: usize) -> &[u64] {
         &self.words[row * self.stride..(row + 1) * self.stride]
@@ -102,14 +108,20 @@ impl Bits {
     }
 }
 
-/// The columns of the bits of a word of a row.
-pub(super) fn columns(word: usize, mut bits: u64) -> impl Iterator<Item = usize> {
-    core::iter::from_fn(move || {
-        let column = word * WORD + bits.trailing_zeros() as usize;
-        let more = bits != 0;
-        bits &= bits.wrapping_sub(1);
-        more.then_some(column)
-    })
+/// Some rows of a set of pixels.
+#[derive(Debug)]
+pub(crate) struct BitRows<'a> {
+    words: &'a mut [u64],
+    stride: usize,
+}
+
+impl BitRows<'_> {
+    /// Puts a pixel in, or takes it out.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, column: usize, row: usize, is_in: bool) {
+        let (word, bit) = (&mut self.words[row * self.stride + column / WORD], column % WORD);
+        *word = *word & !(1 << bit) | u64::from(is_in) << bit;
+    }
 }
 
 /// The bits of a row and of those left and right of them.
@@ -124,6 +136,16 @@ pub(super) fn widened(row: &[u64], word: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The columns of the bits of a word of a row.
+    fn columns(word: usize, mut bits: u64) -> impl Iterator<Item = usize> {
+        core::iter::from_fn(move || {
+            let column = word * WORD + bits.trailing_zeros() as usize;
+            let more = bits != 0;
+            bits &= bits.wrapping_sub(1);
+            more.then_some(column)
+        })
+    }
 
     #[test]
     fn pixels_are_found_where_they_were_put_and_beside_it() {

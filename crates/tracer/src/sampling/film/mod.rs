@@ -7,6 +7,7 @@
 //! decided about pixels is decided for 64 at once ([`Bits`]); only those that go on get sums.
 
 mod bits;
+mod chain;
 mod first;
 mod pixel;
 mod plan;
@@ -14,9 +15,11 @@ mod plan;
 use glam::DVec3;
 use rayfold_scene::{Samples, Tone};
 
+pub(crate) use self::bits::BitRows;
+use self::chain::Chain;
 use self::first::First;
 pub(crate) use self::first::FirstRows;
-use self::pixel::{ONE, Sums};
+use self::pixel::ONE;
 pub(crate) use self::pixel::{Pixel, quantised};
 use self::plan::Plan;
 pub(crate) use self::plan::Wanted;
@@ -46,6 +49,8 @@ pub(crate) struct Band<'a> {
     pub(crate) tiles: &'a mut [Vec<Pixel>],
     /// Row by row.
     pub(crate) first: Option<FirstRows<'a>>,
+    /// Who needs more samples; told by whoever adds some.
+    pub(crate) unsettled: BitRows<'a>,
 }
 
 impl Film {
@@ -69,27 +74,28 @@ impl Film {
             Vec::<Pixel>::new().try_reserve_exact(pixels).ok()?;
             None
         };
-        Some(Self { size, side, tone, first, tiles, plan: Plan::new(size, samples, step)? })
+        let plan = Plan::new(size, Chain::new(samples, tone, step))?;
+        Some(Self { size, side, tone, first, tiles, plan })
     }
 
     /// Plans the next pass; `None` once all pixels have what they need. Gives the least and the largest number of samples
     /// between which it is.
     pub(crate) fn plan(&mut self) -> Option<(u32, u32)> {
-        let sums = Sums { tiles: &self.tiles, columns: self.size.0, side: self.side };
-        self.plan.goes_on().or_else(|| self.plan.next(self.first.as_ref(), &sums, self.tone))
+        self.plan.goes_on().or_else(|| self.plan.next(self.first.as_ref(), self.tone))
     }
 
     /// The rows of tiles, from the top, and what they shall get in the pass that [`Self::plan`] planned.
     pub(crate) fn split(&mut self) -> (Vec<Band<'_>>, Wanted<'_>) {
-        let tiles = self.tiles.chunks_mut(self.size.0.div_ceil(self.side.0));
+        let (wanted, unsettled) = self.plan.split(self.side.1);
+        let tiles = self.tiles.chunks_mut(self.size.0.div_ceil(self.side.0)).zip(unsettled);
         let bands = match &mut self.first {
-            None => tiles.map(|tiles| Band { tiles, first: None }).collect(),
+            None => tiles.map(|(tiles, unsettled)| Band { tiles, first: None, unsettled }).collect(),
             Some(first) => {
-                let first = first.bands(self.size.0 * self.side.1);
-                tiles.zip(first).map(|(tiles, first)| Band { tiles, first: Some(first) }).collect()
+                let first = first.bands(self.size.0 * self.side.1).map(Some);
+                tiles.zip(first).map(|((tiles, unsettled), first)| Band { tiles, first, unsettled }).collect()
             }
         };
-        (bands, self.plan.wanted())
+        (bands, wanted)
     }
 
     /// Columns and rows of a tile.
@@ -123,13 +129,16 @@ impl Film {
     /// The means of the pixels, and how many samples each has.
     #[cfg(any(test, feature = "accuracy"))]
     pub(crate) fn means(&self) -> impl Iterator<Item = (DVec3, u32)> {
-        let (width, height) = self.size;
-        let sums = Sums { tiles: &self.tiles, columns: width, side: self.side };
+        let ((width, height), (across, down)) = (self.size, self.side);
         (0..height).flat_map(move |row| {
             let mut of_row = Vec::with_capacity(width);
             self.each_of_row(row, |color| {
-                let count =
-                    if let Color::Mean(_) = color { sums.pixel(of_row.len(), row).count() } else { 1 };
+                let column = of_row.len();
+                let tile = row / down * width.div_ceil(across) + column / across;
+                let count = match color {
+                    Color::Sample(_) => 1,
+                    Color::Mean(_) => self.tiles[tile][row % down * across + column % across].count(),
+                };
                 of_row.push((color.unit(), count));
             });
             of_row
@@ -167,7 +176,8 @@ impl Color {
 
 #[cfg(test)]
 mod tests {
-    use super::plan::{CONTRAST, MOST_ROUNDS, SLOPE, SPARED};
+    use super::chain::{SLOPE, SPARED};
+    use super::plan::{CONTRAST, MOST_ROUNDS};
     use super::*;
     use crate::reference::encoded;
 
@@ -212,6 +222,8 @@ mod tests {
                             let level = [draw(sample)];
                             pixel.add([&level; 3]);
                         }
+                        let is_unsettled = wanted.is_unsettled(pixel);
+                        of_band.unsettled.set(at.0, at.1, is_unsettled);
                     }
                 }
             }

@@ -84,20 +84,3 @@ fn slope(light: f64, apart: f64) -> f64 {
     let (low, high) = ((light - 0.5 * apart).max(0.0), (light + 0.5 * apart).min(1.0));
     if high - low < 1e-9 { 12.92 } else { (encoded(high) - encoded(low)) / (high - low) }
 }
-
-/// Sums by column and row of the image.
-#[derive(Clone, Copy)]
-pub(super) struct Sums<'a> {
-    pub(super) tiles: &'a [Vec<Pixel>],
-    pub(super) columns: usize,
-    pub(super) side: (usize, usize),
-}
-
-impl Sums<'_> {
-    #[inline(always)]
-    pub(super) fn pixel(&self, column: usize, row: usize) -> &Pixel {
-        let (across, down) = self.side;
-        let tile = row / down * self.columns.div_ceil(across) + column / across;
-        &self.tiles[tile][row % down * across + column % across]
-    }
-}

@@ -5,29 +5,16 @@
 //! Slivers thinner than a pixel, of which some pixels see nothing at first, are found along their length in this way, and the
 //! bias of asking a pixel about itself shrinks to that of asking many.
 
-use rayfold_scene::{Samples, Tone};
+use rayfold_scene::Tone;
 use rayon::prelude::*;
 
-use super::bits::{Bits, columns, widened};
+use super::bits::{BitRows, Bits, widened};
+use super::chain::Chain;
 use super::first::First;
-use super::pixel::{ONE, Sums};
-
-/// Samples a pixel that are looked at before any decision, and where variances begin to say something.
-const FIRST: u32 = 1;
-const SECOND: u32 = 4;
+use super::pixel::{ONE, Pixel};
 
 /// So many times the error that is asked for, two neighbours with a sample each may differ by.
 pub(super) const CONTRAST: f64 = 1.5;
-
-/// The error of a mean of n samples is taken for their deviation times n to this power: steeper than the -1/2 of independent
-/// samples, and less steep than what edges and penumbrae have (docs/reports/sampling.md).
-pub(super) const SLOPE: f64 = -0.65;
-
-/// So many times the error that is asked for a pixel may have: most others have less.
-pub(super) const SPARED: f64 = 3.0;
-
-/// Moments of the first samples.
-const FEW_MOMENTS: u32 = 16;
 
 /// How often it is decided who goes on, at most, so that no pixel depends on one that is farther away, and a band can be drawn
 /// by itself. The example scenes take up to 34 of them (docs/decisions/frames-in-bands.md).
@@ -39,7 +26,7 @@ const BAND: usize = 16;
 /// What a pass gives to whom.
 #[derive(Clone, Copy)]
 pub(crate) struct Wanted<'a> {
-    plan: &'a Plan,
+    chain: &'a Chain,
     /// Who gets something.
     pub(crate) pixels: &'a Bits,
     /// Whether it is the first sample of pixels that may get no other.
@@ -50,22 +37,27 @@ impl Wanted<'_> {
     /// How many samples a pixel that has so many, and gets something in this pass, shall have after it.
     #[inline(always)]
     pub(crate) fn goal(&self, count: u32) -> u32 {
-        self.plan.goal(count)
+        self.chain.goal(count)
     }
 
     /// How many of so many moments, a power of two, a sample is one of: the first samples are of few, so that those of a tile
     /// that are of one moment are many.
     #[inline(always)]
     pub(crate) fn moments(&self, sample: u32, all: u32) -> u32 {
-        self.plan.moments(sample, all)
+        self.chain.moments(sample, all)
+    }
+
+    /// Whether a pixel needs more samples once it has got what it is given, by its own; of no consequence between two numbers
+    /// of the chain.
+    #[inline(always)]
+    pub(crate) fn is_unsettled(&self, pixel: &Pixel) -> bool {
+        self.chain.is_unsettled(pixel)
     }
 }
 
 #[derive(Debug)]
 pub(super) struct Plan {
-    samples: Samples,
-    /// No pass adds more samples to a pixel.
-    step: u32,
+    chain: Chain,
     /// Whose error is too large.
     unsettled: Bits,
     /// Those that have at least the second number of the chain, the third, and so on.
@@ -91,11 +83,10 @@ enum Stage {
 
 impl Plan {
     /// `None` where there is no memory for it.
-    pub(super) fn new(size: (usize, usize), samples: Samples, step: u32) -> Option<Self> {
+    pub(super) fn new(size: (usize, usize), chain: Chain) -> Option<Self> {
         let none = || Bits::none(size);
         Some(Self {
-            samples,
-            step,
+            chain,
             unsettled: none()?,
             at_least: vec![],
             going: vec![],
@@ -106,57 +97,24 @@ impl Plan {
         })
     }
 
-    /// Of the chain.
-    fn number(&self, at: usize) -> u32 {
-        let most = self.samples.most();
-        match at {
-            _ if self.samples.error() == 0.0 => most,
-            0 => FIRST,
-            _ => u32::try_from(u64::from(SECOND) << (at - 1).min(32)).unwrap_or(u32::MAX).min(most),
-        }
-    }
-
-    /// Where a pixel that has so many samples, and gets something in this pass, stands after it.
-    #[inline(always)]
-    pub(super) fn goal(&self, count: u32) -> u32 {
-        let most = self.samples.most();
-        let next = if self.samples.error() == 0.0 {
-            most
-        } else if count < SECOND {
-            if count < FIRST { FIRST } else { SECOND }
-        } else {
-            count.checked_add(1).and_then(u32::checked_next_power_of_two).unwrap_or(most)
-        };
-        next.min(most).min(count.saturating_add(self.step))
-    }
-
-    /// How many of so many moments a sample is one of.
-    #[inline(always)]
-    pub(super) fn moments(&self, sample: u32, all: u32) -> u32 {
-        if self.samples.error() == 0.0 {
-            all
-        } else {
-            sample.saturating_add(1).checked_next_power_of_two().unwrap_or(all).max(FEW_MOMENTS).min(all)
-        }
-    }
-
     /// Whether a pixel has the second number of the chain.
     #[inline(always)]
     pub(super) fn has_many(&self, column: usize, row: usize) -> bool {
         self.at_least.first().is_some_and(|many| many.has(column, row))
     }
 
-    /// Before each pass and after the last.
-    pub(super) fn wanted(&self) -> Wanted<'_> {
-        let is_first_look = self.stage == Stage::First && self.samples.error() > 0.0;
-        Wanted { plan: self, pixels: &self.wanted, is_first_look }
+    /// Before each pass: what it gives to whom, and in bands of so many rows who needs more after it.
+    pub(super) fn split(&mut self, rows: usize) -> (Wanted<'_>, impl Iterator<Item = BitRows<'_>>) {
+        let is_first_look = self.stage == Stage::First && self.chain.has_error();
+        let wanted = Wanted { chain: &self.chain, pixels: &self.wanted, is_first_look };
+        (wanted, self.unsettled.bands(rows))
     }
 
     /// The numbers of samples from and to which pixels of a place of the chain go in this pass, if they do.
     fn part(&self, (from, to): (u32, u32)) -> Option<(u32, u32)> {
-        let from = u64::from(from) + u64::from(self.done) * u64::from(self.step);
+        let from = u64::from(from) + u64::from(self.done) * u64::from(self.chain.step);
         let from = u32::try_from(from).ok().filter(|from| *from < to)?;
-        Some((from, from.saturating_add(self.step).min(to)))
+        Some((from, from.saturating_add(self.chain.step).min(to)))
     }
 
     /// Goes on to the next pass of what was planned; `None` if all have what was planned for them.
@@ -165,7 +123,7 @@ impl Plan {
             Stage::Begins => None,
             Stage::First => {
                 self.done += 1;
-                self.part((0, self.number(0)))
+                self.part((0, self.chain.number(0)))
             }
             Stage::Later => {
                 self.done += 1;
@@ -179,7 +137,7 @@ impl Plan {
         self.wanted.clear();
         let (mut first, mut end) = (u32::MAX, 0);
         for (at, going) in self.going.iter().enumerate().filter(|(_, going)| !going.is_empty()) {
-            if let Some((from, to)) = self.part((self.number(at), self.number(at + 1))) {
+            if let Some((from, to)) = self.part((self.chain.number(at), self.chain.number(at + 1))) {
                 self.wanted.add(going);
                 first = first.min(from);
                 end = end.max(to);
@@ -189,18 +147,18 @@ impl Plan {
     }
 
     /// Plans what comes after all have what was planned for them; `None` once they need no more.
-    pub(super) fn next(&mut self, first: Option<&First>, sums: &Sums, tone: Tone) -> Option<(u32, u32)> {
+    pub(super) fn next(&mut self, first: Option<&First>, tone: Tone) -> Option<(u32, u32)> {
         self.done = 0;
         if self.stage == Stage::Begins {
             self.stage = Stage::First;
             self.wanted.fill();
-            return self.part((0, self.number(0)));
+            return self.part((0, self.chain.number(0)));
         }
         let first = first?;
         if self.stage == Stage::First {
             self.judge_first(first, tone);
         } else {
-            self.judge(sums, tone)?;
+            self.count()?;
         }
         self.stage = Stage::Later;
         if self.rounds == MOST_ROUNDS {
@@ -213,7 +171,7 @@ impl Plan {
 
     /// Finds out who differs from a neighbour.
     fn judge_first(&mut self, first: &First, tone: Tone) {
-        let limit = (CONTRAST * self.samples.error() / 255.0 * ONE).min(ONE) as u16;
+        let limit = (CONTRAST * self.chain.error() / 255.0 * ONE).min(ONE) as u16;
         let (width, height, stride) = (self.unsettled.columns, self.unsettled.rows(), self.unsettled.stride);
         self.unsettled.words.par_chunks_mut(stride * BAND).enumerate().for_each(|(band, words)| {
             let rows = band * BAND..((band + 1) * BAND).min(height);
@@ -221,34 +179,14 @@ impl Plan {
         });
     }
 
-    /// Finds out whose errors are too large, of those that have gone on, and counts those as gone on.
-    fn judge(&mut self, sums: &Sums, tone: Tone) -> Option<()> {
+    /// Counts those that have gone on as gone on.
+    fn count(&mut self) -> Option<()> {
         for (at, going) in self.going.iter().enumerate().filter(|(_, going)| !going.is_empty()) {
             if at == self.at_least.len() {
                 self.at_least.push(going.empty()?);
             }
             self.at_least[at].add(going);
         }
-        let most = self.samples.most();
-        // How much the samples may vary.
-        let limit = |count: u32| {
-            let limit = SPARED * self.samples.error() * libm::pow(f64::from(count), -SLOPE);
-            limit * limit
-        };
-        let limits: Vec<f64> = (0..=self.going.len()).map(|at| limit(self.number(at))).collect();
-        let (going, stride) = (&self.going, self.unsettled.stride);
-        self.unsettled.words.par_chunks_mut(stride).enumerate().for_each(|(row, words)| {
-            for (at, going) in going.iter().enumerate() {
-                for (word, (unsettled, &gone)) in words.iter_mut().zip(going.row(row)).enumerate() {
-                    *unsettled &= !gone;
-                    for column in columns(word, gone) {
-                        let pixel = sums.pixel(column, row);
-                        let is_unsettled = pixel.count() < most && pixel.variance(tone) > limits[at + 1];
-                        *unsettled |= u64::from(is_unsettled) << (column % u64::BITS as usize);
-                    }
-                }
-            }
-        });
         Some(())
     }
 
@@ -258,26 +196,50 @@ impl Plan {
             if at == self.going.len() {
                 self.going.push(self.wanted.empty()?);
             }
-            let ends = self.number(at) == self.samples.most();
+            let ends = self.chain.number(at) == self.chain.most();
             let (unsettled, at_least) = (&self.unsettled, &self.at_least);
             let have = at.checked_sub(1).map(|before| &at_least[before]);
             let (further, ahead) = (at_least.get(at), at_least.get(at + 1));
             let stride = unsettled.stride;
             self.going[at].words.par_chunks_mut(stride * BAND).enumerate().for_each(|(band, words)| {
+                words.fill(0);
                 if ends {
-                    words.fill(0);
                     return;
                 }
+                // Whoever may make others go on, in three rows.
+                let mut active = [(); 3].map(|()| vec![0; stride]);
                 let mut near = vec![0; stride];
-                for (row, words) in (band * BAND..).zip(words.chunks_exact_mut(stride)) {
-                    near.fill(0);
-                    // Whoever may make others go on.
-                    for other in row.saturating_sub(1)..(row + 2).min(unsettled.rows()) {
-                        for (word, near) in near.iter_mut().enumerate() {
-                            let have = have.map_or(u64::MAX, |have| have.row(other)[word]);
-                            let ahead = ahead.map_or(0, |ahead| ahead.row(other)[word]);
-                            *near |= unsettled.row(other)[word] & have | ahead;
+                let look = |active: &mut Vec<u64>, row: Option<usize>| match row
+                    .filter(|&row| row < unsettled.rows())
+                {
+                    None => active.fill(0),
+                    Some(row) => {
+                        active.copy_from_slice(unsettled.row(row));
+                        if let Some(have) = have {
+                            active.iter_mut().zip(have.row(row)).for_each(|(active, have)| *active &= have);
                         }
+                        if let Some(ahead) = ahead {
+                            active
+                                .iter_mut()
+                                .zip(ahead.row(row))
+                                .for_each(|(active, ahead)| *active |= ahead);
+                        }
+                    }
+                };
+                let top = band * BAND;
+                look(&mut active[1], top.checked_sub(1));
+                look(&mut active[2], Some(top));
+                for (row, words) in (top..).zip(words.chunks_exact_mut(stride)) {
+                    active.rotate_left(1);
+                    look(&mut active[2], Some(row + 1));
+                    let [above, here, below] = &active;
+                    let mut any = 0;
+                    for (((near, above), here), below) in near.iter_mut().zip(above).zip(here).zip(below) {
+                        *near = above | here | below;
+                        any |= *near;
+                    }
+                    if any == 0 {
+                        continue;
                     }
                     for (word, going) in words.iter_mut().enumerate() {
                         let have = have.map_or(unsettled.inside(word), |have| have.row(row)[word]);

@@ -1,0 +1,95 @@
+//! The numbers of samples that a pixel can have, one after the other, and by how much the samples of one may vary that has
+//! enough.
+
+use rayfold_scene::{Samples, Tone};
+
+use super::pixel::Pixel;
+
+/// Samples a pixel that are looked at before any decision, and where variances begin to say something.
+const FIRST: u32 = 1;
+const SECOND: u32 = 4;
+
+/// The error of a mean of n samples is taken for their deviation times n to this power: steeper than the -1/2 of independent
+/// samples, and less steep than what edges and penumbrae have (docs/reports/sampling.md).
+pub(super) const SLOPE: f64 = -0.65;
+
+/// So many times the error that is asked for a pixel may have: most others have less.
+pub(super) const SPARED: f64 = 3.0;
+
+/// Moments of the first samples.
+const FEW_MOMENTS: u32 = 16;
+
+#[derive(Debug)]
+pub(super) struct Chain {
+    samples: Samples,
+    /// No pass adds more samples to a pixel.
+    pub(super) step: u32,
+    tone: Tone,
+    /// The largest variance of the samples of a settled pixel, by the logarithm of their number to the base 2.
+    limits: [f64; u32::BITS as usize],
+}
+
+impl Chain {
+    pub(super) fn new(samples: Samples, tone: Tone, step: u32) -> Self {
+        let limits = core::array::from_fn(|at| {
+            let limit = SPARED * samples.error() * libm::pow(f64::from(1_u32 << at), -SLOPE);
+            limit * limit
+        });
+        Self { samples, step, tone, limits }
+    }
+
+    /// Whether there is an error to be reached: without, the first number is the only one.
+    pub(super) fn has_error(&self) -> bool {
+        self.samples.error() > 0.0
+    }
+
+    pub(super) fn error(&self) -> f64 {
+        self.samples.error()
+    }
+
+    pub(super) fn most(&self) -> u32 {
+        self.samples.most()
+    }
+
+    pub(super) fn number(&self, at: usize) -> u32 {
+        let most = self.most();
+        match at {
+            _ if !self.has_error() => most,
+            0 => FIRST,
+            _ => u32::try_from(u64::from(SECOND) << (at - 1).min(32)).unwrap_or(u32::MAX).min(most),
+        }
+    }
+
+    /// Where a pixel that has so many samples, and gets something in a pass, stands after it.
+    #[inline(always)]
+    pub(super) fn goal(&self, count: u32) -> u32 {
+        let most = self.most();
+        let next = if !self.has_error() {
+            most
+        } else if count < SECOND {
+            if count < FIRST { FIRST } else { SECOND }
+        } else {
+            count.checked_add(1).and_then(u32::checked_next_power_of_two).unwrap_or(most)
+        };
+        next.min(most).min(count.saturating_add(self.step))
+    }
+
+    /// How many of so many moments a sample is one of.
+    #[inline(always)]
+    pub(super) fn moments(&self, sample: u32, all: u32) -> u32 {
+        if self.has_error() {
+            sample.saturating_add(1).checked_next_power_of_two().unwrap_or(all).max(FEW_MOMENTS).min(all)
+        } else {
+            all
+        }
+    }
+
+    /// Whether a pixel needs more samples, by its own; nothing is said of what is under way between two numbers.
+    #[inline(never)]
+    pub(super) fn is_unsettled(&self, pixel: &Pixel) -> bool {
+        let count = pixel.count();
+        count < self.most()
+            && count.is_power_of_two()
+            && pixel.variance(self.tone) > self.limits[count.trailing_zeros() as usize]
+    }
+}
