@@ -277,4 +277,36 @@ mod tests {
         let error = Manifest::decode(&manifest.head.animation, &body).unwrap_err();
         assert!(std::error::Error::source(&error).unwrap().to_string().contains("newer"), "{error:?}");
     }
+
+    #[test]
+    fn places_stand_apart_and_only_where_frames_are_many() {
+        let manifest = manifest(60);
+        let lines: Vec<String> =
+            manifest.frames.iter().map(|frame| serde_json::to_string(frame).unwrap()).collect();
+        // A line ends with a comma and a line feed, but for the last one.
+        let length = lines.iter().map(|line| line.len() as u64 + 2).sum::<u64>() - 2;
+        let starts = |lines: &[String]| lines.iter().map(|line| line.len() as u64 + 2).sum::<u64>();
+        for glimpse in [1, 800, 8_000, 2 * length - 2, 2 * length, 1 << 20] {
+            let body = manifest.encode(glimpse).unwrap();
+            let places = Beginning::decode(&manifest.head.animation, &body).unwrap().unwrap().places;
+            assert_eq!(places.is_empty(), glimpse / 2 >= length, "{glimpse} of {length}");
+            let apart = (glimpse / 8).max(length / MOST_PLACES as u64 + 1);
+            let mut expected = Vec::new();
+            for (number, frame) in manifest.frames.iter().enumerate() {
+                let at = starts(&lines[..number]);
+                if expected.last().is_none_or(|(_, last)| at - last >= apart) {
+                    expected.push((frame, at));
+                }
+            }
+            if !places.is_empty() {
+                let same = |(place, (frame, at)): (&Place, &(&Frame, u64))| {
+                    place.at == *at && place.script == frame.script && place.part == frame.part
+                };
+                assert!(
+                    places.len() == expected.len() && places.iter().zip(&expected).all(same),
+                    "{glimpse}"
+                );
+            }
+        }
+    }
 }

@@ -89,4 +89,15 @@ mod tests {
         assert_eq!(read(&bucket, Some("a/01000")).await, (1001, Some("a/01000".into()), 2));
         assert_eq!(read(&bucket, Some("b")).await, (2001, Some("a/02000".into()), 3));
     }
+
+    #[tokio::test]
+    async fn folders_beyond_the_end_are_left_out() {
+        let mut bucket = Bucket::default();
+        for key in ["a/1/x", "a/2/x", "a/3/x"] {
+            bucket.put(Timestamp(0), key, "x".into(), PutOptions::always()).unwrap();
+        }
+        let page = |request| std::future::ready(Ok(bucket.list(&request)));
+        let listing = Listing::read(ListRequest::level("a/"), Some("a/2/"), page).await.unwrap();
+        assert_eq!(listing.prefixes, ["a/1/", "a/2/"]);
+    }
 }
