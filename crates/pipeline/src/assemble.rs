@@ -215,8 +215,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 Next::Leave => return Ok(tally.of(&observed.head)),
                 Next::End => {
                     let Some(mut held) = tally.lease.take() else { return Ok(tally.of(&observed.head)) };
-                    self.abandon_checkpoint(&observed.head, &mut held).await?;
-                    self.release_lease(animation).await?;
+                    self.give_up_lease(&observed.head, &mut held).await?;
                     // Whoever found the lease taken was woken for a manifest that was written before.
                     let now = self.head(&animation.manifest()).await?;
                     let is_blind = self.breaks(Mutation::AssemblerDoesNotLookAgain);
@@ -251,9 +250,14 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             tally.lease = self.take_left_lease(animation).await?;
         }
         let Some(mut held) = tally.lease.take() else { return Ok(has_gif) };
-        self.abandon_checkpoint(&observation.manifest.head, &mut held).await?;
-        self.release_lease(animation).await?;
+        self.give_up_lease(&observation.manifest.head, &mut held).await?;
         Ok(true)
+    }
+
+    /// Gives the lease back, and with it the GIF that nobody will go on with.
+    async fn give_up_lease(&self, head: &Head, held: &mut Held) -> Result<()> {
+        self.abandon_checkpoint(head, held).await?;
+        self.release_lease(&head.animation).await
     }
 
     /// Waits until the set is settled, or builds its GIF, unless another assembler does.

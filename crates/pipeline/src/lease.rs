@@ -45,9 +45,9 @@ pub(crate) struct Held {
 const NOBODY: &str = "";
 
 impl Lease {
-    /// One that anyone may take.
-    fn of_nobody(checkpoint: bool) -> Self {
-        Lease { assembler: NOBODY.to_owned(), until: Timestamp(0), checkpoint }
+    /// One that anyone may take, with the GIF that is written down.
+    fn of_nobody() -> Self {
+        Lease { assembler: NOBODY.to_owned(), until: Timestamp(0), checkpoint: true }
     }
 
     /// Whether its time is not up.
@@ -151,7 +151,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 // Taken over already, by somebody for whom its time was up.
                 return Ok(());
             };
-            if self.replace_lease(&key, &Lease::of_nobody(held.has_checkpoint), there.info.etag).await? {
+            if self.replace_lease(&key, &Lease::of_nobody(), there.info.etag).await? {
                 return Ok(());
             }
         }

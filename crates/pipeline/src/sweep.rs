@@ -291,11 +291,10 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let mut doomed: Vec<Key> = Vec::new();
         let mut split_before = false;
         // Bands have done what they were for once their frame is there.
-        let is_used_up = |found: &&ReceiptFound| match &found.receipt {
-            Receipt::Cut { name, tag, part, .. } | Receipt::Band { name, tag, part, .. } => {
-                current.get(name) == Some(&&tag.version) && used.contains_key(&(name, *part))
-            }
-            _ => false,
+        let is_used_up = |found: &&ReceiptFound| {
+            banded_frame(found).is_some_and(|(name, version, part)| {
+                current.get(name) == Some(&version) && used.contains_key(&(name, part))
+            })
         };
         let receipts = || observation.results.receipts.iter();
         let gone = receipts().filter(superseded).filter(|found| old(found.modified));

@@ -43,6 +43,10 @@ impl Chain {
         self.samples.error() > 0.0
     }
 
+    pub(super) fn tone(&self) -> Tone {
+        self.tone
+    }
+
     pub(super) fn error(&self) -> f64 {
         self.samples.error()
     }

@@ -35,7 +35,6 @@ pub(crate) struct Film {
     size: (usize, usize),
     /// Columns and rows of a tile.
     side: (usize, usize),
-    tone: Tone,
     /// None where all pixels get equally many samples.
     first: Option<First>,
     /// Tile by tile, row by row in each; a tile whose pixels have got but one sample has none, if there is a [`First`].
@@ -75,13 +74,13 @@ impl Film {
             None
         };
         let plan = Plan::new(size, Chain::new(samples, tone, step))?;
-        Some(Self { size, side, tone, first, tiles, plan })
+        Some(Self { size, side, first, tiles, plan })
     }
 
     /// Plans the next pass; `None` once all pixels have what they need. Gives the least and the largest number of samples
     /// between which it is.
     pub(crate) fn plan(&mut self) -> Option<(u32, u32)> {
-        self.plan.goes_on().or_else(|| self.plan.next(self.first.as_ref(), self.tone))
+        self.plan.goes_on().or_else(|| self.plan.next(self.first.as_ref()))
     }
 
     /// The rows of tiles, from the top, and what they shall get in the pass that [`Self::plan`] planned.

@@ -5,7 +5,6 @@
 //! Slivers thinner than a pixel, of which some pixels see nothing at first, are found along their length in this way, and the
 //! bias of asking a pixel about itself shrinks to that of asking many.
 
-use rayfold_scene::Tone;
 use rayon::prelude::*;
 
 use super::bits::{BitRows, Bits, widened};
@@ -147,7 +146,7 @@ impl Plan {
     }
 
     /// Plans what comes after all have what was planned for them; `None` once they need no more.
-    pub(super) fn next(&mut self, first: Option<&First>, tone: Tone) -> Option<(u32, u32)> {
+    pub(super) fn next(&mut self, first: Option<&First>) -> Option<(u32, u32)> {
         self.done = 0;
         if self.stage == Stage::Begins {
             self.stage = Stage::First;
@@ -156,7 +155,7 @@ impl Plan {
         }
         let first = first?;
         if self.stage == Stage::First {
-            self.judge_first(first, tone);
+            self.judge_first(first);
         } else {
             self.count()?;
         }
@@ -170,7 +169,8 @@ impl Plan {
     }
 
     /// Finds out who differs from a neighbour.
-    fn judge_first(&mut self, first: &First, tone: Tone) {
+    fn judge_first(&mut self, first: &First) {
+        let tone = self.chain.tone();
         let limit = (CONTRAST * self.chain.error() / 255.0 * ONE).min(ONE) as u16;
         let (width, height, stride) = (self.unsettled.columns, self.unsettled.rows(), self.unsettled.stride);
         self.unsettled.words.par_chunks_mut(stride * BAND).enumerate().for_each(|(band, words)| {
