@@ -9,7 +9,9 @@ mod hold;
 
 use glam::DVec3;
 use rayfold_scene::model::{Finish, Pattern, Shine, Weight};
-use rayfold_scene::{Camera, Cone, Cylinder, Disc, Look, Material, Object, Plane, Scene, Torus};
+use rayfold_scene::{
+    Camera, Cone, Cylinder, Disc, Lamp, Lens, Light, Look, Material, Object, Plane, Samples, Scene, Torus,
+};
 use rayfold_tracer::{Precision, RenderOptions, reference};
 
 use dice::Dice;
@@ -27,6 +29,23 @@ fn skies_tones_depths_and_mirrors_of_all_kinds_are_the_references() {
         .map(|count| {
             let objects = (0..count).map(|_| dice.object()).collect();
             dice.scene(objects)
+        })
+        .collect();
+    hold(&scenes);
+}
+
+#[test]
+fn a_background_of_one_colour_has_its_tone() {
+    let mut dice = Dice::new("background", SEED);
+    let scenes: Vec<Scene> = [0, 1, 6, 90]
+        .into_iter()
+        .cycle()
+        .take(12)
+        .map(|count| {
+            let objects = (0..count).map(|_| dice.object()).collect();
+            let mut scene = dice.scene(objects);
+            scene.set_background(dice.color()).unwrap();
+            scene
         })
         .collect();
     hold(&scenes);
@@ -96,6 +115,46 @@ fn shapes_with_axes_of_their_own_are_the_references() {
         scenes.extend([(); 3].map(|()| dice.bodies(count, kinds)));
     }
     hold(&scenes);
+}
+
+/// Bodies that no ray meets: with them there are too many for the bits of a word.
+fn specks() -> Vec<Object> {
+    let material = Material::new(DVec3::ONE, DVec3::ONE, DVec3::ZERO).unwrap();
+    let disc =
+        |k: u32| Disc::new(1e-12, DVec3::splat(1.0 + 0.01 * f64::from(k)), DVec3::ONE, material.clone());
+    (0..65).map(|k| disc(k).unwrap().into()).collect()
+}
+
+#[test]
+fn few_bodies_are_drawn_as_they_are_among_many() {
+    let mut dice = Dice::new("few bodies", SEED);
+    for round in 0..48 {
+        let count = dice.0.usize(1..30);
+        let mut scene = dice.bodies(count, 6);
+        if dice.0.bool() {
+            dice.add_lamps(&mut scene);
+        }
+        if dice.0.bool() {
+            scene.set_background(DVec3::splat(0.5)).unwrap();
+        }
+        if round % 2 == 1 {
+            scene.samples = Samples::new(4, 0.0).unwrap();
+            scene.lens = Lens::new(if dice.0.bool() { 0.3 } else { 0.0 }, None).unwrap();
+            let lights = scene.lights.iter().map(|light| match light {
+                Light::Directional(sun) => sun.spanning(20.0).unwrap().into(),
+                Light::Lamp(lamp) => {
+                    Lamp::new(lamp.color(), lamp.position(), 0.5, lamp.reach()).unwrap().into()
+                }
+            });
+            scene.lights = lights.collect();
+        }
+        let mut among_many = scene.clone();
+        among_many.objects = scene.objects.iter().cloned().chain(specks()).collect();
+        let [few, many] = [&scene, &among_many].map(|scene| draw(scene, RenderOptions::default()));
+        let most = few.iter().zip(many.iter()).map(|(a, b)| a.abs_diff(*b)).max();
+        let differ = few.pixels().zip(many.pixels()).filter(|(a, b)| a != b).count();
+        assert_eq!(differ, 0, "round {round}: {count} bodies, by {most:?}");
+    }
 }
 
 #[test]

@@ -42,7 +42,10 @@ impl Dice {
         } else {
             scene.objects = objects.into();
         }
-        scene.background = Background::sky(self.color(), self.color()).unwrap();
+        match self.0.bool() {
+            true => scene.background = Background::sky(self.color(), self.color()).unwrap(),
+            false => scene.set_background(self.color()).unwrap(),
+        }
         scene.tone = if self.0.bool() { Tone::Srgb } else { Tone::Plain };
         scene.depth = Depth::new(self.0.u32(0..8)).unwrap();
         scene.lights = (0..self.0.usize(0..4))

@@ -213,7 +213,10 @@ fn picture(rng: &mut Rng, objects: Vec<Object>, eye: DVec3, target: DVec3) -> Re
     let screen = Screen::new(rng.u32(16..32), rng.u32(16..32))?;
     let look = Look::new(eye, target, within(rng, 20.0, 90.0), Some(DVec3::new(0.1, 1.0, 0.05)))?;
     let mut scene = Scene::new(screen, Camera::Look(look));
-    scene.background = Background::sky(color(rng), color(rng))?;
+    match rng.bool() {
+        true => scene.background = Background::sky(color(rng), color(rng))?,
+        false => scene.set_background(color(rng))?,
+    }
     scene.objects = objects.into();
     let mut lights = Vec::new();
     for _ in 0..rng.u32(0..3) {

@@ -162,6 +162,25 @@ impl Coefficients {
     pub fn mirror(&self) -> DVec3 {
         self.mirror
     }
+
+    /// (1 - w)·own + w·other for a weight from 0 to 1; its own for what is no such weight.
+    #[must_use]
+    pub fn mixed(&self, other: &Self, w: f64) -> Self {
+        // Where one of them is all, the other may be any number.
+        if w == 1.0 {
+            return *other;
+        }
+        if !(w > 0.0 && w < 1.0) {
+            return *self;
+        }
+        // A mean of finite numbers is finite.
+        let mixed = |a: DVec3, b: DVec3| (1.0 - w) * a + w * b;
+        Self {
+            ambient: mixed(self.ambient, other.ambient),
+            diffuse: mixed(self.diffuse, other.diffuse),
+            mirror: mixed(self.mirror, other.mirror),
+        }
+    }
 }
 
 impl Material {

@@ -2,11 +2,12 @@
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
+use glam::DVec3;
 use rayfold_scene::Tone;
 
 use super::bounce::{Columns, packet_shape};
 use super::real::{Lanes, Real, Vec3, constant};
-use super::tone::encoded;
+use super::tone::{encoded, levels};
 use crate::parallel::CHANNELS;
 
 /// A rectangle of the image, counted from its upper left corner.
@@ -18,6 +19,8 @@ pub(super) struct Tile {
     pub(super) height: u32,
     /// What it can show, by bits; with a tree, whether it can show anything.
     pub(super) candidates: u64,
+    /// The same of bodies.
+    pub(super) bodies: u64,
     /// Columns and rows of tiles before it.
     pub(super) place: (usize, usize),
     /// Bounces that are followed.
@@ -29,17 +32,39 @@ pub(super) struct Band<'a> {
     pub(super) bytes: &'a mut [u8],
     /// Columns and rows of the whole image.
     pub(super) size: (u32, u32),
-    /// Level of each channel of a pixel that shows nothing.
-    pub(super) background: [u8; CHANNELS],
+    /// What a pixel shows that shows nothing.
+    pub(super) background: Nothing,
     /// From colours to levels.
     pub(super) tone: Tone,
+}
+
+/// A background of one colour: a level a channel, and the colour that becomes these levels, whoever writes them.
+#[derive(Clone, Copy)]
+pub(super) struct Nothing {
+    levels: [u8; CHANNELS],
+    color: [f64; CHANNELS],
+}
+
+impl Nothing {
+    pub(super) fn new<E: Real>(color: DVec3, tone: Tone) -> Self {
+        match tone {
+            Tone::Plain => {
+                let levels = levels(color, tone);
+                Self { levels, color: levels.map(|level| f64::from(level) / 255.0) }
+            }
+            Tone::Srgb => {
+                let color = color.to_array().map(|channel| E::narrow(channel.clamp(0.0, 1.0)).widen());
+                Self { levels: levels(DVec3::from_array(color), tone), color }
+            }
+        }
+    }
 }
 
 impl Band<'_> {
     /// The colour of what shows nothing.
     #[inline(always)]
     pub(super) fn background<E: Real>(&self) -> [E; 3] {
-        self.background.map(|level| E::narrow(f64::from(level) / 255.0))
+        self.background.color.map(E::narrow)
     }
 }
 
@@ -55,7 +80,7 @@ pub(super) fn fill(tile: Tile, band: &mut Band) {
     let stride = band.size.0 as usize * CHANNELS;
     let (from, to) = (tile.left as usize * CHANNELS, (tile.left + tile.width) as usize * CHANNELS);
     for row in band.bytes.chunks_exact_mut(stride) {
-        row[from..to].as_chunks_mut().0.fill(band.background);
+        row[from..to].as_chunks_mut().0.fill(band.background.levels);
     }
 }
 

@@ -7,6 +7,7 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use super::beyond::Beyond;
+use super::bodies::ANY;
 use super::features::Features;
 use super::glass::Glass;
 use super::packet::Ray;
@@ -54,7 +55,7 @@ impl<S: Simd, E: Real> Arriving<S, E> {
                     }
                     let mut found = nearest::<S, E, F, false>(simd, scene, ray, scene.all());
                     if let Some(bodies) = beyond.bodies() {
-                        bodies.meet(simd, ray, &mut found);
+                        bodies.meet(simd, ANY, ray, &mut found);
                     }
                     let hit = open & found.distance.simd_lt(far);
                     lit |= open & !hit;

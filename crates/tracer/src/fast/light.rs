@@ -4,6 +4,7 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use super::beyond::Beyond;
+use super::bodies::ANY;
 use super::bounce::{Columns, Hits, Queue};
 use super::candidates::{Candidates, Found, Masks, Picked};
 use super::dimming::{Arriving, Shadow};
@@ -31,6 +32,8 @@ pub(super) struct Obstacles {
     /// In one with a tree, if it is not too long.
     list: Picked,
     is_listed: bool,
+    /// Of few bodies, by bits.
+    pub(super) bodies: u64,
 }
 
 impl Obstacles {
@@ -72,6 +75,23 @@ impl InTheWay {
             },
         );
         kinds
+    }
+
+    /// Finds which bodies can, after [`Self::find`], in a scene that has some.
+    #[inline(never)]
+    pub(super) fn find_bodies<S: Simd, E: Real>(&mut self, simd: S, scene: &Prepared<E>, hits: &Hits<E>) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let (low, high) = region(simd, hits);
+                for (light, of) in scene.suns.iter().zip(&mut self.of) {
+                    of.bodies = match &light.bodies {
+                        Some(outlines) => outlines.in_the_way(simd, light.sun.beam(low, high)),
+                        None => ANY,
+                    };
+                }
+            },
+        );
     }
 }
 
@@ -158,7 +178,7 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool,
                     if let Some(bodies) = bodies
                         && lit.any_true()
                     {
-                        lit = bodies.unoccluded(simd, ray, far, lit);
+                        lit = bodies.unoccluded(simd, obstacles.bodies, ray, far, lit);
                     }
                     let mut color = Vec3::splat(simd, light.sun.color);
                     if let Some(glass) = glass {
@@ -184,7 +204,7 @@ pub(super) fn light_up_beyond<S: Simd, E: Real, F: Features<E>, const EYE: bool,
                     if let Some(bodies) = bodies
                         && lit.any_true()
                     {
-                        lit = bodies.unoccluded(simd, ray, far, lit);
+                        lit = bodies.unoccluded(simd, ANY, ray, far, lit);
                     }
                     if lit.any_true() {
                         let met = nearest::<S, E, F, false>(simd, scene, ray, scene.all());

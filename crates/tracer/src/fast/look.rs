@@ -144,12 +144,12 @@ pub(super) fn look<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
     );
 }
 
-/// What the first `count` rays of a queue meet of bodies, nearer than what they have met; `EYE` says that they start at the
-/// origin of the coordinates.
+/// What the first `count` rays of a queue meet of planes and of the bodies that `bits` asks for, nearer than what they have
+/// met; `EYE` says that they start at the origin of the coordinates.
 #[inline(always)]
 pub(super) fn look_at_bodies<S: Simd, E: Real, const EYE: bool>(
     simd: S,
-    bodies: &Bodies<E>,
+    (bodies, bits): (&Bodies<E>, u64),
     count: usize,
     queue: &Queue<E>,
     hits: &mut Hits<E>,
@@ -164,11 +164,13 @@ pub(super) fn look_at_bodies<S: Simd, E: Real, const EYE: bool>(
             hits,
         );
     }
-    if let Some(tree) = bodies.tree() {
+    if let Some(tree) = bodies.tree()
+        && bits != 0
+    {
         look_at_some::<S, E, EYE>(
             simd,
             #[inline(always)]
-            |ray, nearest| bodies.meet_bounded(simd, tree, ray, nearest),
+            |ray, nearest| bodies.meet_bounded(simd, (tree, bits), ray, nearest),
             count,
             queue,
             hits,

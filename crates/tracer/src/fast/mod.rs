@@ -62,7 +62,7 @@ use fearless_simd::{Level, Simd};
 use image::RgbImage;
 use rayfold_scene::Scene;
 
-use self::band::{Band, Tile};
+use self::band::{Band, Nothing, Tile};
 use self::dispatch::on;
 #[cfg(all(target_arch = "x86_64", feature = "narrow"))]
 use self::features::Unfitted;
@@ -76,7 +76,6 @@ use self::shape::Robust;
 use self::shapes::{Formulas, Shape};
 use self::ties::Ranked;
 use self::tile::Scratch;
-use self::tone::levels;
 use self::window::{Grid, Window};
 use crate::parallel::{CHANNELS, bands};
 use crate::{Exposure, Precision, RenderError, RenderOptions};
@@ -304,6 +303,8 @@ struct Setup<'a, E> {
     options: &'a RenderOptions<'a>,
     prepared: Prepared<E>,
     window: Window,
+    /// Of few bodies.
+    bodies: Option<Window>,
     /// Columns and rows of a tile.
     side: (u32, u32),
 }
@@ -326,14 +327,15 @@ impl<'a, E: Real> Setup<'a, E> {
         };
         shapes.sort_by_key(|shape| shape.kind().number());
         let window = Window::new(geometry.view, &shapes, &grid, E::ROUNDOFF);
-        Ok(Self { scene, options, prepared, window, side })
+        let bodies = Window::of_bodies(geometry.view, prepared.boxes_of_bodies(), &grid, E::ROUNDOFF);
+        Ok(Self { scene, options, prepared, window, bodies, side })
     }
 
     /// Draws bands of tiles side by side, those with these rows.
     fn draw<By: Formulas<E>>(&self, rows: Range<u32>) -> Result<RgbImage, RenderError> {
-        let Self { scene, options, prepared, window, side } = self;
+        let Self { scene, options, prepared, window, bodies, side } = self;
         let size = (scene.screen.width(), scene.screen.height());
-        let background = levels(scene.background.colors().0, scene.tone);
+        let background = Nothing::new::<E>(scene.background.colors().0, scene.tone);
         let level = options.level.unwrap_or_else(Level::new);
         let bounces = options.bounces(scene);
         // Boxed: it is passed from band to band by value.
@@ -345,7 +347,8 @@ impl<'a, E: Real> Setup<'a, E> {
             || Box::new(Scratch::new(options.cancel)),
             |scratch, row, bytes| {
                 let band = Band { bytes, size, background, tone: scene.tone };
-                draw::<E, By>(&Job { prepared, window, side: *side, row, bounces }, level, band, scratch);
+                let windows = (window, bodies.as_ref());
+                draw::<E, By>(&Job { prepared, windows, side: *side, row, bounces }, level, band, scratch);
             },
         )?;
         // A tile of much glass is given up halfway.
@@ -357,7 +360,8 @@ impl<'a, E: Real> Setup<'a, E> {
 /// A row of tiles to draw.
 struct Job<'a, E> {
     prepared: &'a Prepared<E>,
-    window: &'a Window,
+    /// Of objects, and of few bodies.
+    windows: (&'a Window, Option<&'a Window>),
     /// Columns and rows of a tile.
     side: (u32, u32),
     /// The first row of pixels.
@@ -381,7 +385,8 @@ impl<E: Real> Job<'_, E> {
                         top: self.row,
                         width: self.side.0.min(width - left),
                         height,
-                        candidates: self.window.candidates(place.0, place.1),
+                        candidates: self.windows.0.candidates(place.0, place.1),
+                        bodies: self.prepared.bodies_in(self.windows.1, place),
                         place,
                         bounces: self.bounces,
                     };

@@ -9,6 +9,7 @@ use glam::DVec3;
 use rayfold_scene::{Material, Object, Scene};
 
 use super::beyond::Beyond;
+use super::bodies::{ANY, Bodies};
 use super::candidates::{Candidates, MASKED, Masks};
 use super::features::{BUILT, Needs};
 use super::geometry::{Geometry, View};
@@ -23,9 +24,12 @@ use super::shapes::{Obstacles, Shape, Shapes, Solid, Sorted};
 use super::sights::Sights;
 use super::sky::Sky;
 use super::tree::{Tree, stump};
-use super::window::Grid;
+use super::window::{Grid, Window};
 use crate::RenderError;
 use crate::parallel::map;
+
+/// As many lanes as a packet has at most.
+const WIDEST: usize = 16;
 
 /// A sun and every obstacle as it sees it.
 #[derive(Clone, Debug)]
@@ -36,6 +40,8 @@ pub(super) struct Sunlight<E> {
     pub(super) outlines: Outlines<E>,
     /// For scenes of many objects, where it helps.
     pub(super) buffer: Option<LightBuffer>,
+    /// Of few bodies, what can meet a ray from a region.
+    pub(super) bodies: Option<Outlines<E>>,
 }
 
 /// How a scene's objects are found.
@@ -137,7 +143,8 @@ impl<E: Real> Prepared<E> {
         let sights = (search == Search::Lists)
             .then(|| Sights::new(&geometry.view, standing.shapes(), row, grid, E::ROUNDOFF))
             .flatten();
-        let suns = geometry.suns.iter().map(|sun| standing.lit_by(sun, search)).collect();
+        let boxes = beyond.as_ref().and_then(Beyond::bodies).and_then(Bodies::boxes);
+        let suns = geometry.suns.iter().map(|sun| standing.lit_by(sun, search, boxes)).collect();
         let shapes = Shapes::new(solids, sorted);
         let alone = match (&solids[..], &geometry.view) {
             ([solid], View::Pinhole { .. }) if grid.lens.is_none() => {
@@ -163,6 +170,28 @@ impl<E: Real> Prepared<E> {
             entries,
             beyond,
         })
+    }
+
+    /// The boxes of its bodies that have bounds, where they are few.
+    pub(super) fn boxes_of_bodies(&self) -> Option<&[Shape]> {
+        self.beyond.as_ref()?.bodies()?.boxes()
+    }
+
+    /// Which bodies a tile can show, by bits: those of a window of their boxes, or any.
+    #[inline(always)]
+    pub(super) fn bodies_in(&self, window: Option<&Window>, (column, row): (usize, usize)) -> u64 {
+        match (window, &self.beyond) {
+            (Some(window), _) => window.candidates(column, row),
+            (None, Some(beyond)) if beyond.bodies().is_some() => ANY,
+            (None, _) => 0,
+        }
+    }
+
+    /// Whether a tile shows a background of one colour that shows nothing but `bodies`.
+    #[inline(always)]
+    pub(super) fn shows_nothing(&self, bodies: u64) -> bool {
+        let has_planes = || self.beyond.as_ref().and_then(Beyond::bodies).is_some_and(Bodies::has_planes);
+        self.is_plain() || bodies == 0 && self.sky().is_none() && !has_planes()
     }
 
     /// Whether there is nothing to be seen but what masks, lists and trees hold, on a background of one colour.
@@ -238,9 +267,14 @@ impl Standing<'_> {
         places.into_iter().flatten().map(|&place| &self.solids[place as usize].shape)
     }
 
-    fn lit_by<E: Real>(&self, sun: &Direction, search: Search) -> Sunlight<E> {
+    /// `boxes` are those of few bodies.
+    fn lit_by<E: Real>(&self, sun: &Direction, search: Search, boxes: Option<&[Shape]>) -> Sunlight<E> {
         let sun = Sun::new(sun);
         let axes = sun.rounded();
+        let bodies = boxes.map(|boxes| {
+            let outlines: Vec<_> = boxes.iter().map(|of| Outline::new::<E>(of, axes)).collect();
+            Outlines::new(&outlines, outlines.len().next_multiple_of(WIDEST))
+        });
         let outlines = || {
             let shapes: Vec<&Shape> = self.shapes().collect();
             map(&shapes, |shape| Outline::new::<E>(*shape, axes))
@@ -255,6 +289,7 @@ impl Standing<'_> {
                 Search::Lists => LightBuffer::new(outlines(), self.row),
                 Search::Masks | Search::Tree => None,
             },
+            bodies,
             sun,
         }
     }

@@ -8,6 +8,7 @@ use glam::DVec3;
 use rayfold_scene::Scene;
 
 use super::beyond::Beyond;
+use super::bodies::ANY;
 use super::dispatch::on;
 use super::features::{Anything, Everything};
 use super::geometry::Geometry;
@@ -129,7 +130,7 @@ impl<E: Real> Batch<'_, E> {
                     nearest::<S, E, Everything<Robust>, false>(simd, self.scene, ray, self.scene.all())
                 };
                 if let Some(bodies) = self.scene.beyond.as_ref().and_then(Beyond::bodies) {
-                    bodies.meet(simd, ray, &mut found);
+                    bodies.meet(simd, ANY, ray, &mut found);
                 }
                 let hit = found.hit(simd).to_bitmask();
                 let mut normals = [DVec3::ZERO; 16];

@@ -14,6 +14,7 @@ use rayfold_scene::Tone;
 
 use super::band::{Band, Tile, fill, rays_of, write_encoded, write_pixels};
 use super::beyond::Beyond;
+use super::bodies::ANY;
 use super::bounce::{Columns, Hits, Queue, columns};
 use super::candidates::{Candidates, Picked};
 use super::features::{Anything, BUILT, Kernel, Variant, fitted};
@@ -68,14 +69,14 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     scratch: &mut Scratch<E>,
     band: &mut Band,
 ) {
-    if tile.candidates == 0 && scene.is_plain() {
+    if tile.candidates == 0 && scene.shows_nothing(tile.bodies) {
         return fill(tile, band);
     }
     let Scratch { queue, hits, next, waiting, pixels: _, in_the_way, sights } = &mut *scratch;
     let tree = BUILT.tree && scene.tree.is_some();
     let candidates = match &scene.sights {
         Some(all) if BUILT.tree && all.gather(tile.place.0, tile.place.1, sights) => {
-            if sights.is_empty() && scene.is_plain() {
+            if sights.is_empty() && scene.shows_nothing(tile.bodies) {
                 return fill(tile, band);
             }
             Candidates::listed(sights)
@@ -98,7 +99,8 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             });
             let count = rays_of::<S, E>((tile.width, tile.height));
             let next = Some(&mut *next);
-            let met = Met { kinds: seen, background, queue, count, next, waiting, soft: None };
+            let bodies = tile.bodies;
+            let met = Met { kinds: seen, bodies, background, queue, count, next, waiting, soft: None };
             shade::<S, E, N, true>(simd, scene, met, hits, in_the_way);
         }
         Rays::Parallel(rays) => {
@@ -108,7 +110,8 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             });
             let count = queue.count;
             let next = Some(&mut *next);
-            let met = Met { kinds: seen, background, queue, count, next, waiting, soft: None };
+            let bodies = tile.bodies;
+            let met = Met { kinds: seen, bodies, background, queue, count, next, waiting, soft: None };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
         }
     }
@@ -150,7 +153,7 @@ impl<E: Real> Scratch<'_, E> {
                 look::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, all, scene.background, queue, hits)
             });
             let (kinds, background, count) = (all.kinds, scene.background, queue.count);
-            let met = Met { kinds, background, queue, count, next: after, waiting, soft };
+            let met = Met { kinds, bodies: ANY, background, queue, count, next: after, waiting, soft };
             shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
             for ray in 0..queue.count {
                 let pixel = queue.pixel.0[ray].to_index();
@@ -184,7 +187,8 @@ fn follow_through_glass<S: Simd, E: Real, N: Kernel<E>>(
             look::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, all, scene.background, queue, hits)
         });
         let (kinds, background, count) = (all.kinds, scene.background, queue.count);
-        let met = Met { kinds, background, queue, count, next: None, waiting: &mut *waiting, soft };
+        let waiting = &mut *waiting;
+        let met = Met { kinds, bodies: ANY, background, queue, count, next: None, waiting, soft };
         shade_more::<S, E, N, false>(simd, scene, met, hits, in_the_way);
         waiting.add(queue, hits);
     }
@@ -196,6 +200,8 @@ fn follow_through_glass<S: Simd, E: Real, N: Kernel<E>>(
 pub(super) struct Met<'a, 'b, E> {
     /// The kinds of what they can have met.
     pub(super) kinds: ByKind<bool>,
+    /// Of bodies, which, by bits.
+    pub(super) bodies: u64,
     pub(super) background: [E; 3],
     pub(super) queue: &'a Queue<E>,
     /// How many there are.
@@ -260,7 +266,7 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
 ) {
     let queue = met.queue;
     if let Some(bodies) = beyond.bodies() {
-        look_at_bodies::<S, E, EYE>(simd, bodies, met.count, queue, hits);
+        look_at_bodies::<S, E, EYE>(simd, (bodies, met.bodies), met.count, queue, hits);
     }
     if hits.packets.is_empty() {
         return;
@@ -268,6 +274,9 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     surfaces::<S, E, Anything<N::By>, EYE, true, true>(simd, scene, met.background, queue, hits);
     let is_painted = paint::<S, E, EYE>(beyond, queue, hits);
     in_the_way.find(simd, scene, hits);
+    if beyond.bodies().is_some() {
+        in_the_way.find_bodies(simd, scene, hits);
+    }
     if beyond.glass().is_some() {
         light_up_beyond::<S, E, Anything<N::By>, EYE, true>(simd, scene, beyond, queue, hits, in_the_way);
     } else {
@@ -288,7 +297,7 @@ fn shade_softly<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
 ) {
     let queue = met.queue;
     if let Some(bodies) = beyond.and_then(Beyond::bodies) {
-        look_at_bodies::<S, E, EYE>(simd, bodies, met.count, queue, hits);
+        look_at_bodies::<S, E, EYE>(simd, (bodies, met.bodies), met.count, queue, hits);
     }
     if hits.packets.is_empty() {
         return;
@@ -296,6 +305,9 @@ fn shade_softly<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     surfaces::<S, E, Anything<N::By>, EYE, true, true>(simd, scene, met.background, queue, hits);
     let is_painted = beyond.is_some_and(|beyond| paint::<S, E, EYE>(beyond, queue, hits));
     in_the_way.find(simd, scene, hits);
+    if beyond.is_some_and(|beyond| beyond.bodies().is_some()) {
+        in_the_way.find_bodies(simd, scene, hits);
+    }
     light_up_softly::<S, E, Anything<N::By>, EYE>(simd, scene, soft, queue, hits, in_the_way);
     go_on::<S, E, N, EYE>(simd, scene, is_painted, met, hits);
 }

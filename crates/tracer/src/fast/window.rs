@@ -97,6 +97,11 @@ impl Window {
         Self { columns: columns.collect(), rows: rows.collect(), caps, view }
     }
 
+    /// The same of the boxes of few bodies.
+    pub(super) fn of_bodies(view: View, boxes: Option<&[Shape]>, grid: &Grid, roundoff: f64) -> Option<Self> {
+        boxes.map(|boxes| Self::new(view, boxes, grid, roundoff))
+    }
+
     /// What the rays of the tile of this column and row can meet.
     pub(super) fn candidates(&self, column: usize, row: usize) -> u64 {
         let (x, y) = (self.columns[column], self.rows[row]);

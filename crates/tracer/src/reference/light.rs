@@ -107,18 +107,41 @@ pub(crate) fn highlight(shine: &Shine, normal: DVec3, towards: DVec3, towards_ey
     if cosine <= 0.0 {
         0.0
     } else if cosine < STEEP {
-        libm::pow(cosine, shine.exponent())
+        power(cosine, shine.exponent())
     } else {
         // From the sine, which is small and therefore known better: cosⁿ = (1 - sin²)^(n/2).
-        let sine = normal.cross(halfway).length_squared();
-        libm::exp(0.5 * shine.exponent() * libm::log1p(-sine.min(1.0)))
+        let sine = normal.cross(halfway).length_squared().min(1.0);
+        let half = 0.5 * shine.exponent();
+        if half <= SMALL { power(1.0 - sine, half) } else { libm::exp(half * libm::log1p(-sine)) }
     }
+}
+
+/// `x` from 0 to 1 to a power that is not negative. Whole ones, which most scripts have, and their halves take few products.
+fn power(x: f64, exponent: f64) -> f64 {
+    let whole = exponent as u32;
+    let left = exponent - f64::from(whole);
+    if exponent > SMALL || left != 0.0 && left != 0.5 {
+        return libm::pow(x, exponent);
+    }
+    let first = if left == 0.5 { x.sqrt() } else { 1.0 };
+    let (mut product, mut square, mut rest) = (first, x, whole);
+    while rest != 0 {
+        if rest % 2 == 1 {
+            product *= square;
+        }
+        square *= square;
+        rest /= 2;
+    }
+    product
 }
 
 /// The largest number instead of infinity, from which nothing could be taken away.
 pub(super) fn held(color: DVec3) -> DVec3 {
     color.clamp(DVec3::MIN, DVec3::MAX)
 }
+
+/// Up to this exponent the roundings of products cannot be seen: together they are less than so many roundoffs.
+const SMALL: f64 = 1024.0;
 
 /// Above this cosine the sine says more.
 const STEEP: f64 = 0.9;
@@ -136,6 +159,15 @@ mod tests {
         };
         assert!((at(2.0, 1.0) - libm::cos(1.0).powi(2)).abs() < 1e-15);
         assert!((at(3.0, 0.1) - libm::cos(0.1).powi(3)).abs() < 1e-15);
+        for exponent in [1.0, 2.0, 3.0, 7.0, 60.0, 99.0, 1023.0, 1024.0, 1.5, 60.25, 1025.0] {
+            for angle in [0.01, 0.1, 0.4, 0.5, 1.0] {
+                let (seen, exact) = (at(exponent, angle), libm::pow(libm::cos(angle), exponent));
+                assert!(
+                    (seen - exact).abs() <= 1e-12 * exact,
+                    "cos({angle})^{exponent}: {seen} is not {exact}"
+                );
+            }
+        }
         assert_eq!((at(1e300, 0.0), at(1e300, 1e-9), at(5.0, 2.0)), (1.0, 0.0, 0.0));
         // cosⁿ(1e-6) for n = 1e12 is e^(-1/2).
         assert!((at(1e12, 1e-6) - libm::exp(-0.5)).abs() < 1e-9);

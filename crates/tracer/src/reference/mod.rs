@@ -23,6 +23,7 @@ mod sampled;
 mod shading;
 mod shapes;
 mod tone;
+mod whole;
 mod world;
 
 use core::ops::Range;

@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use super::whole::{floor, remainder};
+
 /// Perlin's permutation of 0..256.
 const PERMUTATION: [u8; 256] = [
     151, 160, 137, 91, 90, 15, 131, 13, 201, 95, 96, 53, 194, 233, 7, 225, 140, 36, 103, 30, 69, 142, 8, 99,
@@ -20,10 +22,9 @@ const PERMUTATION: [u8; 256] = [
 
 /// The noise at a place, about -1 to 1; its lattice repeats after 256 in each direction.
 pub(super) fn noise(place: DVec3) -> f64 {
-    let cell = place.floor();
+    let cell = DVec3::from_array(place.to_array().map(floor));
     let within = place - cell;
-    // The remainder of a number however large is right.
-    let [x, y, z] = cell.to_array().map(|c| c.rem_euclid(256.0) as usize);
+    let [x, y, z] = cell.to_array().map(|c| usize::from(remainder(c)));
     let fade = within * within * within * (within * (within * 6.0 - 15.0) + 10.0);
     let corner = |dx: usize, dy: usize, dz: usize| {
         let hash = permuted(permuted(permuted(x + dx) + y + dy) + z + dz);
@@ -42,22 +43,29 @@ fn mix(part: f64, a: f64, b: f64) -> f64 {
     a + part * (b - a)
 }
 
-/// The scalar product with one of the 12 directions to the middles of a cube's edges, four of which count twice.
+/// The 12 directions to the middles of a cube's edges, four of which count twice.
+const GRADIENTS: [DVec3; 16] = [
+    DVec3::new(1.0, 1.0, 0.0),
+    DVec3::new(-1.0, 1.0, 0.0),
+    DVec3::new(1.0, -1.0, 0.0),
+    DVec3::new(-1.0, -1.0, 0.0),
+    DVec3::new(1.0, 0.0, 1.0),
+    DVec3::new(-1.0, 0.0, 1.0),
+    DVec3::new(1.0, 0.0, -1.0),
+    DVec3::new(-1.0, 0.0, -1.0),
+    DVec3::new(0.0, 1.0, 1.0),
+    DVec3::new(0.0, -1.0, 1.0),
+    DVec3::new(0.0, 1.0, -1.0),
+    DVec3::new(0.0, -1.0, -1.0),
+    DVec3::new(1.0, 1.0, 0.0),
+    DVec3::new(0.0, -1.0, 1.0),
+    DVec3::new(-1.0, 1.0, 0.0),
+    DVec3::new(0.0, -1.0, -1.0),
+];
+
+/// The scalar product with one of them, whose ones and zeros are no branches.
 fn gradient(hash: usize, v: DVec3) -> f64 {
-    match hash % 16 {
-        0 | 12 => v.x + v.y,
-        1 | 14 => -v.x + v.y,
-        2 => v.x - v.y,
-        3 => -v.x - v.y,
-        4 => v.x + v.z,
-        5 => -v.x + v.z,
-        6 => v.x - v.z,
-        7 => -v.x - v.z,
-        8 => v.y + v.z,
-        9 | 13 => -v.y + v.z,
-        10 => v.y - v.z,
-        _ => -v.y - v.z,
-    }
+    GRADIENTS[hash % GRADIENTS.len()].dot(v)
 }
 
 #[cfg(test)]

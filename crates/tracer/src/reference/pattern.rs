@@ -9,6 +9,7 @@ use rayfold_scene::{Coefficients, Object};
 
 use super::noise::noise;
 use super::shapes::Surface;
+use super::whole::{ceil, is_odd};
 
 /// A number this near to a wall between cells, beside 1 and itself, is on it, if it is a number of the script.
 const WALL: f64 = 1.0 / (1u64 << 40) as f64;
@@ -22,33 +23,15 @@ pub(crate) fn coefficients(object: &Object, place: DVec3, normal: DVec3, surface
     let own = material.coefficients();
     let Some(pattern) = material.finish().and_then(|finish| finish.pattern) else { return own };
     let face = if surface.flat { face(object, place, normal) } else { None };
-    let w = weight(pattern.weight, place, face);
-    let other = pattern.other;
-    let mixed = |a: DVec3, b: DVec3| {
-        // Where one of them is all, the other may be any number.
-        if w == 0.0 {
-            a
-        } else if w == 1.0 {
-            b
-        } else {
-            (1.0 - w) * a + w * b
-        }
-    };
-    let mixed = Coefficients::new(
-        mixed(own.ambient(), other.ambient()),
-        mixed(own.diffuse(), other.diffuse()),
-        mixed(own.mirror(), other.mirror()),
-    );
-    // A mean of finite numbers is finite.
-    mixed.unwrap_or(own)
+    own.mixed(&pattern.other, weight(pattern.weight, place, face))
 }
 
 /// How much there is of the other coefficients. A `face` is square to an axis, at a number of the script.
 fn weight(weight: Weight, place: DVec3, face: Option<(usize, f64)>) -> f64 {
-    let odd = |cells: f64| if cells.rem_euclid(2.0) == 1.0 { 1.0 } else { 0.0 };
+    let odd = |is_odd: bool| if is_odd { 1.0 } else { 0.0 };
     let cell = |axis: usize, size: f64| match face {
         Some((square, number)) if square == axis => cell_of_number(number / size),
-        _ => (place[axis] / size).ceil() - 1.0,
+        _ => ceil(place[axis] / size) - 1.0,
     };
     let place = match face {
         Some((axis, number)) => {
@@ -60,8 +43,11 @@ fn weight(weight: Weight, place: DVec3, face: Option<(usize, f64)>) -> f64 {
     };
     match weight {
         // The parity of each, as a sum of large numbers is rounded.
-        Weight::Checker(size) => odd([0, 1, 2].map(|axis| cell(axis, size).rem_euclid(2.0)).iter().sum()),
-        Weight::Stripes(size) => odd(cell(0, size)),
+        Weight::Checker(size) => {
+            let [x, y, z] = [0, 1, 2].map(|axis| is_odd(cell(axis, size)));
+            odd(x ^ y ^ z)
+        }
+        Weight::Stripes(size) => odd(is_odd(cell(0, size))),
         Weight::Noise(size) => (0.5 + 0.5 * noise(place / size)).clamp(0.0, 1.0),
         Weight::Gradient(start, end) => {
             // Halves, so that the difference is finite.
@@ -74,7 +60,7 @@ fn weight(weight: Weight, place: DVec3, face: Option<(usize, f64)>) -> f64 {
 fn cell_of_number(x: f64) -> f64 {
     let whole = x.round();
     let x = if (x - whole).abs() <= WALL * x.abs().max(1.0) { whole } else { x };
-    x.ceil() - 1.0
+    ceil(x) - 1.0
 }
 
 /// The axis that a flat part is square to, and its number on that axis in the script.

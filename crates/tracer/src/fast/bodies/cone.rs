@@ -5,9 +5,10 @@
 //! the caps to the first where it leaves them.
 //!
 //! A ray is followed from its place that is nearest to the end a, so that the numbers of the side are no larger than the
-//! body; along A·t² + 2·B·t + C the discriminant is (n - x)·(n + x), with n = |r·s - k·dz·ρ⃗|, x = ρ⃗ × s and s the part of
-//! the direction that is square to the axis, which takes the difference of no squares. Errors are then some roundoffs
-//! of the body's size aside, far less than what a new ray starts off the surface by.
+//! body; along A·t² + 2·B·t + C the discriminant is n² - x², with n = r·s - k·dz·ρ⃗, x = ρ⃗ × s and s the part of the
+//! direction that is square to the axis. Errors are then some roundoffs of the body's size aside, far less than what a new
+//! ray starts off the surface by. (Products of sum and difference would take roots, whose rounding is as large as that of the
+//! squares.)
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
@@ -61,16 +62,13 @@ impl<E: Real> Cone<E> {
         let slope = splat::<S, E>(simd, self.slope);
         let radius = slope.mul_add(place.z, splat::<S, E>(simd, self.radii[0]));
         let growth = slope * direction.z;
-        let spread = direction.x.mul_add(direction.x, direction.y * direction.y).sqrt();
-        let apart = place.x.mul_add(place.x, place.y * place.y).sqrt();
-        let a = (spread - growth) * (spread + growth);
+        let a = direction.x.mul_add(direction.x, direction.y * direction.y) - growth * growth;
         let b = place.x.mul_add(direction.x, place.y * direction.y) - radius * growth;
-        let c = (apart - radius) * (apart + radius);
+        let c = place.x.mul_add(place.x, place.y * place.y) - radius * radius;
         let nx = radius.mul_sub(direction.x, growth * place.x);
         let ny = radius.mul_sub(direction.y, growth * place.y);
-        let n = nx.mul_add(nx, ny * ny).sqrt();
-        let x = place.x.mul_sub(direction.y, place.y * direction.x).abs();
-        let discriminant = (n - x) * (n + x);
+        let x = place.x.mul_sub(direction.y, place.y * direction.x);
+        let discriminant = nx.mul_add(nx, ny * ny) - x * x;
         let widens = a.simd_gt(zero);
         let misses = widens & discriminant.simd_lt(zero);
         // Neither root subtracts numbers of the same sign.

@@ -13,6 +13,7 @@
 mod cone;
 mod cuboid;
 mod disc;
+mod few;
 mod placed;
 mod plane;
 mod torus;
@@ -23,6 +24,7 @@ use fearless_simd::prelude::*;
 use self::cone::Cone;
 use self::cuboid::Cuboid;
 use self::disc::Disc;
+use self::few::Few;
 pub(super) use self::placed::{Form, Solid, body, reach};
 use self::torus::Torus;
 use super::bounds::Crossing;
@@ -30,6 +32,7 @@ use super::descent::{backwards, descend};
 use super::packet::{Nearest, Ray, Surface};
 use super::parts::BUILT;
 use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use super::shapes::Shape as Placed;
 use super::tree::{Copies, Tree, group};
 
 /// A packet of rays in the coordinates of a body.
@@ -39,7 +42,7 @@ struct Local<S: Simd, E: Real> {
     direction: Vec3<S, E>,
 }
 
-/// Where rays meet a body, in its coordinates: the place brought onto it, the unit normal on the side that they came
+/// Where rays meet a body, in its coordinates or those of the scene: the place brought onto it, the unit normal on the side that they came
 /// from, and whether that is the inside.
 struct Met<S: Simd, E: Real> {
     point: Vec3<S, E>,
@@ -129,6 +132,14 @@ impl<E: Real> Body<E> {
         Vec3::splat(simd, z).scale_add(v.z, along)
     }
 
+    /// What its own coordinates say in those of the scene.
+    #[inline(always)]
+    fn in_scene<S: Simd>(&self, simd: S, Met { point, normal, within }: Met<S, E>) -> Met<S, E> {
+        let center = Vec3::splat(simd, self.center);
+        let point = self.turned_back(simd, point).scale_add(constant::<S, E>(simd, 1.0), center);
+        Met { point, normal: self.turned_back(simd, normal), within }
+    }
+
     /// How high over the end b rays start, as exactly as over the end a: caps in the plane of a face are met where that is.
     #[inline(always)]
     fn over<S: Simd>(&self, simd: S, end: [E; 3], ray: Ray<S, E>) -> Lanes<S, E> {
@@ -164,20 +175,29 @@ impl<E: Real> Body<E> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let local = self.local(simd, ray);
-                let met = match &self.shape {
-                    Shape::Plane | Shape::Disc(_) => plane::surface(simd, local, distance),
-                    Shape::Cone(cone, end) => cone.surface(simd, local, self.over(simd, *end, ray), distance),
-                    Shape::Torus(torus) => torus.surface(simd, local, distance),
-                    Shape::Cuboid(cuboid) => cuboid.surface(simd, local, distance),
-                };
                 let center = Vec3::splat(simd, self.center);
-                let point = self.turned_back(simd, met.point).scale_add(constant::<S, E>(simd, 1.0), center);
-                let normal = self.turned_back(simd, met.normal);
+                let met = match &self.shape {
+                    Shape::Plane | Shape::Disc(_) => {
+                        let up = Vec3::splat(simd, self.axes[2]);
+                        plane::surface(simd, (up, center), ray, distance)
+                    }
+                    Shape::Cone(cone, end) => {
+                        let local = self.local(simd, ray);
+                        let over = self.over(simd, *end, ray);
+                        self.in_scene(simd, cone.surface(simd, local, over, distance))
+                    }
+                    Shape::Torus(torus) => {
+                        self.in_scene(simd, torus.surface(simd, self.local(simd, ray), distance))
+                    }
+                    Shape::Cuboid(cuboid) => {
+                        self.in_scene(simd, cuboid.surface(simd, self.local(simd, ray), distance))
+                    }
+                };
+                let Met { point, normal, within } = met;
                 let size = point.x.abs() + point.y.abs() + point.z.abs();
                 let offset = size
                     .mul_add(constant::<S, E>(simd, OFFSET * E::ROUNDOFF), splat::<S, E>(simd, self.offset));
-                Surface { start: normal.scale_add(offset, point), normal, offset, within: met.within }
+                Surface { start: normal.scale_add(offset, point), normal, offset, within }
             },
         )
     }
@@ -193,7 +213,12 @@ pub(super) struct Bodies<E> {
     bodies: Vec<Body<E>>,
     planes: usize,
     way: Way<E>,
+    /// Those of the tree, where they are few.
+    few: Option<Few<E>>,
 }
+
+/// Any body, whether they are few or many.
+pub(super) const ANY: u64 = u64::MAX;
 
 /// How bodies are found: one question, so that those in a tree do not ask for planes.
 #[derive(Debug)]
@@ -210,13 +235,14 @@ impl<E: Real> Bodies<E> {
         let branches = group(&mut bounded, Some(true), Copies::Kept);
         let count = planes.len();
         let tree = branches.map(|branches| Tree::new(&branches, &bounded, |place| (count + place) as u32));
+        let few = Few::new(&bounded);
         planes.append(&mut bounded);
         let way = match tree {
             Some(tree) if count == 0 => Way::Tree(tree),
             Some(tree) => Way::Both(tree),
             None => Way::Planes,
         };
-        Self { bodies: planes.iter().map(Body::new).collect(), planes: count, way }
+        Self { bodies: planes.iter().map(Body::new).collect(), planes: count, way, few }
     }
 
     /// Where each stands, by its order in the script.
@@ -224,15 +250,21 @@ impl<E: Real> Bodies<E> {
         self.bodies.iter().enumerate().map(|(at, body)| (body.order.to_index(), at))
     }
 
-    /// Offers where the rays meet a body that is not farther than what they met before.
+    /// The boxes around those that have bounds, in the order of the bits that ask for them; none where they are too many for
+    /// that.
+    pub(super) fn boxes(&self) -> Option<&[Placed]> {
+        self.few.as_ref().map(|few| &few.boxes[..])
+    }
+
+    /// Offers where the rays meet a body that is not farther than what they met before: a plane, or one that `bits` asks for.
     #[inline(always)]
-    pub(super) fn meet<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+    pub(super) fn meet<S: Simd>(&self, simd: S, bits: u64, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
         match &self.way {
-            Way::Tree(tree) => self.meet_bounded(simd, tree, ray, nearest),
+            Way::Tree(tree) => self.meet_bounded(simd, (tree, bits), ray, nearest),
             Way::Planes => self.meet_planes(simd, ray, nearest),
             Way::Both(tree) => {
                 self.meet_planes(simd, ray, nearest);
-                self.meet_bounded(simd, tree, ray, nearest);
+                self.meet_bounded(simd, (tree, bits), ray, nearest);
             }
         }
     }
@@ -250,15 +282,45 @@ impl<E: Real> Bodies<E> {
         }
     }
 
-    /// Offers where the rays meet a body of the tree.
+    /// Offers where the rays meet a body of the tree: one that `bits` asks for, if they are few.
     #[inline(always)]
     pub(super) fn meet_bounded<S: Simd>(
         &self,
         simd: S,
-        tree: &Tree<E>,
+        (tree, bits): (&Tree<E>, u64),
         ray: Ray<S, E>,
         nearest: &mut Nearest<S, E>,
     ) {
+        match &self.few {
+            Some(few) if bits != ANY => self.meet_few(simd, (few, bits), ray, nearest),
+            Some(_) | None => self.meet_in_tree(simd, tree, ray, nearest),
+        }
+    }
+
+    #[inline(always)]
+    fn meet_few<S: Simd>(
+        &self,
+        simd: S,
+        (few, mut bits): (&Few<E>, u64),
+        ray: Ray<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
+        let zero = constant::<S, E>(simd, 0.0);
+        // What others may write to stands in memory: a copy does, and `nearest` need not.
+        let mut with = *nearest;
+        while bits != 0 {
+            let bit = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            let open = with.distance.simd_gt(zero);
+            if (open & few.are_near(simd, bit, ray)).any_true() {
+                self.bodies[self.planes + bit].meet(simd, ray, &mut with);
+            }
+        }
+        *nearest = with;
+    }
+
+    #[inline(always)]
+    fn meet_in_tree<S: Simd>(&self, simd: S, tree: &Tree<E>, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
         // Computed distances are no nearer than this to those of boxes beyond them.
         let slack = constant::<S, E>(simd, super::rounding::distance_error::<E>());
         let crossing = Crossing::new(simd, ray);
@@ -303,21 +365,29 @@ impl<E: Real> Bodies<E> {
         simd.vectorize(
             #[inline(always)]
             || {
+                let zero = constant::<S, E>(simd, 0.0);
+                let open = nearest.distance.simd_gt(zero);
                 for plane in &self.bodies[..self.planes] {
                     let up = Vec3::<S, E>::splat(simd, plane.axes[2]);
                     let high = up.dot(ray.origin.sub(Vec3::splat(simd, plane.center)));
-                    let (hit, distance) = plane::across::<S, E>(simd, high, up.dot(ray.direction));
-                    nearest.offer(simd, hit, distance, plane.order);
+                    let climb = up.dot(ray.direction);
+                    let comes = (high.simd_gt(zero) & climb.simd_lt(zero))
+                        | (high.simd_lt(zero) & climb.simd_gt(zero));
+                    if (open & comes).any_true() {
+                        let (hit, distance) = plane::across::<S, E>(simd, high, climb);
+                        nearest.offer(simd, hit, distance, plane.order);
+                    }
                 }
             },
         );
     }
 
-    /// Which of the rays that `lit` names meet no body nearer than `far`.
+    /// Which of the rays that `lit` names meet no plane and no body that `bits` asks for, nearer than `far`.
     #[inline(always)]
     pub(super) fn unoccluded<S: Simd>(
         &self,
         simd: S,
+        bits: u64,
         ray: Ray<S, E>,
         far: Lanes<S, E>,
         lit: Mask<S, E>,
@@ -326,7 +396,7 @@ impl<E: Real> Bodies<E> {
         // What is in the dark has no way to go.
         nearest.distance = lit.select(far, constant::<S, E>(simd, -1.0));
         let limit = nearest.distance;
-        self.meet(simd, ray, &mut nearest);
+        self.meet(simd, bits, ray, &mut nearest);
         lit & !nearest.distance.simd_lt(limit)
     }
 

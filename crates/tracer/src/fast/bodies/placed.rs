@@ -146,6 +146,20 @@ impl Solid {
         }
     }
 
+    /// A ball around it, of a plane its point alone: its middle and its radius, wide enough for what rounding makes of it.
+    pub(super) fn ball(&self) -> (DVec3, f64) {
+        let (center, radius) = match self.form {
+            Form::Plane => (self.center, 0.0),
+            Form::Disc { radius } => (self.center, radius),
+            Form::Cone { radii: [a, b], height, end } => {
+                (0.5 * (self.center + end), a.max(b).hypot(0.5 * height))
+            }
+            Form::Torus { radius, thickness } => (self.center, radius + thickness),
+            Form::Cuboid { half } => (self.center, half.length()),
+        };
+        (center, radius + WIDER * self.extent())
+    }
+
     /// The box around it; none around a plane.
     pub(in crate::fast) fn bounds(&self) -> Option<Bounds> {
         let [x, y, z] = self.axes;

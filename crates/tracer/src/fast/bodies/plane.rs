@@ -4,7 +4,7 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use super::{Local, Met};
-use crate::fast::packet::no_lane;
+use crate::fast::packet::{Ray, no_lane};
 use crate::fast::real::{Lanes, Mask, Real, Vec3, constant};
 
 /// Where rays meet the plane z = 0. The distance is worked out as that to a box's slab, so that what lies in the plane of
@@ -27,12 +27,18 @@ pub(super) fn across<S: Simd, E: Real>(
     (is_ahead, distance)
 }
 
-/// The surface of the plane z = 0.
+/// The surface of a plane through `center`, square to `up`, in the coordinates of the scene: of all bodies it alone needs no
+/// axes of its own.
 #[inline(always)]
-pub(super) fn surface<S: Simd, E: Real>(simd: S, ray: Local<S, E>, distance: Lanes<S, E>) -> Met<S, E> {
+pub(super) fn surface<S: Simd, E: Real>(
+    simd: S,
+    (up, center): (Vec3<S, E>, Vec3<S, E>),
+    ray: Ray<S, E>,
+    distance: Lanes<S, E>,
+) -> Met<S, E> {
     let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
-    let Vec3 { x, y, .. } = ray.direction.scale_add(distance, ray.origin);
-    let up = ray.direction.z.simd_gt(zero).select(zero - one, one);
-    let (point, normal) = (Vec3::<S, E>::new(x, y, zero), Vec3::<S, E>::new(zero, zero, up));
-    Met { point, normal, within: no_lane::<S, E>(simd) }
+    let place = ray.direction.scale_add(distance, ray.origin);
+    let beside = zero - up.dot(place.sub(center));
+    let side = up.dot(ray.direction).simd_gt(zero).select(zero - one, one);
+    Met { point: up.scale_add(beside, place), normal: up.scale(side), within: no_lane::<S, E>(simd) }
 }

@@ -3,9 +3,9 @@
 //! With ρ the distance from the axis, the surface is where s = (ρ - R)² + z² - r² is 0. Squared, that is a quartic along
 //! the ray with the sign of s; from the place nearest to the middle, where its cubic term is 0, its derivative over 4 is
 //! t³ + p·t + v. Between two roots of that the quartic goes one way and has one root at most. So roots are bracketed: by
-//! those of the cubic, which are bracketed by where it turns itself. The quartic is never computed: where s has another
-//! sign at both ends of such a stretch, there is the hit. s errs by some roundoffs of the torus's size, far less than what
-//! a new ray starts off the surface by.
+//! those of the cubic, which Newton's method finds from where it cannot overshoot. The quartic is never computed: where s
+//! has another sign at both ends of such a stretch, there is the hit. s errs by some roundoffs of the torus's size, far less
+//! than what a new ray starts off the surface by.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
@@ -13,9 +13,19 @@ use fearless_simd::prelude::*;
 use super::{Local, Met};
 use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
 
-/// A bracket is narrowed so often at most: every third time it is halved, so that it ends at the last bit also where a ray
-/// grazes the torus and secants help little.
-const STEPS: u32 = 3 * f64::MANTISSA_DIGITS;
+/// Newton's method alone finds most roots in so many steps.
+const FAST: u32 = 6;
+
+/// A bracket is narrowed so often at most: after the fast steps it is halved every third time, so that it ends at the last bit
+/// also where a ray grazes the torus and tangents help little.
+const STEPS: u32 = FAST + 3 * f64::MANTISSA_DIGITS;
+
+/// Steps to a root of the cubic at most, which get shorter by half at the least: towards two roots in one place.
+const TURN_STEPS: u32 = f64::MANTISSA_DIGITS;
+
+/// How near to a turn is near enough, in parts of the torus: s is known there up to the square of it, and where turns meet up to
+/// the cube.
+const NEAR_TURN: f64 = 1e-6;
 
 /// Around the origin, square to z; lengths are in units of the torus.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +53,17 @@ impl<S: Simd, E: Real> Chord<S, E> {
         let Vec3 { x, y, z } = self.direction.scale_add(t, self.place);
         let over = x.mul_add(x, y * y).sqrt() - self.ring;
         over.mul_add(over, z * z) - self.square
+    }
+
+    /// The same, and how it changes along the ray; that may be no number on the axis.
+    #[inline(always)]
+    fn outside_and_slope(&self, t: Lanes<S, E>) -> (Lanes<S, E>, Lanes<S, E>) {
+        let Vec3 { x, y, z } = self.direction.scale_add(t, self.place);
+        let apart = x.mul_add(x, y * y).sqrt();
+        let over = apart - self.ring;
+        let outwards = x.mul_add(self.direction.x, y * self.direction.y) / apart;
+        let half_slope = over.mul_add(outwards, z * self.direction.z);
+        (over.mul_add(over, z * z) - self.square, half_slope + half_slope)
     }
 }
 
@@ -84,7 +105,7 @@ impl<E: Real> Torus<E> {
         }
         let chord = Chord { place, direction, ring, square: tube * tube };
         // The cubic over 4: t³ + p·t + v.
-        let error = outer * constant::<S, E>(simd, 2.0 * E::ROUNDOFF);
+        let near_turn = outer * constant::<S, E>(simd, NEAR_TURN);
         let twice = (ring + ring) * ring * direction.z;
         let p = twice.mul_add(direction.z, near - ring.mul_add(ring, tube * tube));
         let v = twice * place.z;
@@ -94,14 +115,15 @@ impl<E: Real> Torus<E> {
         let most = end.max(turn);
         // The roots of the cubic in order; where a stretch has none, its end.
         let turns = [
-            cubic_root::<S, E>(simd, cubic, (least, zero - turn), error),
-            cubic_root::<S, E>(simd, cubic, (zero - turn, turn), error),
-            cubic_root::<S, E>(simd, cubic, (turn, most), error),
+            cubic_root::<S, E>(simd, cubic, (least, zero - turn), least, near_turn),
+            cubic_root::<S, E>(simd, cubic, (zero - turn, turn), zero, near_turn),
+            cubic_root::<S, E>(simd, cubic, (turn, most), most, near_turn),
             end,
         ];
         // What begins before the torus does is outside; what begins on it goes one way up to the first turn.
         let is_ahead = begin.simd_gt(zero - middle);
-        let mut side = is_ahead.select(constant::<S, E>(simd, 1.0), chord.outside(begin));
+        let mut at_from = chord.outside(begin);
+        let mut side = is_ahead.select(constant::<S, E>(simd, 1.0), at_from);
         let (mut from, mut to, mut at_end, mut found) = (begin, begin, zero, none);
         for turn in turns {
             let here = turn.max(from).min(end);
@@ -116,6 +138,7 @@ impl<E: Real> Torus<E> {
             let goes_on = open & here.simd_gt(from);
             from = goes_on.select(here, from);
             side = goes_on.select(outside, side);
+            at_from = goes_on.select(outside, at_from);
         }
         if !found.any_true() {
             return (none, zero);
@@ -123,13 +146,17 @@ impl<E: Real> Torus<E> {
         // Where it only touches, the turn is known better than the root.
         let touches = at_end.simd_eq(zero);
         let sign = side.simd_lt(zero).select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0));
+        let error = outer * constant::<S, E>(simd, 2.0 * E::ROUNDOFF);
         let root = bracketed::<S, E>(
             simd,
-            from,
-            to,
+            (from, at_from * sign),
+            (to, at_end * sign),
             (found & !touches, error),
             #[inline(always)]
-            |t| chord.outside(t) * sign,
+            |t| {
+                let (outside, slope) = chord.outside_and_slope(t);
+                (outside * sign, slope * sign)
+            },
         );
         let distance = touches.select(to, root) + middle;
         (found & distance.simd_gt(zero), distance)
@@ -169,69 +196,72 @@ impl<S: Simd, E: Real> Cubic<S, E> {
     }
 }
 
-/// Where the cubic is 0 between two places, between which it goes one way; the second place where it is not 0.
+/// Where the cubic is 0 between two places, between which it goes one way; the second place where it is not 0. On the way there
+/// from `start` it is bent away from 0, so that no tangent leads beyond the root.
 #[inline(always)]
 fn cubic_root<S: Simd, E: Real>(
     simd: S,
     cubic: Cubic<S, E>,
     (from, to): (Lanes<S, E>, Lanes<S, E>),
-    error: Lanes<S, E>,
+    start: Lanes<S, E>,
+    near: Lanes<S, E>,
 ) -> Lanes<S, E> {
-    let zero = constant::<S, E>(simd, 0.0);
+    let (zero, three) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 3.0));
     let (first, last) = (cubic.at(from), cubic.at(to));
     let changes = (first * last).simd_lt(zero) & from.simd_lt(to);
-    if !changes.any_true() {
-        return to;
+    let (mut open, mut root) = (changes, start);
+    for _ in 0..TURN_STEPS {
+        if !open.any_true() {
+            break;
+        }
+        let here = cubic.at(root);
+        let step = here / (three * root).mul_add(root, cubic.p);
+        let next = (root - step).max(from).min(to);
+        let moves = here.simd_ne(zero) & (next - root).abs().simd_gt(near);
+        root = (open & here.simd_ne(zero)).select(next, root);
+        open &= moves;
     }
-    let sign = first.simd_lt(zero).select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0));
-    let root = bracketed::<S, E>(
-        simd,
-        from,
-        to,
-        (changes, error),
-        #[inline(always)]
-        |t| cubic.at(t) * sign,
-    );
     changes.select(root, to)
 }
 
-/// Where a function is 0, to within an `error`, that is not negative at `from` and negative, or 0, at `to`. Only the
-/// `wanted` lanes need be right.
+/// Where a function is 0, to within an `error`, that is not negative at the first of two places, and negative, or 0, at the
+/// second: places come with their values, what is asked with its slope. Only the `wanted` lanes need be right.
 ///
-/// Regula falsi with the weights of Illinois (Dowell and Jarratt 1971) and bisection in turns. Each lane goes its own way,
+/// Newton's method within a bracket, and bisection where that leads out of it or takes too long. Each lane goes its own way,
 /// whatever the others do.
 #[inline(always)]
 fn bracketed<S: Simd, E: Real>(
     simd: S,
-    from: Lanes<S, E>,
-    to: Lanes<S, E>,
+    (mut low, at_low): (Lanes<S, E>, Lanes<S, E>),
+    (mut high, at_high): (Lanes<S, E>, Lanes<S, E>),
     (wanted, error): (Mask<S, E>, Lanes<S, E>),
-    value: impl Fn(Lanes<S, E>) -> Lanes<S, E>,
+    value: impl Fn(Lanes<S, E>) -> (Lanes<S, E>, Lanes<S, E>),
 ) -> Lanes<S, E> {
     let (zero, half) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 0.5));
-    let (mut low, mut high) = (from, to);
-    let (mut at_low, mut at_high) = (value(low).max(zero), value(high).min(zero));
-    let mut open = wanted;
+    let middle = half.mul_add(low, half * high);
+    let secant = low + (high - low) * (at_low / (at_low - at_high));
+    let mut place = (secant.simd_gt(low) & secant.simd_lt(high)).select(secant, middle);
+    let (mut root, mut open) = (place, wanted);
     for step in 0..STEPS {
-        let middle = half.mul_add(low, half * high);
-        let secant = low + (high - low) * (at_low / (at_low - at_high));
-        let is_between = secant.simd_gt(low) & secant.simd_lt(high);
-        let place = if step % 3 == 2 { middle } else { is_between.select(secant, middle) };
-        open &= (high - low).simd_gt(error) & middle.simd_gt(low) & middle.simd_lt(high);
+        open &= (high - low).simd_gt(error) & place.simd_gt(low) & place.simd_lt(high);
         if !open.any_true() {
             break;
         }
-        let here = value(place);
+        let (here, slope) = value(place);
         let is_before = here.simd_gt(zero);
-        let (before, after) = (open & is_before, open & !is_before);
-        low = before.select(place, low);
-        at_high = before.select(at_high * half, at_high);
-        at_low = before.select(here, at_low);
-        high = after.select(place, high);
-        at_low = after.select(at_low * half, at_low);
-        at_high = after.select(here, at_high);
-        // A root that is hit is the end.
-        low = (open & here.simd_eq(zero)).select(place, low);
+        low = (open & is_before).select(place, low);
+        high = (open & !is_before).select(place, high);
+        let middle = half.mul_add(low, half * high);
+        let tangent = place - here / slope;
+        let is_between = tangent.simd_gt(low) & tangent.simd_lt(high);
+        let stays = (tangent - place).abs().simd_le(error);
+        let ends = here.simd_eq(zero) | stays;
+        let end = here.simd_eq(zero).select(place, tangent);
+        let halves = step >= FAST && step % 3 == 2;
+        let next = if halves { middle } else { is_between.select(tangent, middle) };
+        root = open.select(ends.select(end, middle), root);
+        place = open.select(next, place);
+        open &= !ends;
     }
-    half.mul_add(low, half * high)
+    root
 }

@@ -32,6 +32,8 @@ pub(in crate::fast) struct Extents {
     lamps: Vec<Option<(usize, Ball)>>,
     /// Of few objects: what they are known to lie in.
     hulls: Option<Hulls>,
+    /// The same of few bodies.
+    bodies: Option<Hulls>,
     /// The first dimension of each of the points.
     dimensions: Vec<usize>,
 }
@@ -68,7 +70,7 @@ impl Extents {
     pub(super) fn new<E: Real>(
         scene: &Scene,
         geometry: &Geometry,
-        shapes: Option<&[Shape]>,
+        (shapes, bodies): (Option<&[Shape]>, Option<&[Shape]>),
         dimensions: &Dimensions,
     ) -> Option<Self> {
         let (mut suns, mut lamps, mut firsts) = (vec![], vec![], vec![]);
@@ -92,8 +94,9 @@ impl Extents {
                 }
             }
         }
-        let hulls = shapes.map(|shapes| Hulls::new::<E>(shapes.iter()));
-        (!firsts.is_empty()).then_some(Self { suns, lamps, hulls, dimensions: firsts })
+        let [hulls, bodies] =
+            [shapes, bodies].map(|shapes| shapes.map(|shapes| Hulls::new::<E>(shapes.iter())));
+        (!firsts.is_empty()).then_some(Self { suns, lamps, hulls, bodies, dimensions: firsts })
     }
 
     /// The points of rays of these samples of pixels.
@@ -187,20 +190,32 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                 Some(_) => Candidates::masked(scene.masks(mask)),
                 None => scene.all(),
             };
-            let towards_sun = |sun: &SoftSun| match &extents.hulls {
+            let towards_sun = |hulls: &Option<Hulls>, sun: &SoftSun| match hulls {
                 Some(hulls) => hulls.towards(&from, &sun.cone),
                 None => u64::MAX,
             };
-            let to_lamp = |ball: &Ball| match &extents.hulls {
+            let to_lamp = |hulls: &Option<Hulls>, ball: &Ball| match hulls {
                 Some(hulls) => hulls.between(&from, ball.middle, ball.radius),
                 None => u64::MAX,
             };
-            let sun_masks: Vec<u64> =
-                extents.suns.iter().map(|sun| sun.as_ref().map_or(0, |(_, sun)| towards_sun(sun))).collect();
-            let lamp_masks: Vec<u64> = extents
+            // Of objects and of bodies.
+            let all_hulls = [&extents.hulls, &extents.bodies];
+            let sun_masks: Vec<[u64; 2]> = extents
+                .suns
+                .iter()
+                .zip(&obstacles.of)
+                .map(|(sun, in_the_way)| match sun {
+                    Some((_, sun)) => all_hulls.map(|hulls| towards_sun(hulls, sun)),
+                    None => [0, in_the_way.bodies],
+                })
+                .collect();
+            let lamp_masks: Vec<[u64; 2]> = extents
                 .lamps
                 .iter()
-                .map(|lamp| lamp.as_ref().map_or(u64::MAX, |(_, ball)| to_lamp(ball)))
+                .map(|lamp| match lamp {
+                    Some((_, ball)) => all_hulls.map(|hulls| to_lamp(hulls, ball)),
+                    None => [u64::MAX; 2],
+                })
                 .collect();
             for &(at, others) in &hits.packets {
                 let normal = Vec3::load(simd, &hits.normal, at);
@@ -224,7 +239,7 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                     let mut lit = facing;
                     if lit.any_true() {
                         lit = if own.is_some() {
-                            let mut candidates = all(sun_masks[index]);
+                            let mut candidates = all(sun_masks[index][0]);
                             candidates.masks = candidates.masks.and_spheres(others);
                             unmet::<S, E, F>(simd, scene, ray, far, lit, candidates)
                         } else {
@@ -235,7 +250,7 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                     if let Some(bodies) = bodies
                         && lit.any_true()
                     {
-                        lit = bodies.unoccluded(simd, ray, far, lit);
+                        lit = bodies.unoccluded(simd, sun_masks[index][1], ray, far, lit);
                     }
                     let mut color = Vec3::splat(simd, light.sun.color);
                     if let Some(glass) = glass {
@@ -266,9 +281,9 @@ pub(in crate::fast) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const E
                     if let Some(bodies) = bodies
                         && lit.any_true()
                     {
-                        lit = bodies.unoccluded(simd, ray, far, lit);
+                        lit = bodies.unoccluded(simd, lamp_masks[index][1], ray, far, lit);
                     }
-                    let mut candidates = all(lamp_masks[index]);
+                    let mut candidates = all(lamp_masks[index][0]);
                     candidates.masks = candidates.masks.and_spheres(others);
                     lit = unmet::<S, E, F>(simd, scene, ray, far, lit, candidates);
                     let mut color = Vec3::splat(simd, lamp.color);

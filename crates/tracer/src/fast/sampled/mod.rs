@@ -51,6 +51,8 @@ pub(super) const MARGIN: f64 = 0.5 + super::rounding::MARGIN;
 struct Moment<E> {
     prepared: Prepared<E>,
     window: Window,
+    /// Of few bodies.
+    bodies: Option<Window>,
     extents: Option<Extents>,
     lens: Option<Aperture<E>>,
 }
@@ -194,12 +196,14 @@ impl<E: Real> Moment<E> {
         shapes.sort_by_key(|shape| shape.kind().number());
         let window = Window::new(geometry.view, &shapes, &grid, E::ROUNDOFF);
         let few = prepared.tree.is_none().then_some(&shapes[..]);
-        let extents = Extents::new::<E>(scene, geometry, few, dimensions);
+        let boxes = prepared.boxes_of_bodies();
+        let bodies = Window::of_bodies(geometry.view, boxes, &grid, E::ROUNDOFF);
+        let extents = Extents::new::<E>(scene, geometry, (few, boxes), dimensions);
         let lens = match geometry.view {
             View::Pinhole { right, up, .. } => geometry.lens.map(|lens| Aperture::new(lens, right, up)),
             View::Parallel { .. } => None,
         };
-        Ok(Self { prepared, window, extents, lens })
+        Ok(Self { prepared, window, bodies, extents, lens })
     }
 }
 

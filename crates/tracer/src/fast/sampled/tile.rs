@@ -234,10 +234,17 @@ impl<E: Real> Moment<E> {
         if parts::BUILT.lenses { self.lens.as_ref() } else { None }
     }
 
+    /// Which bodies it can show, by bits.
+    #[inline(always)]
+    fn bodies_in(&self, tile: &SampledTile) -> u64 {
+        self.prepared.bodies_in(self.bodies.as_ref(), tile.place)
+    }
+
     /// Whether a tile surely shows nothing but a background of one colour.
     #[inline(always)]
     fn shows_nothing(&self, tile: &SampledTile) -> bool {
-        self.prepared.is_plain() && self.window.candidates(tile.place.0, tile.place.1) == 0
+        self.window.candidates(tile.place.0, tile.place.1) == 0
+            && self.prepared.shows_nothing(self.bodies_in(tile))
     }
 }
 
@@ -315,17 +322,20 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
         waiting.begin(pass.bounces);
     }
     let (kinds, background) = (candidates.kinds, scene.background);
+    let bodies = moment.bodies_in(tile);
     if matches!(scene.rays, Rays::Pinhole(_)) && moment.lens().is_none() {
         fitted!(N, kinds, tree, C T D => {
             look::<S, E, Variant<N::By, C, T, D>, true>(simd, scene, candidates, background, queue, hits)
         });
-        let met = Met { kinds, background, queue, count, next: Some(&mut *next), waiting, soft };
+        let next = Some(&mut *next);
+        let met = Met { kinds, bodies, background, queue, count, next, waiting, soft };
         shade::<S, E, N, true>(simd, scene, met, hits, in_the_way);
     } else {
         fitted!(N, kinds, tree, C T D => {
             look::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, candidates, background, queue, hits)
         });
-        let met = Met { kinds, background, queue, count, next: Some(&mut *next), waiting, soft };
+        let next = Some(&mut *next);
+        let met = Met { kinds, bodies, background, queue, count, next, waiting, soft };
         shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
     }
     if pass.wanted.is_first_look {
