@@ -114,3 +114,6 @@ fn reasons_are_there(next: &Manifest, _: Option<&Manifest>) -> bool {
 fn settings_are_either(next: &Manifest, _: Option<&Manifest>) -> bool {
     next.head.settings.value.is_some() != next.head.settings.fault.is_some()
 }
+
+#[cfg(test)]
+mod tests;

@@ -170,3 +170,27 @@ fn an_animation_has_at_most_as_many_frames_as_it_may() {
         assert_eq!(head.status == Status::Failed, is_too_many, "{most:?}");
     }
 }
+
+#[test]
+fn of_many_diagnostics_the_first_are_repeated_and_the_others_counted() {
+    let unknown = br#"{"a": 1, "b": 2, "c": 3, "d": 4, "e": 5}"#;
+    let all = parse_settings(SETTINGS_FILE, unknown).diagnostics;
+    assert_eq!(all.len(), 5, "{all:?}");
+    let whole = Reason { omitted: 7, ..Reason::from_diagnostics(all.clone()) };
+    assert_eq!(whole.diagnostics, all);
+    let shortened = whole.shortened();
+    assert_eq!((&shortened.diagnostics[..], shortened.omitted), (&all[..DIAGNOSTICS_SHOWN], 9));
+    assert_eq!(shortened.clone().shortened(), shortened);
+}
+
+/// What each line says is read by people, and costs each reader of a large manifest.
+#[test]
+fn a_document_leaves_out_what_says_nothing() {
+    let json = |reason: &Reason| serde_json::to_string(reason).unwrap();
+    let plain = Reason::new("why");
+    assert_eq!(json(&plain), r#"{"message":"why"}"#);
+    assert_eq!(json(&Reason { omitted: 1, ..plain.clone() }), r#"{"message":"why","omitted":1}"#);
+    for reason in [Reason { omitted: 3, ..plain.clone() }, plain] {
+        assert_eq!(serde_json::from_str::<Reason>(&json(&reason)).unwrap(), reason);
+    }
+}
