@@ -1,10 +1,11 @@
 //! Steps on a store in memory in which somebody meddles at the worst moment: one test for each rule that only then shows.
 
 mod bands;
+mod refusals;
 
 use std::num::NonZeroU64;
 use std::ops::Range;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
@@ -13,7 +14,7 @@ use bytes::Bytes;
 use crate::failure::{End, Failure, Recorded};
 use crate::keys::{Animation, Key, ScriptName};
 use crate::manifest::{FrameState, Manifest, Reason, Status};
-use crate::render::Outcome;
+use crate::render::{Outcome, Rendered};
 use crate::retry::{Scope, retry};
 use crate::simulation::acting::{Drawer, film, picture};
 use crate::store::{
@@ -26,8 +27,8 @@ use crate::{
 };
 
 /// Jumps to wherever someone waits for.
-#[derive(Debug)]
-struct JumpingClock(AtomicU64);
+#[derive(Debug, Clone)]
+struct JumpingClock(Arc<AtomicU64>);
 
 impl Clock for JumpingClock {
     fn now(&self) -> Timestamp {
@@ -41,20 +42,28 @@ impl Clock for JumpingClock {
 
 type Meddler = Box<dyn FnMut(&str, &mut Bucket, Timestamp) + Send>;
 
+/// Answers a request that is named like `put frames/…` with an error, and nothing is done.
+type Refuser = Box<dyn FnMut(&str) -> Option<Error> + Send>;
+
 /// A bucket in which somebody does something before a request that is named like `put frames/…`.
 struct Meddled {
     bucket: Mutex<Bucket>,
     clock: JumpingClock,
     meddler: Mutex<Option<Meddler>>,
+    refuser: Mutex<Option<Refuser>>,
 }
 
 impl Meddled {
-    fn meet(&self, action: &str, key: &str) -> std::sync::MutexGuard<'_, Bucket> {
+    fn meet(&self, action: &str, key: &str) -> Result<std::sync::MutexGuard<'_, Bucket>> {
+        let refuse = |refuser: &mut Refuser| refuser(&format!("{action} {key}"));
+        if let Some(error) = self.refuser.lock().unwrap().as_mut().and_then(refuse) {
+            return Err(error);
+        }
         let mut bucket = self.bucket.lock().unwrap();
         if let Some(meddler) = self.meddler.lock().unwrap().as_mut() {
             meddler(&format!("{action} {key}"), &mut bucket, self.clock.now());
         }
-        bucket
+        Ok(bucket)
     }
 }
 
@@ -62,28 +71,28 @@ impl Store for Meddled {
     type Upload = Pieces;
 
     async fn get(&self, key: &str) -> Result<Object> {
-        self.meet("get", key).get(key)
+        self.meet("get", key)?.get(key)
     }
 
     async fn get_range(&self, key: &str, range: Range<u64>) -> Result<Object> {
-        self.meet("get", key).get_range(key, range)
+        self.meet("get", key)?.get_range(key, range)
     }
 
     async fn head(&self, key: &str) -> Result<ObjectInfo> {
-        self.meet("head", key).head(key)
+        self.meet("head", key)?.head(key)
     }
 
     async fn put(&self, key: &str, body: Bytes, options: PutOptions) -> Result<ETag> {
-        self.meet("put", key).put(self.clock.now(), key, body, options)
+        self.meet("put", key)?.put(self.clock.now(), key, body, options)
     }
 
     async fn delete(&self, key: &str) -> Result<()> {
-        self.meet("delete", key).delete(key);
+        self.meet("delete", key)?.delete(key);
         Ok(())
     }
 
     async fn list(&self, request: ListRequest) -> Result<ListPage> {
-        Ok(self.meet("list", &request.prefix).list(&request))
+        Ok(self.meet("list", &request.prefix)?.list(&request))
     }
 
     async fn upload(&self, _: &str, _: PutOptions) -> Result<Pieces> {
@@ -157,8 +166,9 @@ struct World {
 
 impl World {
     fn new() -> Self {
-        let clock = JumpingClock(AtomicU64::new(1_000_000));
-        let store = Meddled { bucket: Mutex::default(), clock, meddler: Mutex::default() };
+        let clock = JumpingClock(Arc::new(AtomicU64::new(1_000_000)));
+        let bucket = Mutex::default();
+        let store = Meddled { bucket, clock, meddler: Mutex::default(), refuser: Mutex::default() };
         World { store, random: Randomness::seeded(1), policy: Policy::new(1), requests: AtomicU64::new(0) }
     }
 
@@ -181,16 +191,21 @@ impl World {
         *self.store.meddler.lock().unwrap() = Some(Box::new(meddler));
     }
 
+    fn refuse(&self, refuser: impl FnMut(&str) -> Option<Error> + Send + 'static) {
+        *self.store.refuser.lock().unwrap() = Some(Box::new(refuser));
+    }
+
     async fn with<T>(&self, step: impl AsyncFnOnce(&Invocation<'_, Meddled, JumpingClock>) -> T) -> T {
         let id = format!("request-{}", self.requests.fetch_add(1, Ordering::Relaxed));
         step(&Invocation::new(&self.store, &self.store.clock, &self.random, &self.policy, &id)).await
     }
 
     async fn render(&self, key: &str) -> Outcome {
-        self.with(async |invocation| {
-            render_frame(invocation, &Drawer { bands: BANDS }, key).await.unwrap().outcome
-        })
-        .await
+        self.try_render(key).await.unwrap().outcome
+    }
+
+    async fn try_render(&self, key: &str) -> Result<Rendered> {
+        self.with(async |invocation| render_frame(invocation, &Drawer { bands: BANDS }, key).await).await
     }
 
     async fn upload(&self, file: &str, text: &str) -> Outcome {
