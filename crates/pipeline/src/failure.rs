@@ -348,6 +348,25 @@ mod tests {
     }
 
     #[test]
+    fn each_sign_of_an_end_is_enough() {
+        let kind = |kind: &str| format!(r#"{{"errorType":"{kind}","errorMessage":"of some kind"}}"#);
+        check("RetriesExhausted", &kind("Sandbox.Timedout"), End::TimedOut);
+        check("RetriesExhausted", &kind("Runtime.ExitError"), End::Died);
+        check("RetriesExhausted", &kind("Runtime.OutOfMemory"), End::Died);
+        check("RetriesExhausted", r#"{"errorMessage":"Runtime exited"}"#, End::Died);
+        check("RetriesExhausted", &kind("Other"), End::Error("of some kind".to_owned()));
+    }
+
+    #[test]
+    fn an_event_of_a_removed_object_has_no_version() {
+        for version in ["\"eTag\":\"\"", "\"other\":\"abc\""] {
+            let text = record("EventAgeExceeded", "null").replace("\"eTag\":\"abc\"", version);
+            let [failure] = &parse_record(text.as_bytes()).unwrap()[..] else { panic!("{text}") };
+            assert_eq!(failure.version, None, "{version}");
+        }
+    }
+
+    #[test]
     fn records_of_the_schedule_have_no_objects() {
         let text = record("RetriesExhausted", "null").replace("Records", "other");
         assert_eq!(parse_record(text.as_bytes()).unwrap(), []);

@@ -1,12 +1,13 @@
 //! Steps on a store in memory in which somebody meddles at the worst moment: one test for each rule that only then shows.
 
 mod bands;
+mod failures;
 mod refusals;
 
 use std::num::NonZeroU64;
 use std::ops::Range;
-use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bytes::Bytes;
