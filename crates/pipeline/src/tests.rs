@@ -3,6 +3,7 @@
 mod bands;
 mod failures;
 mod refusals;
+mod sweeps;
 
 use std::num::NonZeroU64;
 use std::ops::Range;
@@ -19,7 +20,8 @@ use crate::render::{Outcome, Rendered};
 use crate::retry::{Scope, retry};
 use crate::simulation::acting::{Drawer, film, picture};
 use crate::store::{
-    Bucket, ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, UnfinishedUpload, Upload,
+    Bucket, ETag, ListPage, ListRequest, Metadata, Object, ObjectInfo, PutOptions, Store, UnfinishedUpload,
+    Upload,
 };
 use crate::sweep::{Visit, visit};
 use crate::{
@@ -163,6 +165,8 @@ struct World {
     random: Randomness,
     policy: Policy,
     requests: AtomicU64,
+    /// When the platform ends whatever runs.
+    deadline: Option<Timestamp>,
 }
 
 impl World {
@@ -170,7 +174,13 @@ impl World {
         let clock = JumpingClock(Arc::new(AtomicU64::new(1_000_000)));
         let bucket = Mutex::default();
         let store = Meddled { bucket, clock, meddler: Mutex::default(), refuser: Mutex::default() };
-        World { store, random: Randomness::seeded(1), policy: Policy::new(1), requests: AtomicU64::new(0) }
+        World {
+            store,
+            random: Randomness::seeded(1),
+            policy: Policy::new(1),
+            requests: AtomicU64::new(0),
+            deadline: None,
+        }
     }
 
     fn film() -> Animation {
@@ -181,6 +191,14 @@ impl World {
         let body = Bytes::copy_from_slice(text.as_bytes());
         let mut bucket = self.store.bucket.lock().unwrap();
         bucket.put(self.store.clock.now(), key, body, PutOptions::always()).unwrap()
+    }
+
+    /// A GIF that says of which set it is.
+    fn put_gif(&self, generation: &str) {
+        let metadata: Metadata = [("generation".to_owned(), generation.to_owned())].into();
+        let options = PutOptions { metadata, ..PutOptions::always() };
+        let mut bucket = self.store.bucket.lock().unwrap();
+        bucket.put(self.store.clock.now(), "animations/film.gif", "GIF".into(), options).unwrap();
     }
 
     fn keys(&self, prefix: &str) -> Vec<String> {
@@ -198,7 +216,19 @@ impl World {
 
     async fn with<T>(&self, step: impl AsyncFnOnce(&Invocation<'_, Meddled, JumpingClock>) -> T) -> T {
         let id = format!("request-{}", self.requests.fetch_add(1, Ordering::Relaxed));
-        step(&Invocation::new(&self.store, &self.store.clock, &self.random, &self.policy, &id)).await
+        let invocation = Invocation::new(&self.store, &self.store.clock, &self.random, &self.policy, &id);
+        match self.deadline {
+            Some(deadline) => step(&invocation.until(deadline)).await,
+            None => step(&invocation).await,
+        }
+    }
+
+    fn modified(&self, key: &str) -> Timestamp {
+        self.store.bucket.lock().unwrap().head(key).unwrap().modified
+    }
+
+    async fn later(&self, by: Duration) {
+        self.store.clock.sleep(by).await;
     }
 
     async fn render(&self, key: &str) -> Outcome {

@@ -26,16 +26,8 @@ impl World {
         Some(String::from_utf8_lossy(&object.body).into_owned())
     }
 
-    fn modified(&self, key: &str) -> Timestamp {
-        self.store.bucket.lock().unwrap().head(key).unwrap().modified
-    }
-
     fn delete(&self, key: &str) {
         assert!(self.store.bucket.lock().unwrap().delete(key), "{key}");
-    }
-
-    async fn later(&self, by: Duration) {
-        self.store.clock.sleep(by).await;
     }
 
     /// Delivers the events of these bands, by the keys that woke them.

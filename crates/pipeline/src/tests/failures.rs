@@ -1,7 +1,6 @@
 //! What becomes of events that the platform has given up.
 
 use super::*;
-use crate::store::Metadata;
 
 const SCRIPT: &str = "scripts/film/1.txt";
 
@@ -143,13 +142,6 @@ impl World {
         self.upload("1.txt", "frame 1").await;
         self.upload("2.txt", "frame 2").await;
         self.keys("assemblies/").pop().unwrap()
-    }
-
-    fn put_gif(&self, generation: &str) {
-        let metadata: Metadata = [("generation".to_owned(), generation.to_owned())].into();
-        let options = PutOptions { metadata, ..PutOptions::always() };
-        let mut bucket = self.store.bucket.lock().unwrap();
-        bucket.put(self.store.clock.now(), "animations/film.gif", "GIF".into(), options).unwrap();
     }
 }
 

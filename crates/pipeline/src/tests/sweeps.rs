@@ -1,0 +1,280 @@
+//! What the sweep wakes, gives up, claims, heals and deletes, and what it leaves alone.
+
+use super::*;
+use crate::sweep::{Swept, sweep};
+
+const MINUTE: Duration = Duration::from_secs(60);
+const DAY: Duration = Duration::from_secs(24 * 3600);
+const SCRIPT: &str = "scripts/film/1.txt";
+
+/// The shortest time that a clock shows.
+const MOMENT: Duration = Duration::from_millis(1);
+
+impl World {
+    async fn sweep(&self) -> Swept {
+        self.with(async |invocation| sweep(invocation).await.unwrap()).await
+    }
+
+    /// Waits until an object is so old.
+    async fn until(&self, key: &str, age: Duration) {
+        let then = self.modified(key).after(age);
+        self.later(then.since(self.store.clock.now())).await;
+        assert_eq!(self.store.clock.now(), then);
+    }
+
+    /// What is left below these prefixes.
+    fn left(&self, prefixes: &[&str]) -> Vec<String> {
+        prefixes.iter().flat_map(|prefix| self.keys(prefix)).collect()
+    }
+}
+
+fn woken(count: u64) -> Visit {
+    Visit { woken: count, ..Visit::default() }
+}
+
+#[tokio::test]
+async fn a_sweep_visits_whatever_is_uploaded_or_has_a_manifest() {
+    let mut world = World::new();
+    for key in [
+        "scripts/a/1.txt",
+        "scripts/b/animation.json",
+        "scripts/c/.txt",
+        "manifests/d.json",
+        "scripts/1.txt",
+        "scripts/notes.md",
+    ] {
+        world.put(key, "{}");
+    }
+    for left in [None, Some(60 * MINUTE)] {
+        world.deadline = left.map(|left| world.store.clock.now().after(left));
+        let swept = world.sweep().await;
+        let mut visited: Vec<_> = swept.visits.iter().map(|(animation, _)| animation.to_string()).collect();
+        visited.sort();
+        assert_eq!((visited, swept.unvisited), (["a", "b", "c", "d"].map(str::to_owned).into(), 0));
+        assert!(swept.visits.iter().all(|(_, visit)| visit.is_ok()));
+        let rejected: Vec<_> = swept.rejected.iter().map(|(key, _)| key.as_str()).collect();
+        assert_eq!(rejected, ["scripts/1.txt"]);
+    }
+    world.deadline = Some(world.store.clock.now().after(world.policy.margin));
+    let late = world.sweep().await;
+    assert_eq!((late.visits.len(), late.unvisited), (0, 4));
+}
+
+#[tokio::test]
+async fn a_claim_is_put_where_manifest_or_gif_are_not_as_they_should_be() {
+    let claimed = async |world: &World| world.visit().await.claimed;
+    let world = World::new();
+    assert!(!claimed(&world).await, "there is nothing at all");
+    world.put_gif("any");
+    assert!(claimed(&world).await, "a GIF of nothing");
+    let world = World::new();
+    world.put(SCRIPT, "frame 1");
+    assert!(claimed(&world).await, "no manifest");
+    let world = World::new();
+    world.upload("1.txt", "frame 1").await;
+    assert!(claimed(&world).await, "no GIF");
+    world.put_gif("another");
+    assert!(claimed(&world).await, "another set's GIF");
+    world.put_gif(world.manifest().head.generation.as_str());
+    assert_eq!(world.visit().await, Visit::default(), "all is right");
+    world.put("scripts/film/2.txt", "frame 2");
+    assert!(claimed(&world).await, "a script that the manifest does not show");
+    world.store.bucket.lock().unwrap().delete("animations/film.gif");
+    for key in world.keys("scripts/") {
+        world.store.bucket.lock().unwrap().delete(&key);
+    }
+    assert!(claimed(&world).await, "the manifest shows scripts that are gone");
+}
+
+/// Two frames that nobody draws, a manifest that says so, and their versions.
+async fn stuck(world: &World) -> [ETag; 2] {
+    let versions = [1, 2].map(|number| world.put(&format!("scripts/film/{number}.txt"), "hang 1"));
+    world.with(async |invocation| crate::fold::fold(invocation, &World::film()).await.unwrap()).await;
+    versions
+}
+
+#[tokio::test]
+async fn frames_are_woken_when_nothing_has_happened_for_a_while_and_then_less_and_less_often() {
+    let world = World::new();
+    let [version, _] = stuck(&world).await;
+    world.until(SCRIPT, 15 * MINUTE - MOMENT).await;
+    assert_eq!(world.visit().await, Visit::default());
+    world.later(MOMENT).await;
+    assert_eq!(world.visit().await, woken(2));
+    for (attempt, minutes) in (2..).zip([15, 30, 60, 120, 240, 480, 960, 960, 960]) {
+        world.later(minutes * MINUTE - MOMENT).await;
+        assert_eq!(world.visit().await, Visit::default(), "attempt {attempt}");
+        world.later(MOMENT).await;
+        assert_eq!(world.visit().await, woken(2), "attempt {attempt}");
+        assert!(world.keys("retries/").contains(&format!("retries/film/1@{version}-p1/{attempt}")));
+    }
+    // Something happens, if only to another frame.
+    world.upload("3.txt", "frame 3").await;
+    world.later(15 * MINUTE - MOMENT).await;
+    assert_eq!(world.visit().await.woken, 0);
+}
+
+#[tokio::test]
+async fn frames_that_were_begun_in_vain_are_given_up_and_the_claim_says_so() {
+    let world = World::new();
+    let versions = stuck(&world).await;
+    let begin = |attempt: u64| {
+        for (number, version) in (1..).zip(&versions) {
+            world.put(&format!("frames/film/{number}@{version}-p1.begun-{attempt}"), "");
+        }
+    };
+    begin(1);
+    begin(2);
+    world.later(15 * MINUTE).await;
+    assert_eq!(world.visit().await, woken(2));
+    begin(3);
+    world.later(30 * MINUTE).await;
+    assert_eq!(world.visit().await, Visit { given_up: 2, claimed: true, ..Visit::default() });
+    let receipts: Vec<_> =
+        world.keys("frames/").into_iter().filter(|key| key.ends_with(".error.json")).collect();
+    assert_eq!(receipts.len(), 2);
+}
+
+#[tokio::test]
+async fn where_attempts_do_not_count_those_at_pending_frames_are_forgotten() {
+    let mut world = World::new();
+    let [version, _] = stuck(&world).await;
+    world.policy.attempts_count = false;
+    let other = format!("frames/film/1@0-p1.begun-1");
+    world.put(&other, "");
+    for attempt in 1..=3 {
+        world.put(&format!("frames/film/1@{version}-p1.begun-{attempt}"), "");
+    }
+    world.later(15 * MINUTE).await;
+    assert_eq!(world.visit().await, woken(2));
+    assert_eq!(world.keys("frames/"), [other], "of another version");
+}
+
+#[tokio::test]
+async fn of_an_animation_that_has_too_many_frames_none_is_woken() {
+    let mut world = World::new();
+    world.policy.most_frames = Some(1);
+    stuck(&world).await;
+    world.later(15 * MINUTE).await;
+    assert_eq!(world.visit().await, Visit::default());
+    world.policy.most_frames = Some(2);
+    assert_eq!(world.visit().await.woken, 2);
+}
+
+#[tokio::test]
+async fn error_receipts_that_cannot_be_read_go_and_their_frames_are_woken() {
+    let world = World::new();
+    world.upload("1.txt", "bad 1").await;
+    let versions = [2, 3].map(|number| world.put(&format!("scripts/film/{number}.txt"), "bad 2"));
+    let keys: Vec<_> = (2..)
+        .zip(&versions)
+        .map(|(number, version)| format!("frames/film/{number}@{version}-p1.error.json"))
+        .collect();
+    for key in &keys {
+        world.put(key, &format!("garbage of {key}"));
+    }
+    let older = "frames/film/2@0-p1.error.json".to_owned();
+    world.put(&older, "garbage of another version");
+    // The manifest says what there is.
+    world.with(async |invocation| crate::fold::fold(invocation, &World::film()).await.unwrap()).await;
+    assert_eq!(world.manifest().head.status, Status::Failed);
+    let before = world.keys("frames/");
+    let visit = world.visit().await;
+    assert_eq!(visit, Visit { woken: 2, deleted: 2, claimed: true, ..Visit::default() });
+    let left: Vec<_> = before.into_iter().filter(|key| !keys.contains(key)).collect();
+    assert_eq!(world.keys("frames/"), left);
+    assert!(left.contains(&older) && left.len() == 2, "{left:?}");
+    assert_eq!(world.keys("retries/").len(), 2);
+}
+
+#[tokio::test]
+async fn a_refusal_that_cannot_be_read_goes() {
+    let world = World::new();
+    world.upload("1.txt", "frame 1").await;
+    let refusal = format!("frames/film/@{}.error.json", world.manifest().head.generation.as_str());
+    let other = format!("frames/film/@{}.error.json", "0a".repeat(16));
+    for key in [&refusal, &other] {
+        world.put(key, "garbage");
+    }
+    let visit = world.visit().await;
+    assert_eq!(visit, Visit { deleted: 1, claimed: true, ..Visit::default() });
+    let left = world.keys("frames/");
+    assert!(left.contains(&other) && !left.contains(&refusal), "{left:?}");
+}
+
+#[tokio::test]
+async fn refusals_of_other_sets_go_after_a_week_and_that_of_this_set_stays() {
+    let world = World::new();
+    world.upload("1.txt", "frame 1").await;
+    let refusal = format!("frames/film/@{}.error.json", world.manifest().head.generation.as_str());
+    let other = format!("frames/film/@{}.error.json", "0a".repeat(16));
+    for key in [&refusal, &other] {
+        world.put(key, r#"{"message":"why"}"#);
+    }
+    world.until(&other, 7 * DAY - MOMENT).await;
+    assert_eq!(world.visit().await.deleted, 0);
+    world.later(MOMENT).await;
+    assert_eq!(world.visit().await.deleted, 1);
+    let left = world.keys("frames/");
+    assert!(left.contains(&refusal) && !left.contains(&other), "{left:?}");
+}
+
+#[tokio::test]
+async fn frames_of_older_pixels_go_after_a_week_where_there_is_a_newer_one() {
+    let mut world = World::new();
+    let version = world.put(SCRIPT, "frame 1");
+    world.render(SCRIPT).await;
+    let key = |pixels: u32| format!("frames/film/1@{version}-p{pixels}.png");
+    for pixels in [2, 3] {
+        world.later(DAY).await;
+        world.put(&key(pixels), "frame");
+    }
+    world.policy = Policy::new(2);
+    for (pixels, left) in [(1, &[key(2), key(3)][..]), (2, &[key(3)])] {
+        world.until(&key(pixels), 7 * DAY - MOMENT).await;
+        assert_eq!(world.visit().await.deleted, 0);
+        world.later(MOMENT).await;
+        assert_eq!(world.visit().await.deleted, 1);
+        assert_eq!(world.keys("frames/"), left);
+    }
+    world.later(30 * DAY).await;
+    assert_eq!(world.visit().await.deleted, 0);
+}
+
+/// The script was two frames, then one, and another script is two frames.
+#[tokio::test]
+async fn what_came_of_older_versions_goes_after_a_week_and_all_else_stays() {
+    let world = World::new();
+    let before = world.put(SCRIPT, "split 2 1");
+    world.render(SCRIPT).await;
+    for key in world.keys("parts/") {
+        world.render(&key).await;
+    }
+    world.put(&format!("frames/film/1@{before}-p1/1.begun-1"), "");
+    world.put("frames/film/1@0-p1.error.json", r#"{"message":"why"}"#);
+    world.put("frames/film/1@0-p1.begun-1", "");
+    world.upload("2.txt", "split 2 2").await;
+    for key in world.keys("parts/film/2@") {
+        world.render(&key).await;
+    }
+    let now = world.put(SCRIPT, "frame 1");
+    world.render(SCRIPT).await;
+    // Of an animation below this one.
+    world.put("parts/film/sub/1@0-p1/1.json", "{}");
+    world.later(6 * DAY).await;
+    let there = world.left(&["frames/", "parts/"]);
+    assert_eq!(world.visit().await.deleted, 0);
+    // Its event may still be to come.
+    let new_part = format!("parts/film/1@{before}-p1/2.json");
+    world.put(&new_part, "{}");
+    world.later(2 * DAY).await;
+    let visit = world.visit().await;
+    let is_kept = |key: &String| {
+        key.contains("/2@") || key.contains("film/sub/") || key.contains(now.as_str()) || *key == new_part
+    };
+    let kept: Vec<_> = there.iter().filter(|key| is_kept(key)).cloned().collect();
+    assert_eq!(world.left(&["frames/", "parts/"]), kept);
+    // The split, its two frames, what says that one has begun, one part; the error and what says that it has begun.
+    assert_eq!(visit.deleted, 7);
+    assert_eq!(there.len() - kept.len(), 7);
+}
