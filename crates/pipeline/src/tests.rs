@@ -3,6 +3,7 @@
 mod bands;
 mod failures;
 mod refusals;
+mod renders;
 mod sweeps;
 
 use std::num::NonZeroU64;

@@ -1,0 +1,307 @@
+//! What an event of the render function leads to, how long it may take, and what a retry on demand does.
+
+use super::*;
+use crate::keys::{Band, Part};
+use crate::render::{Drawing, Renderer, Stages};
+use crate::retry::Retried;
+use crate::simulation::acting::Paste;
+
+const SCRIPT: &str = "scripts/film/1.txt";
+
+/// Draws as long as it is told to, or for ever.
+struct Painter {
+    clock: JumpingClock,
+    takes: Option<Duration>,
+    /// What it was told that it may take.
+    told: Mutex<Vec<Option<Duration>>>,
+}
+
+impl Painter {
+    fn new(world: &World, takes: Option<Duration>) -> Self {
+        Painter { clock: world.store.clock.clone(), takes, told: Mutex::default() }
+    }
+
+    async fn take_time(&self) {
+        match self.takes {
+            Some(takes) => self.clock.sleep(takes).await,
+            None => std::future::pending().await,
+        }
+    }
+}
+
+const DRAWER: Drawer = Drawer { bands: BANDS };
+
+impl Renderer for Painter {
+    type Joining = Paste;
+
+    fn most_bytes(&self) -> u64 {
+        DRAWER.most_bytes()
+    }
+
+    async fn draw(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+        left: Option<Duration>,
+    ) -> Result<Drawing> {
+        self.told.lock().unwrap().push(left);
+        self.take_time().await;
+        DRAWER.draw(name, script, part, left).await
+    }
+
+    async fn draw_band(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+        band: Band,
+    ) -> Result<Result<Bytes, Reason>> {
+        self.take_time().await;
+        DRAWER.draw_band(name, script, part, band).await
+    }
+
+    async fn join(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+        count: NonZeroU64,
+    ) -> Result<Result<Paste, Reason>> {
+        DRAWER.join(name, script, part, count).await
+    }
+}
+
+impl World {
+    async fn paint(&self, painter: &Painter, key: &str) -> Result<Rendered> {
+        self.with(async |invocation| render_frame(invocation, painter, key).await).await
+    }
+
+    /// Each request takes as many milliseconds as this says; pauses take none.
+    fn time(&mut self, takes: impl Fn(&str) -> u64 + Send + 'static) {
+        self.policy.pause_cap = Duration::ZERO;
+        let clock = self.store.clock.clone();
+        self.refuse(move |request| {
+            clock.0.fetch_add(takes(request), Ordering::Relaxed);
+            None
+        });
+    }
+
+    async fn again(&self, scope: Scope<'_>) -> Retried {
+        self.with(async |invocation| retry(invocation, &World::film(), scope).await.unwrap()).await
+    }
+}
+
+fn ms(milliseconds: u64) -> Duration {
+    Duration::from_millis(milliseconds)
+}
+
+#[tokio::test]
+async fn an_invocation_says_where_its_time_went() {
+    let mut world = World::new();
+    world.put(SCRIPT, "frame 1");
+    world.time(|request| match request {
+        "get scripts/film/1.txt" => 10,
+        "get manifests/film.json" => 1_000,
+        "put manifests/film.json" => 7_000,
+        _ if request.starts_with("list frames/film/1@") => 20,
+        _ if request.starts_with("put frames/film/1@") => 300,
+        _ => 0,
+    });
+    let painter = Painter::new(&world, Some(ms(50_000)));
+    let stages = world.paint(&painter, SCRIPT).await.unwrap().stages;
+    // The manifest is looked at twice, for there is none, and written.
+    let expected = Stages { read: ms(30), draw: ms(50_000), put: ms(300), fold: ms(9_000) };
+    assert_eq!(stages, expected);
+    let again = world.paint(&painter, SCRIPT).await.unwrap().stages;
+    assert_eq!((again.read, again.draw, again.put), (ms(30), ms(0), ms(0)));
+
+    world.put("scripts/film/animation.json", "{}");
+    world.time(|request| match request {
+        "head scripts/film/animation.json" => 10,
+        "get manifests/film.json" => 1_000,
+        _ => 0,
+    });
+    let stages = world.paint(&painter, "scripts/film/animation.json").await.unwrap().stages;
+    assert_eq!((stages.read, stages.fold >= ms(1_000)), (ms(10), true), "{stages:?}");
+}
+
+#[tokio::test]
+async fn all_that_is_drawn_of_a_frame_in_bands_is_drawing() {
+    let mut world = World::new();
+    let version = world.put(SCRIPT, "big frame 1");
+    world.time(|_| 0);
+    let painter = Painter::new(&world, Some(ms(50_000)));
+    assert_eq!(world.paint(&painter, SCRIPT).await.unwrap().stages.draw, ms(50_000));
+    let woken = |band: &str| format!("parts/film/1@{version}-p1/{band}.band-0.json");
+    for band in ["1-of-3", "2-of-3"] {
+        assert_eq!(world.paint(&painter, &woken(band)).await.unwrap().stages.draw, ms(50_000));
+    }
+    world.put(&format!("frames/film/1@{version}-p1.2-of-3.band"), "garbled");
+    let last = world.paint(&painter, &woken("3-of-3")).await.unwrap();
+    assert_eq!((last.outcome, last.stages.draw), (Outcome::Drawn, ms(100_000)), "one is drawn anew");
+}
+
+#[tokio::test]
+async fn a_drawing_is_told_its_time_and_stopped_before_the_deadline() {
+    let mut world = World::new();
+    world.put(SCRIPT, "frame 1");
+    let painter = Painter::new(&world, Some(Duration::ZERO));
+    world.paint(&painter, SCRIPT).await.unwrap();
+    let version = world.put(SCRIPT, "frame 2");
+    let begin = world.store.clock.now();
+    world.deadline = Some(begin.after(ms(10_000)));
+    let painter = Painter { takes: None, ..painter };
+    let error = world.paint(&painter, SCRIPT).await.unwrap_err();
+    assert_eq!(error.to_string(), "out of time: 1 is not drawn after 9500 ms");
+    assert_eq!(world.store.clock.now(), begin.after(ms(9_500)));
+    assert_eq!(*painter.told.lock().unwrap(), [None, Some(ms(9_500))]);
+    assert!(!world.keys("frames/").iter().any(|key| key.contains(version.as_str())));
+}
+
+#[tokio::test]
+async fn only_an_attempt_at_this_version_is_counted() {
+    let world = World::new();
+    let version = world.put(SCRIPT, "frame 1");
+    assert_eq!(world.render("retries/film/1@0-p1/2").await, Outcome::Drawn, "the current one");
+    let frame = format!("frames/film/1@{version}-p1.png");
+    assert_eq!(world.keys("frames/"), [frame.clone()]);
+    world.store.bucket.lock().unwrap().delete(&frame);
+    assert_eq!(world.render(&format!("retries/film/1@{version}-p1/2")).await, Outcome::Drawn);
+    assert_eq!(world.keys("frames/"), [format!("frames/film/1@{version}-p1.begun-2"), frame]);
+}
+
+#[tokio::test]
+async fn of_an_animation_with_too_many_frames_no_more_are_drawn() {
+    let mut world = World::new();
+    world.policy.most_frames = Some(2);
+    assert_eq!(world.upload("1.txt", "frame 1").await, Outcome::Drawn);
+    assert_eq!(world.upload("2.txt", "frame 2").await, Outcome::Drawn);
+    // Nobody knows yet.
+    assert_eq!(world.upload("3.txt", "frame 3").await, Outcome::Drawn);
+    assert_eq!(world.upload("4.txt", "frame 4").await, Outcome::TooMany);
+    assert_eq!((world.manifest().head.status, world.manifest().head.total), (Status::Failed, 4));
+    assert!(!world.keys("frames/").iter().any(|key| key.starts_with("frames/film/4@")));
+}
+
+#[tokio::test]
+async fn a_script_has_at_most_as_many_frames_as_an_animation_may() {
+    for (frames, expected) in [(2, true), (3, true), (4, false), (5, false)] {
+        let mut world = World::new();
+        world.policy.most_frames = Some(3);
+        let outcome = world.upload(&format!("{frames}.txt"), &format!("split {frames} 1")).await;
+        match outcome {
+            Outcome::Split(count) => assert!(expected && count.get() == frames),
+            Outcome::Faulty(reason) => {
+                let message = format!("{frames}.txt has {frames} frames: expected at most 3");
+                assert!(!expected && reason.message.starts_with(&message), "{reason:?}");
+            }
+            other => panic!("{other:?}"),
+        }
+        let has_error = world.keys("frames/").iter().any(|key| key.ends_with(".error.json"));
+        assert_eq!(has_error, !expected, "{frames}");
+    }
+}
+
+/// Their events came while another version of the script was current, and drew nothing.
+#[tokio::test]
+async fn parts_of_a_split_from_before_the_upload_are_woken_anew_if_nothing_came_of_them() {
+    let world = World::new();
+    let version = world.upload("1.txt", "split 4 1").await;
+    assert!(matches!(version, Outcome::Split(_)));
+    let parts = world.keys("parts/");
+    assert_eq!(world.render(&parts[0]).await, Outcome::Drawn);
+    world.later(ms(9_000)).await;
+    world.put(SCRIPT, "split 4 1");
+    world.later(ms(9_000)).await;
+    world.put(&parts[2], "{}");
+    world.later(ms(9_000)).await;
+    let before: Vec<_> = parts.iter().map(|key| world.modified(key)).collect();
+    assert_eq!(world.render(SCRIPT).await, Outcome::Present);
+    let is_new: Vec<_> = parts.iter().zip(before).map(|(key, before)| world.modified(key) > before).collect();
+    assert_eq!(is_new, [false, true, false, true]);
+}
+
+#[tokio::test]
+async fn parts_are_listed_only_while_some_are_to_come() {
+    let world = World::new();
+    world.upload("1.txt", "split 2 1").await;
+    let (asked, parts) = (Arc::new(AtomicU64::new(0)), world.keys("parts/"));
+    let counter = asked.clone();
+    world.refuse(move |request| {
+        counter.fetch_add(u64::from(request.starts_with("list parts/")), Ordering::Relaxed);
+        None
+    });
+    for (drawn, expected) in [(None, 1), (Some(0), 1), (Some(1), 0)] {
+        if let Some(place) = drawn {
+            assert_eq!(world.render(&parts[place as usize]).await, Outcome::Drawn);
+        }
+        assert_eq!(world.render(SCRIPT).await, Outcome::Present);
+        assert_eq!(asked.swap(0, Ordering::Relaxed), expected, "{drawn:?}");
+    }
+}
+
+/// A film of a frame, a fault, and a frame that is to come, and of a script with a frame and a fault.
+async fn mixed(world: &World) {
+    world.upload("1.txt", "frame 1").await;
+    world.upload("2.txt", "bad 2").await;
+    world.put("scripts/film/3.txt", "hang 3");
+    let version = world.put("scripts/film/4.txt", "split 2 4");
+    world.render("scripts/film/4.txt").await;
+    world.render(&format!("parts/film/4@{version}-p1/1.json")).await;
+    world.put(&format!("frames/film/4@{version}-p1/2.error.json"), r#"{"message":"why"}"#);
+}
+
+/// What is left of the results, without versions.
+fn results(world: &World) -> Vec<String> {
+    let short = |key: String| {
+        let (name, rest) = key["frames/film/".len()..].split_once('@').unwrap();
+        format!("{name}{}", &rest[rest.find("-p1").unwrap() + 3..])
+    };
+    world.keys("frames/").into_iter().map(short).collect()
+}
+
+#[tokio::test]
+async fn what_is_drawn_again_is_what_was_asked_for() {
+    let name = |name: &str| ScriptName::new(name).unwrap();
+    let (one, four) = (name("1"), name("4"));
+    let all = ["1.png", "2.error.json", "4.split-2", "4/1.png", "4/2.error.json"];
+    for (what, scope, gone, woken) in [
+        ("failed", Scope::Failed, &["2.error.json", "4/2.error.json"][..], 3),
+        ("one", Scope::Frame(&one, None), &["1.png"], 1),
+        ("a part", Scope::Frame(&four, NonZeroU64::new(1)), &["4/1.png"], 1),
+        ("no such part", Scope::Frame(&one, NonZeroU64::new(1)), &[], 0),
+        ("all", Scope::All, &["1.png", "2.error.json", "4/1.png", "4/2.error.json"], 5),
+    ] {
+        let world = World::new();
+        mixed(&world).await;
+        assert_eq!(results(&world), all);
+        let retried = world.again(scope).await;
+        let expected = Retried { deleted: gone.len() as u64, woken, reassembled: false };
+        assert_eq!(retried, expected, "{what}");
+        let left: Vec<_> = all.into_iter().filter(|key| !gone.contains(key)).collect();
+        assert_eq!(results(&world), left, "{what}");
+        assert_eq!(world.keys("retries/").len() as u64, woken, "{what}");
+    }
+}
+
+#[tokio::test]
+async fn a_refusal_goes_when_the_set_is_to_be_assembled_again() {
+    let world = World::new();
+    world.upload("1.txt", "frame 1").await;
+    let refusal = format!("frames/film/@{}.error.json", world.manifest().head.generation.as_str());
+    world.put(&refusal, r#"{"message":"why"}"#);
+    let retried = world.again(Scope::Failed).await;
+    assert_eq!(retried, Retried { deleted: 1, woken: 0, reassembled: true });
+    assert!(!world.keys("frames/").contains(&refusal));
+}
+
+/// Where no result went the manifest is as it was, and whoever draws folds.
+#[tokio::test]
+async fn a_retry_folds_only_what_it_has_changed() {
+    let world = World::new();
+    world.put(SCRIPT, "hang 1");
+    let retried = world.again(Scope::Failed).await;
+    assert_eq!(retried, Retried { deleted: 0, woken: 1, reassembled: false });
+    assert_eq!(world.keys("manifests/"), [""; 0]);
+}
