@@ -374,6 +374,27 @@ mod tests {
         }
     }
 
+    /// One of another set, or that was named already, or of a set that is not whole, is not.
+    #[test]
+    fn a_gif_is_new_that_is_of_this_set_and_not_written_down() {
+        let generation = head(Status::Done).generation;
+        let this = gif(Some(generation.as_str()));
+        let named = |version: &str| {
+            Some(crate::manifest::Gif { generation: generation.clone(), version: ETag::new(version) })
+        };
+        for (status, named, gif, expected) in [
+            (Status::Done, None, Some(&this), Some(ETag::new("e"))),
+            (Status::Done, None, None, None),
+            (Status::Done, None, Some(&gif(Some("another"))), None),
+            (Status::Done, named("e"), Some(&this), None),
+            (Status::Done, named("f"), Some(&this), None),
+            (Status::Rendering, None, Some(&this), None),
+        ] {
+            let head = Head { gif: named, ..head(status) };
+            assert_eq!(new_gif(&head, gif), expected, "{status:?} {head:?}");
+        }
+    }
+
     #[test]
     fn quiet_is_waited_for_once_whatever_the_clocks_say() {
         let (period, mut quiet) = (Duration::from_secs(5), Quiet::default());

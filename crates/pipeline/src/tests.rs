@@ -1,5 +1,6 @@
 //! Steps on a store in memory in which somebody meddles at the worst moment: one test for each rule that only then shows.
 
+mod assemblies;
 mod bands;
 mod failures;
 mod refusals;
@@ -13,13 +14,15 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bytes::Bytes;
+use rayfold_scene::AnimationSettings;
 
+use crate::assemble::Assembled;
 use crate::failure::{End, Failure, Recorded};
 use crate::keys::{Animation, Key, ScriptName};
 use crate::manifest::{FrameState, Manifest, Reason, Status};
 use crate::render::{Outcome, Rendered};
 use crate::retry::{Scope, retry};
-use crate::simulation::acting::{Drawer, film, picture};
+use crate::simulation::acting::{Drawer, Listed, picture};
 use crate::store::{
     Bucket, ETag, ListPage, ListRequest, Metadata, Object, ObjectInfo, PutOptions, Store, UnfinishedUpload,
     Upload,
@@ -51,18 +54,20 @@ type Refuser = Box<dyn FnMut(&str) -> Option<Error> + Send>;
 
 /// A bucket in which somebody does something before a request that is named like `put frames/…`.
 struct Meddled {
-    bucket: Mutex<Bucket>,
+    bucket: Arc<Mutex<Bucket>>,
     clock: JumpingClock,
     meddler: Mutex<Option<Meddler>>,
-    refuser: Mutex<Option<Refuser>>,
+    refuser: Arc<Mutex<Option<Refuser>>>,
+}
+
+fn asked(refuser: &Mutex<Option<Refuser>>, action: &str, key: &str) -> Result<()> {
+    let refuse = |refuser: &mut Refuser| refuser(&format!("{action} {key}"));
+    refuser.lock().unwrap().as_mut().and_then(refuse).map_or(Ok(()), Err)
 }
 
 impl Meddled {
     fn meet(&self, action: &str, key: &str) -> Result<std::sync::MutexGuard<'_, Bucket>> {
-        let refuse = |refuser: &mut Refuser| refuser(&format!("{action} {key}"));
-        if let Some(error) = self.refuser.lock().unwrap().as_mut().and_then(refuse) {
-            return Err(error);
-        }
+        asked(&self.refuser, action, key)?;
         let mut bucket = self.bucket.lock().unwrap();
         if let Some(meddler) = self.meddler.lock().unwrap().as_mut() {
             meddler(&format!("{action} {key}"), &mut bucket, self.clock.now());
@@ -99,65 +104,141 @@ impl Store for Meddled {
         Ok(self.meet("list", &request.prefix)?.list(&request))
     }
 
-    async fn upload(&self, _: &str, _: PutOptions) -> Result<Pieces> {
-        Ok(Pieces)
+    async fn upload(&self, key: &str, options: PutOptions) -> Result<Pieces> {
+        Ok(self.take_up(key, options, UnfinishedUpload::default()))
     }
 
-    fn take_up(&self, _: &str, _: PutOptions, _: UnfinishedUpload) -> Pieces {
-        Pieces
+    fn take_up(&self, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> Pieces {
+        let (bucket, refuser) = (self.bucket.clone(), self.refuser.clone());
+        Pieces { bucket, refuser, clock: self.clock.clone(), key: key.to_owned(), options, unfinished }
     }
 }
 
-/// What is uploaded in pieces: here only whether it comes to an end.
-struct Pieces;
+/// Bytes of a part of an upload.
+const PART: usize = 16;
+
+/// What is uploaded in pieces. Its requests are named `part`, `finish` and `abort`.
+struct Pieces {
+    bucket: Arc<Mutex<Bucket>>,
+    refuser: Arc<Mutex<Option<Refuser>>>,
+    clock: JumpingClock,
+    key: String,
+    options: PutOptions,
+    unfinished: UnfinishedUpload,
+}
+
+impl Pieces {
+    fn id(&self) -> Option<u64> {
+        self.unfinished.id.as_ref().map(|id| id.parse().unwrap())
+    }
+}
 
 impl Upload for Pieces {
-    async fn write(&mut self, _: Bytes) -> Result<()> {
+    async fn write(&mut self, bytes: Bytes) -> Result<()> {
+        let mut tail = [&self.unfinished.tail[..], &bytes].concat();
+        while tail.len() >= PART {
+            asked(&self.refuser, "part", &self.key)?;
+            let rest = tail.split_off(PART);
+            let mut bucket = self.bucket.lock().unwrap();
+            let id = self.id().unwrap_or_else(|| bucket.begin_upload());
+            self.unfinished.id = Some(id.to_string());
+            let part = bucket.put_part(&self.key, id, self.unfinished.parts.len() + 1, tail.into())?;
+            self.unfinished.parts.push(part);
+            tail = rest;
+        }
+        self.unfinished.tail = tail.into();
         Ok(())
     }
 
     async fn finish(self) -> Result<ETag> {
-        Err(Error::Refused { key: "the GIF".into(), source: "it was built".into() })
+        asked(&self.refuser, "finish", &self.key)?;
+        let (now, id) = (self.clock.now(), self.id());
+        let (mut bucket, UnfinishedUpload { parts, tail, .. }) =
+            (self.bucket.lock().unwrap(), self.unfinished);
+        match id {
+            Some(id) => bucket.complete_upload(now, &self.key, id, (&parts, &tail), self.options),
+            None => bucket.put(now, &self.key, tail, self.options),
+        }
     }
 
     async fn abort(self) -> Result<()> {
+        asked(&self.refuser, "abort", &self.key)?;
+        if let Some(id) = self.id() {
+            self.bucket.lock().unwrap().abort_upload(id);
+        }
         Ok(())
     }
 
     fn leave(self) -> UnfinishedUpload {
-        UnfinishedUpload::default()
+        self.unfinished
     }
 }
 
 /// Of a frame that is too big.
 const BANDS: NonZeroU64 = NonZeroU64::new(3).unwrap();
 
-struct Joiner(Vec<String>);
+/// Lists frames, and takes its time.
+#[derive(Clone)]
+struct Joiner {
+    clock: JumpingClock,
+    /// For each frame.
+    takes: Duration,
+    trouble: Option<Trouble>,
+}
 
-impl Animator for Joiner {
-    type Encoding = Joiner;
+/// Where a set makes no animation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Trouble {
+    Begin,
+    Suspend,
+    Finish,
+}
 
-    fn begin(&self, _: &rayfold_scene::AnimationSettings) -> Result<Joiner, Reason> {
-        Ok(Joiner(Vec::new()))
-    }
+struct Joined {
+    joiner: Joiner,
+    listed: Listed,
+}
 
-    async fn resume(&self, _: Bytes) -> Result<Joiner, Reason> {
-        Err(Reason::new("nothing is suspended here"))
+impl Joiner {
+    fn meets(&self, trouble: Trouble) -> Result<(), Reason> {
+        if self.trouble == Some(trouble) { Err(Reason::new(format!("{trouble:?}"))) } else { Ok(()) }
     }
 }
 
-impl Encoding for Joiner {
-    async fn push(&mut self, frame: Bytes) -> Result<Bytes, Unfit> {
-        self.0.push(String::from_utf8_lossy(&frame).into_owned());
-        Ok(Bytes::new())
+impl Animator for Joiner {
+    type Encoding = Joined;
+
+    fn begin(&self, settings: &AnimationSettings) -> Result<Joined, Reason> {
+        self.meets(Trouble::Begin)?;
+        Ok(Joined { joiner: self.clone(), listed: Listed::new(settings) })
     }
 
-    async fn finish(self) -> Result<Bytes, Reason> {
-        Ok(film(&Default::default(), &self.0).into())
+    async fn resume(&self, state: Bytes) -> Result<Joined, Reason> {
+        Ok(Joined { joiner: self.clone(), listed: Listed::resume(&state)? })
+    }
+}
+
+impl Encoding for Joined {
+    async fn push(&mut self, frame: Bytes) -> Result<Bytes, Unfit> {
+        self.joiner.clock.sleep(self.joiner.takes).await;
+        if frame == "garbled" {
+            return Err(Unfit::Corrupt(Reason::new("no picture")));
+        }
+        if frame.ends_with(b"frame odd") {
+            return Err(Unfit::Unlike(Reason::new("odd")));
+        }
+        self.listed.push(&frame);
+        Ok(self.listed.take())
+    }
+
+    async fn finish(mut self) -> Result<Bytes, Reason> {
+        self.joiner.meets(Trouble::Finish)?;
+        Ok(self.listed.take())
     }
 
     async fn suspend(self) -> Result<Bytes, Reason> {
-        Err(Reason::new("nothing is suspended here"))
+        self.joiner.meets(Trouble::Suspend)?;
+        self.listed.suspend()
     }
 }
 
@@ -173,8 +254,8 @@ struct World {
 impl World {
     fn new() -> Self {
         let clock = JumpingClock(Arc::new(AtomicU64::new(1_000_000)));
-        let bucket = Mutex::default();
-        let store = Meddled { bucket, clock, meddler: Mutex::default(), refuser: Mutex::default() };
+        let (bucket, refuser) = (Arc::default(), Arc::default());
+        let store = Meddled { bucket, clock, meddler: Mutex::default(), refuser };
         World {
             store,
             random: Randomness::seeded(1),
@@ -240,6 +321,15 @@ impl World {
         self.with(async |invocation| render_frame(invocation, &Drawer { bands: BANDS }, key).await).await
     }
 
+    /// Takes no time, and has no trouble.
+    fn joiner(&self) -> Joiner {
+        Joiner { clock: self.store.clock.clone(), takes: Duration::ZERO, trouble: None }
+    }
+
+    async fn assemble(&self, joiner: &Joiner, claim: &str) -> Result<Assembled> {
+        self.with(async |invocation| assemble(invocation, joiner, claim).await).await
+    }
+
     async fn upload(&self, file: &str, text: &str) -> Outcome {
         let key = format!("scripts/film/{file}");
         self.put(&key, text);
@@ -274,9 +364,7 @@ async fn a_gif_skips_no_frame_that_is_gone() {
             bucket.delete(key);
         }
     });
-    let assembled =
-        world.with(async |invocation| assemble(invocation, &Joiner(Vec::new()), &claim).await).await;
-    let assembled = assembled.expect("nothing was built");
+    let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
     assert_eq!((assembled.built, assembled.status), (0, Status::Rendering));
 }
 
@@ -290,9 +378,8 @@ fn delete_all_but(bucket: &mut Bucket, kept: &str) {
 
 #[tokio::test]
 async fn what_comes_after_a_removal_brings_nothing_back() {
-    let assemble_in = async |world: &World, claim: &str| {
-        world.with(async |invocation| assemble(invocation, &Joiner(Vec::new()), claim).await.unwrap()).await
-    };
+    let assemble_in =
+        async |world: &World, claim: &str| world.assemble(&world.joiner(), claim).await.unwrap();
     let world = World::new();
     world.upload("1.txt", "frame 1").await;
     let claim = world.keys("assemblies/").pop().unwrap();

@@ -1,0 +1,311 @@
+//! What an assembler builds, waits for, leaves to the next one, refuses and takes away.
+
+use super::*;
+use crate::simulation::acting::film;
+
+const GIF: &str = "animations/film.gif";
+const LEASE: &str = "frames/film/@assembler.json";
+const CHECKPOINT: &str = "checkpoints/film.state";
+
+fn seconds(seconds: u64) -> Duration {
+    Duration::from_secs(seconds)
+}
+
+impl World {
+    /// So many frames are drawn, as many as were announced. Gives the claim.
+    async fn announced(&self, frames: u64) -> String {
+        self.put("scripts/film/animation.json", &format!(r#"{{"frames": {frames}}}"#));
+        for number in 1..=frames {
+            self.upload(&format!("{number}.txt"), &format!("frame {number}")).await;
+        }
+        self.keys("assemblies/").pop().unwrap()
+    }
+
+    fn gif(&self) -> Option<String> {
+        let object = self.store.bucket.lock().unwrap().get(GIF).ok()?;
+        Some(String::from_utf8_lossy(&object.body).into_owned())
+    }
+
+    /// What the GIF of all frames is.
+    fn film_of(&self, frames: u64) -> String {
+        let name = |number: u64| ScriptName::new(&number.to_string()).unwrap();
+        let text = |number: u64| format!("frame {number}");
+        let pictures: Vec<_> =
+            (1..=frames).map(|number| picture(&name(number), text(number).as_bytes(), None)).collect();
+        film(&AnimationSettings::default(), &pictures)
+    }
+
+    fn slow(&self, takes: Duration) -> Joiner {
+        Joiner { takes, ..self.joiner() }
+    }
+
+    /// Nobody holds a lease, nothing is unfinished, and the manifest names the GIF, if there is one.
+    fn is_at_rest(&self) -> bool {
+        let head = self.manifest().head;
+        let bucket = self.store.bucket.lock().unwrap();
+        let gif = bucket.head(GIF).ok().map(|info| info.etag);
+        let is_clean = bucket.keys().all(|key| key != LEASE && key != CHECKPOINT);
+        is_clean && bucket.unfinished_uploads() == 0 && (gif.is_none() || gif.as_ref() == head.gif_version())
+    }
+}
+
+#[tokio::test]
+async fn a_set_is_built_when_it_is_quiet_and_not_again() {
+    let world = World::new();
+    world.upload("1.txt", "frame 1").await;
+    world.upload("2.txt", "frame 2").await;
+    let claim = world.keys("assemblies/").pop().unwrap();
+    let quiet = world.modified("scripts/film/2.txt").after(world.policy.quiet);
+    let waited = quiet.since(world.store.clock.now());
+    let revision = world.manifest().head.revision;
+    let assembled = world.assemble(&world.slow(seconds(3)), &claim).await.unwrap();
+    // It waits, builds, and finds nothing to do.
+    assert_eq!((assembled.rounds, assembled.built, assembled.frames), (3, 1, 2));
+    assert_eq!((assembled.waited, assembled.building, assembled.left_after), (waited, seconds(6), None));
+    assert_eq!(world.gif(), Some(world.film_of(2)));
+    assert!(world.is_at_rest());
+    assert_eq!(world.manifest().head.revision, revision, "the GIF is no revision");
+    let again = world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!((again.rounds, again.built, again.waited), (1, 0, Duration::ZERO));
+    assert!(world.is_at_rest());
+}
+
+#[tokio::test]
+async fn a_set_that_was_announced_is_built_at_once() {
+    let world = World::new();
+    let claim = world.announced(2).await;
+    let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!((assembled.rounds, assembled.built, assembled.waited), (2, 1, Duration::ZERO));
+    assert_eq!(world.gif(), Some(world.film_of(2)));
+}
+
+#[tokio::test]
+async fn an_assembler_whose_time_does_not_do_for_the_quiet_wakes_the_next_one() {
+    let mut world = World::new();
+    world.upload("1.txt", "frame 1").await;
+    let claim = world.keys("assemblies/").pop().unwrap();
+    let quiet = world.modified("scripts/film/1.txt").after(world.policy.quiet);
+    world.deadline = Some(quiet.after(world.policy.margin));
+    let before = world.modified(&claim);
+    world.later(seconds(1)).await;
+    let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!((assembled.rounds, assembled.built, assembled.waited), (1, 0, Duration::ZERO));
+    assert!(world.modified(&claim) > before && world.is_at_rest());
+    world.deadline = world.deadline.map(|deadline| deadline.after(seconds(1)));
+    assert_eq!(world.assemble(&world.joiner(), &claim).await.unwrap().built, 1);
+}
+
+/// An invocation has time for five frames, and keeps that of one free.
+#[tokio::test]
+async fn a_gif_that_takes_too_long_is_left_where_it_stands_and_gone_on_with() {
+    let mut world = World::new();
+    world.policy.spare_frames = 1;
+    let claim = world.announced(12).await;
+    for (left_after, built) in [(Some(5), 0), (Some(10), 0), (None, 1)] {
+        assert_eq!(world.gif(), None);
+        let before = world.modified(&claim);
+        world.later(seconds(1)).await;
+        world.deadline = Some(world.store.clock.now().after(seconds(60)));
+        let assembled = world.assemble(&world.slow(seconds(10)), &claim).await.unwrap();
+        assert_eq!((assembled.left_after, assembled.built), (left_after, built));
+        assert_eq!(world.modified(&claim) > before, left_after.is_some(), "the next one is woken");
+        assert_eq!(world.keys("checkpoints/").len(), usize::from(left_after.is_some()));
+        if left_after.is_some() {
+            let lease = world.store.bucket.lock().unwrap().get(LEASE).unwrap().body;
+            assert_eq!(lease, r#"{"assembler":"","until":0,"checkpoint":true}"#);
+        }
+    }
+    assert_eq!(world.gif(), Some(world.film_of(12)));
+    assert!(world.is_at_rest());
+}
+
+/// The last frame needs no time for one more.
+#[tokio::test]
+async fn a_gif_that_has_all_its_frames_is_finished_unless_it_is_too_late() {
+    for (frames, expected) in [(5, (None, 1)), (6, (Some(5), 0))] {
+        let mut world = World::new();
+        world.policy.spare_frames = 1;
+        let claim = world.announced(frames).await;
+        world.deadline = Some(world.store.clock.now().after(seconds(60)));
+        let assembled = world.assemble(&world.slow(seconds(10)), &claim).await.unwrap();
+        assert_eq!((assembled.left_after, assembled.built), expected, "{frames}");
+    }
+    let mut world = World::new();
+    let claim = world.announced(2).await;
+    world.policy.spare_frames = 0;
+    for expected in [(Some(2), 0), (None, 1)] {
+        world.deadline = Some(world.store.clock.now().after(seconds(60)));
+        let assembled = world.assemble(&world.slow(seconds(30)), &claim).await.unwrap();
+        assert_eq!((assembled.left_after, assembled.built), expected);
+    }
+    assert_eq!(world.gif(), Some(world.film_of(2)));
+}
+
+#[tokio::test]
+async fn sets_that_make_no_gif_are_refused_by_name_and_the_gif_before_goes() {
+    for (text, trouble, takes, reason) in [
+        ("frame odd", None, 0, "odd"),
+        ("frame 2", Some(Trouble::Begin), 0, "Begin"),
+        ("frame 2", Some(Trouble::Finish), 0, "Finish"),
+        ("frame 2", Some(Trouble::Suspend), 10, "Suspend"),
+        ("frame 2", None, 100, "1 of 3 frames were assembled in the 100 s"),
+    ] {
+        let mut world = World::new();
+        world.put("scripts/film/animation.json", r#"{"frames": 3}"#);
+        for (file, text) in [("1.txt", "frame 1"), ("2.txt", text), ("3.txt", "frame 3")] {
+            world.upload(file, text).await;
+        }
+        world.put_gif("another");
+        let claim = world.keys("assemblies/").pop().unwrap();
+        world.deadline = Some(world.store.clock.now().after(seconds(60)));
+        let joiner = Joiner { trouble, ..world.slow(seconds(takes)) };
+        let assembled = world.assemble(&joiner, &claim).await.unwrap();
+        assert_eq!((assembled.built, assembled.status), (0, Status::Refused), "{reason}");
+        let message = world.manifest().head.refusal.unwrap().reason.unwrap().message;
+        assert!(message.starts_with(reason), "{message}");
+        assert!(world.gif().is_none() && world.is_at_rest(), "{reason}");
+    }
+}
+
+#[tokio::test]
+async fn a_gif_goes_when_a_frame_cannot_be_drawn() {
+    let world = World::new();
+    world.upload("1.txt", "bad 1").await;
+    world.put_gif("another");
+    let claim = world.keys("assemblies/").pop().unwrap();
+    let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!((assembled.rounds, assembled.built, assembled.status), (2, 0, Status::Failed));
+    assert!(world.gif().is_none() && world.is_at_rest());
+}
+
+#[tokio::test]
+async fn a_frame_that_is_none_is_drawn_again_until_that_has_been_tried_often_enough() {
+    for (attempts, begun) in [(0, 0), (2, 2), (5, 2), (3, 3), (4, 4)] {
+        let world = World::new();
+        let claim = world.announced(2).await;
+        let version = world.store.bucket.lock().unwrap().head("scripts/film/1.txt").unwrap().etag;
+        let frame = format!("frames/film/1@{version}-p1.png");
+        world.put(&frame, "garbled");
+        for attempt in 1..=attempts {
+            world.put(&format!("retries/film/1@{version}-p1/{attempt}"), "");
+        }
+        for attempt in 1..=begun {
+            world.put(&format!("frames/film/1@{version}-p1.begun-{attempt}"), "");
+        }
+        let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
+        assert_eq!(assembled.built, 0);
+        assert!(!world.keys("frames/").contains(&frame) && world.is_at_rest());
+        let is_given_up = begun >= 3;
+        let next = format!("retries/film/1@{version}-p1/{}", attempts + 1);
+        assert_eq!(world.keys("retries/").contains(&next), !is_given_up, "{attempts}, {begun}");
+        if is_given_up {
+            let FrameState::Failed(fault) = &world.manifest().frames[0].state else { panic!() };
+            let message = format!("{frame} is no frame, though drawn {begun} times: no picture");
+            assert_eq!(fault.reason.as_ref().unwrap().message, message);
+        } else {
+            assert_eq!(assembled.status, Status::Rendering);
+        }
+    }
+}
+
+/// Its assembler died before it could write down which it is.
+#[tokio::test]
+async fn a_gif_of_this_set_that_nobody_has_named_is_named_and_one_in_its_place_is_built_anew() {
+    let world = World::new();
+    let claim = world.announced(2).await;
+    world.put_gif(world.manifest().head.generation.as_str());
+    assert!(!world.is_at_rest());
+    let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!((assembled.rounds, assembled.built), (1, 0));
+    assert_eq!(world.gif().unwrap(), "GIF");
+    assert!(world.is_at_rest());
+    // Somebody cuts it off, and keeps its metadata.
+    {
+        let mut bucket = world.store.bucket.lock().unwrap();
+        let metadata = bucket.head(GIF).unwrap().metadata;
+        let options = PutOptions { metadata, ..PutOptions::always() };
+        bucket.put(world.store.clock.now(), GIF, "GI".into(), options).unwrap();
+    }
+    assert_eq!(world.assemble(&world.joiner(), &claim).await.unwrap().built, 1);
+    assert_eq!(world.gif(), Some(world.film_of(2)));
+    assert!(world.is_at_rest());
+}
+
+#[tokio::test]
+async fn an_assembler_leaves_the_gif_to_whoever_holds_the_lease() {
+    let world = World::new();
+    let claim = world.announced(2).await;
+    let until = world.store.clock.now().after(seconds(600)).0;
+    let lease = format!(r#"{{"assembler":"another","until":{until}}}"#);
+    world.put(LEASE, &lease);
+    let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!((assembled.rounds, assembled.built), (1, 0));
+    assert_eq!(world.store.bucket.lock().unwrap().get(LEASE).unwrap().body, lease);
+    // Nor does it give it back when there is nothing to build.
+    world.put_gif(world.manifest().head.generation.as_str());
+    world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!(world.store.bucket.lock().unwrap().get(LEASE).unwrap().body, lease);
+}
+
+/// It died when the GIF was put.
+#[tokio::test]
+async fn the_lease_of_an_earlier_attempt_is_given_back_when_there_is_nothing_left_to_do() {
+    let world = World::new();
+    let claim = world.announced(2).await;
+    world.put_gif(world.manifest().head.generation.as_str());
+    let next = world.requests.load(Ordering::Relaxed);
+    world.put(LEASE, &format!(r#"{{"assembler":"request-{next}","until":9000000000}}"#));
+    assert_eq!(world.assemble(&world.joiner(), &claim).await.unwrap().built, 0);
+    assert!(world.is_at_rest());
+}
+
+#[tokio::test]
+async fn an_unfinished_gif_that_nobody_needs_any_more_is_given_up() {
+    for is_gone in [false, true] {
+        let mut world = World::new();
+        world.policy.spare_frames = 1;
+        let claim = world.announced(6).await;
+        world.deadline = Some(world.store.clock.now().after(seconds(60)));
+        world.assemble(&world.slow(seconds(10)), &claim).await.unwrap();
+        assert_eq!(world.store.bucket.lock().unwrap().unfinished_uploads(), 1);
+        world.deadline = None;
+        if is_gone {
+            // All of it, but for what was left.
+            for key in world.keys("") {
+                if key != LEASE && key != CHECKPOINT {
+                    world.store.bucket.lock().unwrap().delete(&key);
+                }
+            }
+        } else {
+            world.upload("1.txt", "bad 1").await;
+        }
+        let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
+        assert_eq!(assembled.built, 0);
+        assert!(world.keys("checkpoints/").is_empty() && !world.keys("frames/").contains(&LEASE.to_owned()));
+        assert_eq!(world.store.bucket.lock().unwrap().unfinished_uploads(), 0, "{is_gone}");
+    }
+}
+
+/// Whoever found the lease taken was woken for a manifest that the holder had not seen.
+#[tokio::test]
+async fn an_assembler_looks_once_more_after_it_has_given_the_lease_back() {
+    let world = World::new();
+    let claim = world.announced(1).await;
+    world.meddle({
+        let mut done = false;
+        move |request, bucket, now| {
+            if request == "head manifests/film.json" && !std::mem::replace(&mut done, true) {
+                bucket.put(now, "scripts/film/1.txt", "frame 2".into(), PutOptions::always()).unwrap();
+                let version = bucket.head("scripts/film/1.txt").unwrap().etag;
+                let frame = format!("frames/film/1@{version}-p1.png");
+                bucket.put(now, &frame, "1:0:frame 2".into(), PutOptions::always()).unwrap();
+                let manifest = bucket.get("manifests/film.json").unwrap().body;
+                let manifest = [&manifest[..], b"\n"].concat();
+                bucket.put(now, "manifests/film.json", manifest.into(), PutOptions::always()).unwrap();
+            }
+        }
+    });
+    let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!(assembled.built, 2);
+    assert!(world.gif().unwrap().contains("frame 2"));
+}
