@@ -86,3 +86,53 @@ impl Randomness {
         self.below(of) == 0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_told_apart_in_milliseconds() {
+        let (early, late) = (Timestamp(1_000), Timestamp(3_500));
+        assert_eq!(late.since(early), Duration::from_millis(2_500));
+        assert_eq!(early.since(late), Duration::ZERO);
+        assert_eq!(early.after(Duration::from_millis(2_500)), late);
+        assert_eq!(late.after(Duration::MAX), Timestamp(u64::MAX));
+    }
+
+    #[tokio::test]
+    async fn the_machines_clock_goes_on_while_one_sleeps() {
+        let before = SystemClock.now();
+        assert!(before > Timestamp(1_600_000_000_000), "it is later than 2020: {before:?}");
+        SystemClock.sleep(Duration::from_millis(30)).await;
+        assert!(SystemClock.now().since(before) >= Duration::from_millis(25));
+    }
+
+    /// The numbers that the authors' program prints.
+    #[test]
+    fn chance_is_that_of_splitmix64() {
+        let random = Randomness::seeded(1_234_567);
+        let expected = [
+            6_457_827_717_110_365_317,
+            3_203_168_211_198_807_973,
+            9_817_491_932_198_370_423,
+            4_593_380_528_125_082_431,
+            16_408_922_859_458_223_821,
+        ];
+        assert_eq!(expected.map(|_| random.bits()), expected);
+    }
+
+    #[test]
+    fn draws_are_below_their_bound_and_reach_it() {
+        let random = Randomness::seeded(1);
+        let draws: std::collections::BTreeSet<u64> = (0..100).map(|_| random.below(5)).collect();
+        assert_eq!(draws, (0..5).collect());
+        assert_eq!((random.below(0), random.below(1)), (0, 0));
+        let most = Duration::from_micros(3);
+        let draws: std::collections::BTreeSet<Duration> = (0..100).map(|_| random.up_to(most)).collect();
+        assert_eq!(draws, (0..=3).map(Duration::from_micros).collect());
+        let times = (0..1_000).filter(|_| random.one_in(4)).count();
+        assert!((180..320).contains(&times), "{times} of 1,000 are one in four");
+        assert!((0..10).all(|_| random.one_in(1)));
+    }
+}

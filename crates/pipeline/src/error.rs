@@ -132,3 +132,43 @@ pub fn found<T>(answer: Result<T>) -> Result<Option<T>> {
         Err(error) => Err(error),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_error_says_what_may_be_done_about_it() {
+        let (key, cause) = (|| "k".to_owned(), || Cause::from("why"));
+        // A conflict, not found, retryable, ambiguous, out of time.
+        for (error, expected) in [
+            (Error::NotFound { key: key() }, [false, true, false, false, false]),
+            (Error::PreconditionFailed { key: key() }, [true, false, false, false, false]),
+            (Error::Conflict { key: key() }, [true, false, true, false, false]),
+            (Error::Throttled { key: key(), source: cause() }, [false, false, true, false, false]),
+            (Error::Ambiguous { key: key(), source: cause() }, [false, false, true, true, false]),
+            (Error::Refused { key: key(), source: cause() }, [false; 5]),
+            (Error::NoRegion, [false; 5]),
+            (Error::key("k", "p"), [false; 5]),
+            (Error::Malformed { key: key(), source: cause() }, [false; 5]),
+            (Error::Invariant { animation: key(), rule: "r" }, [false; 5]),
+            (Error::OutOfTime { what: key() }, [false, false, false, false, true]),
+        ] {
+            let says = [
+                error.is_conflict(),
+                error.is_not_found(),
+                error.is_retryable(),
+                error.is_ambiguous(),
+                error.is_out_of_time(),
+            ];
+            assert_eq!(says, expected, "{error:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_there_is_no_error() {
+        assert_eq!(found(Ok(1)).unwrap(), Some(1));
+        assert_eq!(found::<()>(Err(Error::NotFound { key: "k".to_owned() })).unwrap(), None);
+        assert!(matches!(found::<()>(Err(Error::NoRegion)), Err(Error::NoRegion)));
+    }
+}

@@ -3,6 +3,7 @@
 mod assemblies;
 mod bands;
 mod failures;
+mod folds;
 mod refusals;
 mod renders;
 mod sweeps;
