@@ -138,13 +138,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             Err(reason) => return self.give_up(upload, head, held, Ok(Built::Refused(reason))).await,
         };
         if let Err(error) = upload.write(rest).await {
-            return match error.is_retryable() {
+            return match error {
                 // What is written down stands.
-                true => Err(error),
-                false if held.has_checkpoint && error.is_not_found() => {
+                error if held.has_checkpoint && error.is_retryable() => Err(error),
+                error if held.has_checkpoint && error.is_not_found() => {
                     self.give_up(upload, head, held, Ok(Built::Stale)).await
                 }
-                false => self.give_up(upload, head, held, Err(error)).await,
+                error => self.give_up(upload, head, held, Err(error)).await,
             };
         }
         let finished = upload.finish().await;

@@ -2,6 +2,7 @@
 
 mod assemblies;
 mod bands;
+mod builds;
 mod failures;
 mod folds;
 mod refusals;
@@ -116,7 +117,7 @@ impl Store for Meddled {
 }
 
 /// Bytes of a part of an upload.
-const PART: usize = 16;
+const PART: usize = 8;
 
 /// What is uploaded in pieces. Its requests are named `part`, `finish` and `abort`.
 struct Pieces {
@@ -228,8 +229,10 @@ impl Encoding for Joined {
         if frame.ends_with(b"frame odd") {
             return Err(Unfit::Unlike(Reason::new("odd")));
         }
+        // One goes out when the next one comes.
+        let before = self.listed.take();
         self.listed.push(&frame);
-        Ok(self.listed.take())
+        Ok(before)
     }
 
     async fn finish(mut self) -> Result<Bytes, Reason> {

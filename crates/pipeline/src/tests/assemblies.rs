@@ -3,17 +3,17 @@
 use super::*;
 use crate::simulation::acting::film;
 
-const GIF: &str = "animations/film.gif";
-const LEASE: &str = "frames/film/@assembler.json";
-const CHECKPOINT: &str = "checkpoints/film.state";
+pub(super) const GIF: &str = "animations/film.gif";
+pub(super) const LEASE: &str = "frames/film/@assembler.json";
+pub(super) const CHECKPOINT: &str = "checkpoints/film.state";
 
-fn seconds(seconds: u64) -> Duration {
+pub(super) fn seconds(seconds: u64) -> Duration {
     Duration::from_secs(seconds)
 }
 
 impl World {
     /// So many frames are drawn, as many as were announced. Gives the claim.
-    async fn announced(&self, frames: u64) -> String {
+    pub(super) async fn announced(&self, frames: u64) -> String {
         self.put("scripts/film/animation.json", &format!(r#"{{"frames": {frames}}}"#));
         for number in 1..=frames {
             self.upload(&format!("{number}.txt"), &format!("frame {number}")).await;
@@ -21,13 +21,13 @@ impl World {
         self.keys("assemblies/").pop().unwrap()
     }
 
-    fn gif(&self) -> Option<String> {
+    pub(super) fn gif(&self) -> Option<String> {
         let object = self.store.bucket.lock().unwrap().get(GIF).ok()?;
         Some(String::from_utf8_lossy(&object.body).into_owned())
     }
 
     /// What the GIF of all frames is.
-    fn film_of(&self, frames: u64) -> String {
+    pub(super) fn film_of(&self, frames: u64) -> String {
         let name = |number: u64| ScriptName::new(&number.to_string()).unwrap();
         let text = |number: u64| format!("frame {number}");
         let pictures: Vec<_> =
@@ -35,12 +35,12 @@ impl World {
         film(&AnimationSettings::default(), &pictures)
     }
 
-    fn slow(&self, takes: Duration) -> Joiner {
+    pub(super) fn slow(&self, takes: Duration) -> Joiner {
         Joiner { takes, ..self.joiner() }
     }
 
     /// Nobody holds a lease, nothing is unfinished, and the manifest names the GIF, if there is one.
-    fn is_at_rest(&self) -> bool {
+    pub(super) fn is_at_rest(&self) -> bool {
         let head = self.manifest().head;
         let bucket = self.store.bucket.lock().unwrap();
         let gif = bucket.head(GIF).ok().map(|info| info.etag);
