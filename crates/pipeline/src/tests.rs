@@ -5,6 +5,7 @@ mod bands;
 mod builds;
 mod failures;
 mod folds;
+mod observations;
 mod refusals;
 mod renders;
 mod sweeps;

@@ -265,3 +265,46 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         stream::iter(wakings).map(Ok).try_for_each_concurrent(concurrency, |waking| waking).await
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Timestamp;
+    use crate::keys::ScriptName;
+    use crate::store::ETag;
+
+    #[test]
+    fn the_bands_of_a_frame_are_those_of_its_part_and_pixels() {
+        let number = |number: u64| NonZeroU64::new(number).unwrap();
+        let name = || ScriptName::new("1").unwrap();
+        let tag = |pixels: u32| Tag { version: ETag::new("v"), pixels };
+        let cut = |pixels: u32, part, count: u64| Receipt::Cut {
+            name: name(),
+            tag: tag(pixels),
+            part,
+            count: number(count),
+        };
+        let band = |pixels: u32, part, band| Receipt::Band { name: name(), tag: tag(pixels), part, band };
+        let [first, second, third] = [0, 1, 2].map(|k| Band::all(number(3)).nth(k).unwrap());
+        let one = Some(number(1));
+        let receipts = [
+            cut(1, None, 9),
+            cut(2, None, 3),
+            cut(2, None, 2),
+            cut(2, one, 8),
+            band(1, None, first),
+            band(2, None, second),
+            band(2, one, third),
+        ];
+        let found =
+            receipts.map(|receipt| ReceiptFound { receipt, etag: ETag::new("e"), modified: Timestamp(0) });
+        let of = |part, pixels| {
+            let bands = Bands::of(&found, part, pixels);
+            (bands.cut().map(NonZeroU64::get), bands.missing(number(3)))
+        };
+        assert_eq!(of(None, 1), (Some(9), vec![second, third]));
+        assert_eq!(of(None, 2), (Some(3), vec![first, third]));
+        assert_eq!(of(one, 2), (Some(8), vec![first, second]));
+        assert_eq!(of(one, 1), (None, vec![first, second, third]));
+    }
+}

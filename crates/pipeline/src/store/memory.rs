@@ -121,10 +121,18 @@ impl<C: Clock + Clone + 'static> Upload for MemoryUpload<C> {
 
 #[cfg(test)]
 mod tests {
-    use crate::store::{MemoryStore, conformance};
+    use crate::store::{MemoryStore, PutOptions, Store, conformance};
 
     #[tokio::test]
     async fn the_memory_store_conforms() {
         conformance::check(&MemoryStore::new(crate::SystemClock), "suite").await;
+    }
+    #[tokio::test]
+    async fn keys_are_as_long_as_those_of_s3() {
+        let store = MemoryStore::new(crate::SystemClock);
+        for (length, is_fine) in [(0, false), (1, true), (1_023, true), (1_024, true), (1_025, false)] {
+            let put = store.put(&"k".repeat(length), "body".into(), PutOptions::always()).await;
+            assert_eq!(put.is_ok(), is_fine, "{length}");
+        }
     }
 }
