@@ -207,6 +207,16 @@ mod tests {
         store.put("frames/film/@assembler.json", body, PutOptions::always()).await.unwrap();
     }
 
+    #[test]
+    fn a_lease_stands_to_the_moment_and_for_no_longer_than_an_invocation_may_run() {
+        let now = Timestamp(1_000_000);
+        let stands = |until: u64| {
+            Lease { assembler: "a".to_owned(), until: Timestamp(until), checkpoint: false }.stands(now)
+        };
+        assert!(!stands(0) && !stands(1_000_000) && stands(1_000_001));
+        assert!(stands(1_000_000 + 20 * 60_000) && !stands(1_000_001 + 20 * 60_000));
+    }
+
     #[tokio::test]
     async fn a_lease_is_its_holders_until_its_time_is_up() {
         let store = MemoryStore::new(SystemClock);
