@@ -32,14 +32,6 @@ impl Scope<'_> {
             Scope::Frame(name, part) => frame.script == *name && frame.part == part,
         }
     }
-
-    /// Whether it draws what is drawn.
-    fn draws_anew(self) -> bool {
-        match self {
-            Scope::Failed => false,
-            Scope::All | Scope::Frame(..) => true,
-        }
-    }
 }
 
 /// What a retry did.
@@ -78,9 +70,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let stopped: BTreeSet<_> = stopped.map(|frame| (&frame.script, &frame.version, frame.part)).collect();
         let (mut doomed, mut counted) = (Vec::new(), Vec::new());
         for found in &observation.results.receipts {
-            let (name, tag, part, drawn) = match &found.receipt {
-                Receipt::Frame { name, tag, part } => (name, tag, *part, true),
-                Receipt::Fault { name, tag, part } => (name, tag, *part, false),
+            let (name, tag, part) = match &found.receipt {
+                Receipt::Frame { name, tag, part } | Receipt::Fault { name, tag, part } => (name, tag, *part),
                 Receipt::Refusal { .. } => {
                     doomed.push(animation.receipt(&found.receipt));
                     continue;
@@ -101,7 +92,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 }
                 Receipt::Split { .. } => continue,
             };
-            if named.contains(&(name, &tag.version, part)) && (scope.draws_anew() || !drawn) {
+            if named.contains(&(name, &tag.version, part)) {
                 doomed.push(animation.receipt(&found.receipt));
             }
         }

@@ -309,3 +309,22 @@ async fn an_assembler_looks_once_more_after_it_has_given_the_lease_back() {
     assert_eq!(assembled.built, 2);
     assert!(world.gif().unwrap().contains("frame 2"));
 }
+
+/// The manifest says so, however it was before; only where there is no manifest either nothing is written.
+#[tokio::test]
+async fn a_set_whose_scripts_are_gone_is_empty_and_one_without_a_manifest_gets_one() {
+    let world = World::new();
+    let claim = world.announced(2).await;
+    assert_eq!(world.assemble(&world.joiner(), &claim).await.unwrap().built, 1);
+    for key in world.keys("scripts/") {
+        world.store.bucket.lock().unwrap().delete(&key);
+    }
+    let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!((assembled.status, world.manifest().head.status), (Status::Empty, Status::Empty));
+    assert_eq!(world.gif(), None);
+    let world = World::new();
+    let claim = world.announced(2).await;
+    world.store.bucket.lock().unwrap().delete("manifests/film.json");
+    assert_eq!(world.assemble(&world.joiner(), &claim).await.unwrap().built, 1);
+    assert_eq!(world.manifest().head.status, Status::Done);
+}
