@@ -328,3 +328,38 @@ async fn a_set_whose_scripts_are_gone_is_empty_and_one_without_a_manifest_gets_o
     assert_eq!(world.assemble(&world.joiner(), &claim).await.unwrap().built, 1);
     assert_eq!(world.manifest().head.status, Status::Done);
 }
+
+/// A frame was gone when it looked, and was there again when it had written that down: nobody else is woken for that.
+#[tokio::test]
+async fn an_assembler_that_has_written_something_looks_again() {
+    let world = World::new();
+    let claim = world.announced(2).await;
+    let frame = world.keys("frames/film/1@").pop().unwrap();
+    let body = world.store.bucket.lock().unwrap().get(&frame).unwrap().body;
+    world.store.bucket.lock().unwrap().delete(&frame);
+    world.meddle(move |request, bucket, now| {
+        if request == "put manifests/film.json" && bucket.head(&frame).is_err() {
+            bucket.put(now, &frame, body.clone(), PutOptions::always()).unwrap();
+        }
+    });
+    let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!((assembled.built, assembled.status), (1, Status::Done));
+    assert_eq!(world.gif(), Some(world.film_of(2)));
+    assert!(world.is_at_rest());
+}
+
+#[tokio::test]
+async fn a_lease_that_the_listing_does_not_show_is_not_asked_for() {
+    let world = World::new();
+    world.put_gif("late");
+    let asked = Arc::new(AtomicU64::new(0));
+    let counter = asked.clone();
+    world.refuse(move |request| {
+        counter.fetch_add(u64::from(request.ends_with(LEASE)), Ordering::Relaxed);
+        None
+    });
+    let claim = format!("assemblies/film/1-{}.json", "0a".repeat(16));
+    let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!((assembled.rounds, world.gif()), (2, None));
+    assert_eq!(asked.load(Ordering::Relaxed), 0);
+}
