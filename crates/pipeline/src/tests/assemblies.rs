@@ -101,7 +101,7 @@ async fn a_gif_that_takes_too_long_is_left_where_it_stands_and_gone_on_with() {
     let mut world = World::new();
     world.policy.spare_frames = 1;
     let claim = world.announced(12).await;
-    for (left_after, built) in [(Some(5), 0), (Some(10), 0), (None, 1)] {
+    for (pieces, (left_after, built)) in (1..).zip([(Some(5), 0), (Some(10), 0), (None, 1)]) {
         assert_eq!(world.gif(), None);
         let before = world.modified(&claim);
         world.later(seconds(1)).await;
@@ -113,6 +113,8 @@ async fn a_gif_that_takes_too_long_is_left_where_it_stands_and_gone_on_with() {
         if left_after.is_some() {
             let lease = world.store.bucket.lock().unwrap().get(LEASE).unwrap().body;
             assert_eq!(lease, r#"{"assembler":"","until":0,"checkpoint":true}"#);
+            let state = world.store.bucket.lock().unwrap().get(CHECKPOINT).unwrap().body;
+            assert!(String::from_utf8_lossy(&state).contains(&format!(r#""pieces":{pieces},"#)));
         }
     }
     assert_eq!(world.gif(), Some(world.film_of(12)));
