@@ -140,7 +140,7 @@ async fn where_attempts_do_not_count_those_at_pending_frames_are_forgotten() {
     let mut world = World::new();
     let [version, _] = stuck(&world).await;
     world.policy.attempts_count = false;
-    let other = format!("frames/film/1@0-p1.begun-1");
+    let other = "frames/film/1@0-p1.begun-1".to_owned();
     world.put(&other, "");
     for attempt in 1..=3 {
         world.put(&format!("frames/film/1@{version}-p1.begun-{attempt}"), "");
