@@ -158,3 +158,17 @@ fn a_version_has_come_to_the_strongest_of_what_there_is_of_it() {
         assert_eq!(standing(&receipts, one), first, "{receipts:?}");
     }
 }
+
+#[tokio::test]
+async fn an_animation_that_is_called_like_anothers_receipts_draws_none_of_its_frames() {
+    let world = World::new();
+    let [first, second] = [1, 2].map(|number| {
+        let version = world.put(&format!("scripts/film/{number}.txt"), &format!("split 2 {number}"));
+        world.put(&format!("frames/film/{number}@{version}-p1.split-2"), "");
+        version
+    });
+    world.put(&format!("frames/film/1@{first}-p1/2@{second}-p1/1.png"), "another's");
+    world.asks("").await;
+    let head = world.manifest().head;
+    assert_eq!((head.total, head.done), (4, 0));
+}
