@@ -37,7 +37,7 @@ pub struct Args {
 }
 
 /// How often a picture is drawn; the shortest time counts.
-const ROUNDS: u32 = 3;
+pub(super) const ROUNDS: u32 = 3;
 
 /// A picture that was drawn.
 pub(super) struct Drawn {

@@ -3,10 +3,13 @@
 //! The truth of each picture is computed by the same kernels in `f64` with many samples, and held against independent random
 //! samples of the plain tracer, which share nothing with them but the words of the language.
 
+mod curve;
 mod measure;
+mod mitsuba;
 mod report;
 mod scenes;
 mod targets;
+mod targets_page;
 
 use anyhow::Result;
 use rayfold_scene::{Samples, Scene};

@@ -45,8 +45,17 @@ pub(crate) fn run(scene: &Scene, rounds: u32) -> Result<Option<Seconds>> {
         "towards": (-sun.direction().normalize()).to_array(),
         "rounds": rounds,
     });
+    let answer = ask(PROGRAM, &told)?;
+    let numbers: Vec<f64> = answer.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    let [camera, shadow, lit] = numbers[..] else { anyhow::bail!("the Mitsuba peer says {answer}") };
+    let rays = scene.screen.pixels() as f64 + lit;
+    Ok(Some(Seconds { seconds: camera + shadow, rays }))
+}
+
+/// What a Python program prints that is told so much.
+pub(crate) fn ask(program: &str, told: &Value) -> Result<String> {
     let mut child = Command::new("python3")
-        .args(["-c", PROGRAM])
+        .args(["-c", program])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
@@ -54,11 +63,7 @@ pub(crate) fn run(scene: &Scene, rounds: u32) -> Result<Option<Seconds>> {
     child.stdin.take().context("its input")?.write_all(told.to_string().as_bytes())?;
     let run = child.wait_with_output()?;
     ensure!(run.status.success(), "the Mitsuba peer: {}", run.status);
-    let answer = String::from_utf8(run.stdout)?;
-    let numbers: Vec<f64> = answer.split_whitespace().filter_map(|word| word.parse().ok()).collect();
-    let [camera, shadow, lit] = numbers[..] else { anyhow::bail!("the Mitsuba peer says {answer}") };
-    let rays = scene.screen.pixels() as f64 + lit;
-    Ok(Some(Seconds { seconds: camera + shadow, rays }))
+    Ok(String::from_utf8(run.stdout)?)
 }
 
 /// Its numbers; none if Mitsuba has no such shape. A cylinder is open there.

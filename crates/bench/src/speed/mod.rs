@@ -1,7 +1,7 @@
 //! `rayfold-bench speed`: processor time against the work asked for, and side by side with peers.
 
 mod embree;
-mod mitsuba;
+pub(crate) mod mitsuba;
 pub(crate) mod povray;
 pub mod shapes;
 

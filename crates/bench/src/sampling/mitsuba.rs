@@ -1,0 +1,163 @@
+//! Mitsuba 3 as a peer, where Python has it: the scene as it is given to its path tracer, and what that takes.
+//!
+//! Its kernels need a newer LLVM than some systems have: 19 does, 15 lacks an instruction. `DRJIT_LIBLLVM_PATH` says where.
+
+use anyhow::{Context, Result, ensure};
+use glam::DVec3;
+use rayfold_scene::{Camera, Light, Material, Object, Scene};
+use rayfold_tracer::MAX_BOUNCES;
+use serde_json::{Value, json};
+
+use super::curve::{Curve, Point};
+use super::measure::ROUNDS;
+use crate::speed::mitsuba::ask;
+
+pub(super) const NAME: &str = "Mitsuba";
+
+const PROGRAM: &str = include_str!("mitsuba_peer.py");
+
+/// Samples of its truth.
+const TRUTH: u32 = 2048;
+
+/// What it drew.
+pub(super) struct Drawn {
+    /// One of each sampler.
+    pub(super) curves: Vec<Curve>,
+    pub(super) truth: Truth,
+}
+
+/// The picture that its errors are from.
+pub(super) struct Truth {
+    pub(super) version: String,
+    pub(super) samples: u32,
+    /// Half of the root mean square by which its halves differ.
+    pub(super) error: f64,
+}
+
+/// Draws the scene with each of its samplers.
+pub(super) fn draw(work: &'static str, scene: &Scene) -> Result<Drawn> {
+    let answer = ask(PROGRAM, &told(scene)?)?;
+    eprint!("{answer}");
+    read(work, &answer).with_context(|| format!("the Mitsuba peer says {answer}"))
+}
+
+fn read(work: &'static str, answer: &str) -> Option<Drawn> {
+    let mut lines = answer.lines();
+    let words: Vec<&str> = lines.next()?.split_whitespace().collect();
+    let [version, samples, error] = words[..] else { return None };
+    let version = version.to_owned();
+    let truth = Truth { version, samples: samples.parse().ok()?, error: error.parse().ok()? };
+    let mut curves: Vec<Curve> = vec![];
+    for line in lines {
+        let (sampler, numbers) = line.split_once(' ')?;
+        let numbers: Vec<f64> = numbers.split(' ').map(str::parse).collect::<Result<_, _>>().ok()?;
+        let [rays, seconds, error, off] = numbers[..] else { return None };
+        let point = Point { ms: 1e3 * seconds, rays, error, off };
+        let way = format!("{NAME}, {sampler}");
+        match curves.iter_mut().find(|curve| curve.way == way) {
+            Some(curve) => curve.points.push(point),
+            None => curves.push(Curve { work, peer: Some(NAME), way, points: vec![point] }),
+        }
+    }
+    Some(Drawn { curves, truth })
+}
+
+/// The scene in numbers: light, matter and camera as they are here. Pixels are square there; they are higher by a
+/// thousandth here.
+fn told(scene: &Scene) -> Result<Value> {
+    let Camera::Pinhole(pinhole) = scene.camera else { anyhow::bail!("only a pinhole camera is translated") };
+    let (a, b) = (pinhole.lower_left(), pinhole.upper_right());
+    ensure!((a + b).length() < 1e-9, "only a window around the gaze is translated");
+    let width = scene.screen.width();
+    // Samples in pixels' centres there, on the window's corners here.
+    let window = (b.x - a.x) * f64::from(width) / f64::from(width.max(2) - 1);
+    let shapes: Result<Vec<Value>> =
+        scene.objects.iter().map(|object| shape(object, pinhole.eye())).collect();
+    let suns: Result<Vec<Value>> = scene.lights.iter().map(sun).collect();
+    Ok(json!({
+        "shapes": shapes?,
+        "suns": suns?,
+        "background": scene.background.color().context("a sky is not translated")?.to_array(),
+        "bounces": MAX_BOUNCES,
+        "size": [width, scene.screen.height()],
+        "eye": pinhole.eye().to_array(),
+        "target": (pinhole.eye() + pinhole.gaze()).to_array(),
+        "up": pinhole.up().to_array(),
+        "fov": 2.0 * (0.5 * window / pinhole.distance()).atan().to_degrees(),
+        "lens": scene.lens.radius(),
+        "focus": scene.lens.distance().unwrap_or(1.0),
+        "truth": TRUTH,
+        "rounds": ROUNDS,
+        "enough": 0.5,
+    }))
+}
+
+fn sun(light: &Light) -> Result<Value> {
+    let Light::Directional(sun) = light else { anyhow::bail!("a lamp is not translated") };
+    let towards = (-sun.direction().normalize()).to_array();
+    Ok(json!({"color": sun.color().to_array(), "towards": towards, "angle": sun.angle()}))
+}
+
+fn shape(object: &Object, eye: DVec3) -> Result<Value> {
+    let mut told = surface(object.material())?;
+    let shape = match object {
+        Object::Sphere(o) => {
+            json!({"kind": "sphere", "center": o.center().to_array(), "radius": o.radius()})
+        }
+        Object::Cuboid(o) => {
+            json!({"kind": "cube", "low": o.min().to_array(), "high": o.max().to_array()})
+        }
+        Object::Triangle(o) => {
+            let [u, mut v, mut w] = *o.vertices();
+            // What it emits leaves its front alone.
+            if (v - u).cross(w - u).dot(eye - u) < 0.0 {
+                (v, w) = (w, v);
+            }
+            let corners = [u, v, w].map(|corner| corner.to_array());
+            json!({"kind": "triangle", "corners": corners})
+        }
+        Object::Plane(_)
+        | Object::Disc(_)
+        | Object::Cylinder(_)
+        | Object::Cone(_)
+        | Object::Torus(_)
+        | Object::Instance(_) => anyhow::bail!("only spheres, boxes and triangles are translated"),
+    };
+    if let (Value::Object(told), Value::Object(shape)) = (&mut told, shape) {
+        told.extend(shape);
+    }
+    Ok(told)
+}
+
+fn surface(material: &Material) -> Result<Value> {
+    ensure!(material.finish().is_none(), "highlights, patterns and glass are not translated");
+    let colors = [material.ambient(), material.diffuse(), material.mirror()].map(|color| color.to_array());
+    Ok(json!({"ambient": colors[0], "diffuse": colors[1], "mirror": colors[2]}))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenes::table;
+
+    #[test]
+    fn the_scene_is_told_whole() {
+        let told = told(&table(512, 384).unwrap()).unwrap();
+        assert_eq!(told["shapes"].as_array().unwrap().len(), 26);
+        assert_eq!(told["suns"].as_array().unwrap().len(), 2);
+        assert!((told["fov"].as_f64().unwrap() - 57.72).abs() < 0.01);
+    }
+
+    #[test]
+    fn what_it_says_is_read() {
+        let drawn =
+            read("edges", "3.9 64 0.5\nsobol 4 0.25 2 0.125\nother 4 1 1 0\nsobol 16 1 1 0\n").unwrap();
+        assert_eq!((drawn.truth.version.as_str(), drawn.truth.samples), ("3.9", 64));
+        let ways: Vec<(&str, usize)> =
+            drawn.curves.iter().map(|curve| (curve.way.as_str(), curve.points.len())).collect();
+        assert_eq!(ways, [("Mitsuba, sobol", 2), ("Mitsuba, other", 1)]);
+        let first = drawn.curves[0].points[0];
+        assert_eq!((first.ms, first.rays, first.error, first.off), (250.0, 4.0, 2.0, 0.125));
+        assert!(read("edges", "3.9 64 0.5\nsobol 4\n").is_none());
+    }
+}
