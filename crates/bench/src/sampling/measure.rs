@@ -23,7 +23,7 @@ pub struct Args {
     #[arg(long, default_value_t = 4096, value_parser = clap::value_parser!(u32).range(64..))]
     pub(super) truth: u32,
     /// Independent samples of the plain tracer that the truth is held against
-    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(2..))]
+    #[arg(long, default_value_t = 65_536, value_parser = clap::value_parser!(u32).range(2..))]
     pub(super) independent: u32,
     /// The scene of the report on speed instead: the time to an error, at the sizes of the targets
     #[arg(long)]
@@ -63,6 +63,9 @@ pub(super) struct Agreement {
     pub(super) mean_square: f64,
     /// The largest difference in standard errors.
     pub(super) largest: f64,
+    /// Root mean squares in levels, of the difference and of the standard errors.
+    pub(super) difference: f64,
+    pub(super) standard_error: f64,
 }
 
 /// The picture of a scene, before it becomes levels.

@@ -12,12 +12,13 @@ mod targets;
 mod targets_page;
 
 use anyhow::Result;
+use glam::DVec3;
 use rayfold_scene::{Samples, Scene};
 use rayfold_tracer::reference::estimate;
 use rayfold_tracer::{Exposure, RenderOptions, Sampler};
 
 pub use self::measure::Args;
-use self::measure::{Agreement, measure, truth};
+use self::measure::{Agreement, measure, root_mean_square, truth};
 use self::scenes::{EFFECTS, Effect};
 
 /// Rays a pixel of pictures that are not adaptive.
@@ -40,7 +41,7 @@ pub fn run(args: &Args) -> Result<()> {
     for effect in EFFECTS.iter().filter(|effect| args.only.as_ref().is_none_or(|only| only == effect.name)) {
         let picture = effect.picture(size)?;
         let truth = truth(&picture, args.truth)?;
-        agreements.push(agreement(effect, args)?);
+        agreements.push(one.install(|| agreement(effect, args))?);
         let mut ways = vec![];
         for (way, sampler) in
             [("uniform", Sampler::Sobol), ("pairs", Sampler::Pairs), ("independent", Sampler::Independent)]
@@ -65,7 +66,7 @@ pub fn run(args: &Args) -> Result<()> {
             drawn.push(row);
         }
     }
-    if args.check { Ok(()) } else { report::write(&args.output, size, &drawn, &agreements, args.truth) }
+    if args.check { Ok(()) } else { report::write(args, size, &drawn, &agreements) }
 }
 
 /// A small picture by the plain tracer, beside the kernels' truth at that size.
@@ -75,21 +76,28 @@ fn agreement(effect: &Effect, args: &Args) -> Result<Agreement> {
     let scene = Scene { samples: Samples::new(2, 0.0)?, ..picture.scene.clone() };
     let after = |frames| picture.after(frames);
     let plain = estimate(Exposure::moving(&scene, &after), args.independent, 1);
+    // Where all samples agree nothing is known of the error. What one of so many would change is counted as a quarter of that.
+    let unseen = 0.25 / f64::from(args.independent);
     let (mut sum, mut count, mut largest) = (0.0, 0.0, 0f64);
     for ((mean, error), truth) in plain.means.iter().zip(&plain.errors).zip(&truth.means) {
         for channel in 0..3 {
-            // Where all samples agree nothing is known of the error; a level is counted as one.
-            let error = error[channel].hypot(0.25 / 255.0);
-            let difference = (mean[channel] - truth[channel]) / error;
+            let difference = (mean[channel] - truth[channel]) / error[channel].hypot(unseen);
             sum += difference * difference;
             count += 1.0;
             largest = largest.max(difference.abs());
         }
     }
-    let agreement = Agreement { effect: effect.name, mean_square: sum / count, largest };
+    let differences: Vec<DVec3> = plain.means.iter().zip(&truth.means).map(|(a, b)| *a - *b).collect();
+    let agreement = Agreement {
+        effect: effect.name,
+        mean_square: sum / count,
+        largest,
+        difference: 255.0 * root_mean_square(&differences),
+        standard_error: 255.0 * root_mean_square(&plain.errors),
+    };
     eprintln!(
-        "{:8} beside independent samples: mean square {:.3}, largest {:.2}",
-        effect.name, agreement.mean_square, largest
+        "{:8} beside independent samples: mean square {:.3}, largest {:.2}, {:.4} levels, standard error {:.4}",
+        effect.name, agreement.mean_square, largest, agreement.difference, agreement.standard_error
     );
     Ok(agreement)
 }

@@ -1,11 +1,10 @@
 //! The page, its table and its plots.
 
 use std::fmt::Write as _;
-use std::path::Path;
 
 use anyhow::Result;
 
-use super::measure::{Agreement, Drawn};
+use super::measure::{Agreement, Args, Drawn};
 use super::scenes::EFFECTS;
 use crate::plot::{Labels, Series, log_log};
 
@@ -17,12 +16,12 @@ const WAYS: [(&str, &str); 4] = [
 ];
 
 pub(super) fn write(
-    folder: &Path,
+    args: &Args,
     (width, height): (u32, u32),
     drawn: &[Drawn],
     agreements: &[Agreement],
-    truth: u32,
 ) -> Result<()> {
+    let (folder, truth) = (args.output.as_path(), args.truth);
     let mut table = csv::Writer::from_path(folder.join("sampling.csv"))?;
     table.write_record([
         "effect",
@@ -59,7 +58,7 @@ pub(super) fn write(
     );
     page.push_str(&slopes(drawn));
     page.push_str(&rays_saved(drawn));
-    page.push_str(&agreement(agreements));
+    page.push_str(&agreement(agreements, args));
     page.push_str("## Error against time\n\n");
     for effect in &EFFECTS {
         let series: Vec<Series> = WAYS
@@ -139,14 +138,22 @@ fn rays_saved(drawn: &[Drawn]) -> String {
     text
 }
 
-fn agreement(agreements: &[Agreement]) -> String {
-    let mut text = "## Against independent samples of the plain tracer\n\nSmall pictures (48 x 36): the difference between the kernels' \
-                    truth and independent random samples of the plain tracer, in standard errors of the latter. Two estimates of \
-                    the same thing have a mean square of about 1; where samples are few it is a little more.\n\n\
-                    | effect | mean square | largest |\n| --- | --- | --- |\n"
-        .to_owned();
+/// The check of the truth itself.
+fn agreement(agreements: &[Agreement], args: &Args) -> String {
+    let mut text = format!(
+        "## Against independent samples of the plain tracer\n\nThe check of the truth itself. Small pictures (48 x 36): the \
+         difference between the kernels' truth of {} samples and {} independent random samples of the plain tracer in every \
+         pixel, in standard errors of the latter, and both in levels (root mean squares). Two estimates of the same thing have a \
+         mean square of about 1, less where most pixels are of one colour.\n\n\
+         | effect | mean square | largest | difference, levels | standard error, levels |\n| --- | --- | --- | --- | --- |\n",
+        args.truth, args.independent
+    );
     for row in agreements {
-        let _ = writeln!(text, "| {} | {:.3} | {:.2} |", row.effect, row.mean_square, row.largest);
+        let Agreement { effect, mean_square, largest, difference, standard_error } = row;
+        let _ = writeln!(
+            text,
+            "| {effect} | {mean_square:.3} | {largest:.2} | {difference:.4} | {standard_error:.4} |"
+        );
     }
     text.push('\n');
     text
