@@ -105,10 +105,11 @@ fn about_mitsuba(truths: &[(&str, Truth)]) -> String {
         truths.iter().map(|(work, truth)| format!("{:.2} ({work})", truth.error)).collect();
     format!(
         "Of {} {version} (LLVM variant, single precision, `path` of the same depth without roulette, box filter) the best of \
-         `independent`, `stratified`, `multijitter`, `orthogonal` and `ldsampler` counts, with 4 to 256 samples a pixel or as many \
-         as they make of that, drawing alone: the scene is loaded and the kernels are compiled before, and what a picture of 8 x 6 \
-         takes is taken off. Its errors are from a truth of its own, {samples} samples of `multijitter` by other seeds, whose own \
-         error is estimated at {} levels. In this language light that was scattered is not scattered again, and suns are not seen \
+         `independent`, `stratified`, `multijitter`, `orthogonal` and `ldsampler` counts, with 4, 16, 64 samples a pixel and so on \
+         until an error of .5 (`orthogonal` rounds up, to 121 for 64), drawing alone: the scene is loaded and the kernels are \
+         compiled before, and what a picture of 8 x 6 takes is taken off. Its errors are from a truth of its own, {samples} samples \
+         of `multijitter` by other seeds, whose own error is estimated at {} levels. In this language light that was scattered is \
+         not scattered again, and suns are not seen \
          in mirrors: Mitsuba's own surfaces and suns do both, which is another picture and a noisier one. So its path tracer is \
          given the surfaces, and the suns of 4 degrees, as classes of Python, which it compiles into its kernels like its own. A \
          path goes on as a mirror does; each hit asks one sun, the brighter one more often; ambient light is emitted and not \
