@@ -69,15 +69,20 @@ pub fn run(args: &Args) -> Result<()> {
     if args.check { Ok(()) } else { report::write(args, size, &drawn, &agreements) }
 }
 
+/// The parts of a channel that the kernels sum up.
+const PARTS: f64 = 65535.0;
+
 /// A small picture by the plain tracer, beside the kernels' truth at that size.
 fn agreement(effect: &Effect, args: &Args) -> Result<Agreement> {
     let picture = effect.picture((48, 36))?;
-    let truth = truth(&picture, args.truth)?;
+    // As many, so that what is left is the error of the independent ones.
+    let truth = truth(&picture, args.truth.max(args.independent))?;
     let scene = Scene { samples: Samples::new(2, 0.0)?, ..picture.scene.clone() };
     let after = |frames| picture.after(frames);
     let plain = estimate(Exposure::moving(&scene, &after), args.independent, 1);
-    // Where all samples agree nothing is known of the error. What one of so many would change is counted as a quarter of that.
-    let unseen = 0.25 / f64::from(args.independent);
+    // Where all samples agree nothing is known of the error. What one of so many would change is counted as a quarter of that;
+    // the kernels' sums are of whole parts of a channel.
+    let unseen = 0.25 / f64::from(args.independent) + 0.5 / PARTS;
     let (mut sum, mut count, mut largest) = (0.0, 0.0, 0f64);
     for ((mean, error), truth) in plain.means.iter().zip(&plain.errors).zip(&truth.means) {
         for channel in 0..3 {

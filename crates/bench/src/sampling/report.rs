@@ -141,12 +141,13 @@ fn rays_saved(drawn: &[Drawn]) -> String {
 /// The check of the truth itself.
 fn agreement(agreements: &[Agreement], args: &Args) -> String {
     let mut text = format!(
-        "## Against independent samples of the plain tracer\n\nThe check of the truth itself. Small pictures (48 x 36): the \
-         difference between the kernels' truth of {} samples and {} independent random samples of the plain tracer in every \
-         pixel, in standard errors of the latter, and both in levels (root mean squares). Two estimates of the same thing have a \
-         mean square of about 1, less where most pixels are of one colour.\n\n\
+        "## Against independent samples of the plain tracer\n\nWhether the truth is one: small pictures (48 x 36) by the kernels with \
+         {} samples in every pixel and by the plain tracer with {} independent random ones. Their difference in standard errors of \
+         the latter, and both in levels (root mean squares). Two estimates of the same thing have a mean square of about 1, less \
+         where most pixels are of one colour.\n\n\
          | effect | mean square | largest | difference, levels | standard error, levels |\n| --- | --- | --- | --- | --- |\n",
-        args.truth, args.independent
+        args.truth.max(args.independent),
+        args.independent
     );
     for row in agreements {
         let Agreement { effect, mean_square, largest, difference, standard_error } = row;
