@@ -10,6 +10,7 @@ mod report;
 mod scenes;
 mod targets;
 mod targets_page;
+mod works;
 
 use anyhow::Result;
 use glam::DVec3;

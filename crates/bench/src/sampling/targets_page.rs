@@ -7,7 +7,7 @@ use anyhow::Result;
 use super::curve::{Curve, gathered};
 use super::measure::Args;
 use super::mitsuba::{self, Truth};
-use super::targets::{PEER, WORKS};
+use super::works::{PEER, WORKS};
 use crate::plot::{Labels, Series, log_log};
 use crate::speed::{self, povray};
 

@@ -160,9 +160,27 @@ impl<E: Real> Body<E> {
                 let (hit, distance) = match &self.shape {
                     Shape::Plane => plane::along(simd, local),
                     Shape::Disc(disc) => disc.meet(simd, local),
-                    Shape::Cone(cone, end) => cone.meet(simd, local, self.over(simd, *end, ray)),
-                    Shape::Torus(torus) => torus.meet(simd, local, nearest.distance),
-                    Shape::Cuboid(cuboid) => cuboid.meet(simd, local),
+                    Shape::Cone(cone, end) => {
+                        let over = self.over(simd, *end, ray);
+                        apart(
+                            simd,
+                            #[inline(always)]
+                            || cone.meet(simd, local, over),
+                        )
+                    }
+                    Shape::Torus(torus) => {
+                        let limit = nearest.distance;
+                        apart(
+                            simd,
+                            #[inline(always)]
+                            || torus.meet(simd, local, limit),
+                        )
+                    }
+                    Shape::Cuboid(cuboid) => apart(
+                        simd,
+                        #[inline(always)]
+                        || cuboid.meet(simd, local),
+                    ),
                 };
                 nearest.offer(simd, hit, distance, self.order);
             },
@@ -182,16 +200,23 @@ impl<E: Real> Body<E> {
                         plane::surface(simd, (up, center), ray, distance)
                     }
                     Shape::Cone(cone, end) => {
-                        let local = self.local(simd, ray);
                         let over = self.over(simd, *end, ray);
-                        self.in_scene(simd, cone.surface(simd, local, over, distance))
+                        apart(
+                            simd,
+                            #[inline(always)]
+                            || self.in_scene(simd, cone.surface(simd, self.local(simd, ray), over, distance)),
+                        )
                     }
-                    Shape::Torus(torus) => {
-                        self.in_scene(simd, torus.surface(simd, self.local(simd, ray), distance))
-                    }
-                    Shape::Cuboid(cuboid) => {
-                        self.in_scene(simd, cuboid.surface(simd, self.local(simd, ray), distance))
-                    }
+                    Shape::Torus(torus) => apart(
+                        simd,
+                        #[inline(always)]
+                        || self.in_scene(simd, torus.surface(simd, self.local(simd, ray), distance)),
+                    ),
+                    Shape::Cuboid(cuboid) => apart(
+                        simd,
+                        #[inline(always)]
+                        || self.in_scene(simd, cuboid.surface(simd, self.local(simd, ray), distance)),
+                    ),
                 };
                 let Met { point, normal, within } = met;
                 let size = point.x.abs() + point.y.abs() + point.z.abs();
@@ -201,6 +226,12 @@ impl<E: Real> Body<E> {
             },
         )
     }
+}
+
+/// What a long test finds, out of line: so planes and discs pay nothing for its registers.
+#[inline(never)]
+fn apart<S: Simd, T>(simd: S, test: impl FnOnce() -> T) -> T {
+    simd.vectorize(test)
 }
 
 /// How far off its surface a new ray starts, in roundoffs of the place and of the body.
