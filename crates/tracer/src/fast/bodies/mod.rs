@@ -147,9 +147,37 @@ impl<E: Real> Body<E> {
     }
 
     /// Offers where the rays meet the body.
+    #[inline(always)]
+    fn meet<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+        match &self.shape {
+            Shape::Disc(_) | Shape::Cuboid(_) => self.meet_short(simd, ray, nearest),
+            Shape::Plane | Shape::Cone(..) | Shape::Torus(_) => self.meet_other(simd, ray, nearest),
+        }
+    }
+
+    /// The shortest tests, which pay nothing for the registers of the others.
+    #[inline(never)]
+    fn meet_short<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                if !self.shape.is_built() {
+                    return;
+                }
+                let local = self.local(simd, ray);
+                let (hit, distance) = match &self.shape {
+                    Shape::Disc(disc) => disc.meet(simd, local),
+                    Shape::Cuboid(cuboid) => cuboid.meet(simd, local),
+                    Shape::Plane | Shape::Cone(..) | Shape::Torus(_) => return,
+                };
+                nearest.offer(simd, hit, distance, self.order);
+            },
+        );
+    }
+
     // Out of line, so that there is one piece of code for all that looks for bodies.
     #[inline(never)]
-    fn meet<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+    fn meet_other<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
         simd.vectorize(
             #[inline(always)]
             || {
@@ -159,28 +187,9 @@ impl<E: Real> Body<E> {
                 let local = self.local(simd, ray);
                 let (hit, distance) = match &self.shape {
                     Shape::Plane => plane::along(simd, local),
-                    Shape::Disc(disc) => disc.meet(simd, local),
-                    Shape::Cone(cone, end) => {
-                        let over = self.over(simd, *end, ray);
-                        apart(
-                            simd,
-                            #[inline(always)]
-                            || cone.meet(simd, local, over),
-                        )
-                    }
-                    Shape::Torus(torus) => {
-                        let limit = nearest.distance;
-                        apart(
-                            simd,
-                            #[inline(always)]
-                            || torus.meet(simd, local, limit),
-                        )
-                    }
-                    Shape::Cuboid(cuboid) => apart(
-                        simd,
-                        #[inline(always)]
-                        || cuboid.meet(simd, local),
-                    ),
+                    Shape::Cone(cone, end) => cone.meet(simd, local, self.over(simd, *end, ray)),
+                    Shape::Torus(torus) => torus.meet(simd, local, nearest.distance),
+                    Shape::Disc(_) | Shape::Cuboid(_) => return,
                 };
                 nearest.offer(simd, hit, distance, self.order);
             },
@@ -200,23 +209,16 @@ impl<E: Real> Body<E> {
                         plane::surface(simd, (up, center), ray, distance)
                     }
                     Shape::Cone(cone, end) => {
+                        let local = self.local(simd, ray);
                         let over = self.over(simd, *end, ray);
-                        apart(
-                            simd,
-                            #[inline(always)]
-                            || self.in_scene(simd, cone.surface(simd, self.local(simd, ray), over, distance)),
-                        )
+                        self.in_scene(simd, cone.surface(simd, local, over, distance))
                     }
-                    Shape::Torus(torus) => apart(
-                        simd,
-                        #[inline(always)]
-                        || self.in_scene(simd, torus.surface(simd, self.local(simd, ray), distance)),
-                    ),
-                    Shape::Cuboid(cuboid) => apart(
-                        simd,
-                        #[inline(always)]
-                        || self.in_scene(simd, cuboid.surface(simd, self.local(simd, ray), distance)),
-                    ),
+                    Shape::Torus(torus) => {
+                        self.in_scene(simd, torus.surface(simd, self.local(simd, ray), distance))
+                    }
+                    Shape::Cuboid(cuboid) => {
+                        self.in_scene(simd, cuboid.surface(simd, self.local(simd, ray), distance))
+                    }
                 };
                 let Met { point, normal, within } = met;
                 let size = point.x.abs() + point.y.abs() + point.z.abs();
@@ -226,12 +228,6 @@ impl<E: Real> Body<E> {
             },
         )
     }
-}
-
-/// What a long test finds, out of line: so planes and discs pay nothing for its registers.
-#[inline(never)]
-fn apart<S: Simd, T>(simd: S, test: impl FnOnce() -> T) -> T {
-    simd.vectorize(test)
 }
 
 /// How far off its surface a new ray starts, in roundoffs of the place and of the body.
