@@ -147,37 +147,9 @@ impl<E: Real> Body<E> {
     }
 
     /// Offers where the rays meet the body.
-    #[inline(always)]
-    fn meet<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
-        match &self.shape {
-            Shape::Disc(_) | Shape::Cuboid(_) => self.meet_short(simd, ray, nearest),
-            Shape::Plane | Shape::Cone(..) | Shape::Torus(_) => self.meet_other(simd, ray, nearest),
-        }
-    }
-
-    /// The shortest tests, which pay nothing for the registers of the others.
-    #[inline(never)]
-    fn meet_short<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                if !self.shape.is_built() {
-                    return;
-                }
-                let local = self.local(simd, ray);
-                let (hit, distance) = match &self.shape {
-                    Shape::Disc(disc) => disc.meet(simd, local),
-                    Shape::Cuboid(cuboid) => cuboid.meet(simd, local),
-                    Shape::Plane | Shape::Cone(..) | Shape::Torus(_) => return,
-                };
-                nearest.offer(simd, hit, distance, self.order);
-            },
-        );
-    }
-
     // Out of line, so that there is one piece of code for all that looks for bodies.
     #[inline(never)]
-    fn meet_other<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+    fn meet<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
         simd.vectorize(
             #[inline(always)]
             || {
@@ -187,9 +159,10 @@ impl<E: Real> Body<E> {
                 let local = self.local(simd, ray);
                 let (hit, distance) = match &self.shape {
                     Shape::Plane => plane::along(simd, local),
+                    Shape::Disc(disc) => disc.meet(simd, local),
                     Shape::Cone(cone, end) => cone.meet(simd, local, self.over(simd, *end, ray)),
                     Shape::Torus(torus) => torus.meet(simd, local, nearest.distance),
-                    Shape::Disc(_) | Shape::Cuboid(_) => return,
+                    Shape::Cuboid(cuboid) => cuboid.meet(simd, local),
                 };
                 nearest.offer(simd, hit, distance, self.order);
             },
