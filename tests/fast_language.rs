@@ -19,56 +19,45 @@ use hold::{draw, hold, off, placed, scripted};
 
 const SEED: u64 = 20_261_122;
 
+/// That scenes of `counts` objects in turn are drawn as the reference draws them: `count` of them.
+fn hold_each(
+    dice: &mut Dice,
+    (counts, count): (&[usize], usize),
+    mut scene: impl FnMut(&mut Dice, usize) -> Scene,
+) {
+    let scenes: Vec<Scene> = counts.iter().cycle().take(count).map(|&count| scene(dice, count)).collect();
+    hold(&scenes);
+}
+
 #[test]
 fn skies_tones_depths_and_mirrors_of_all_kinds_are_the_references() {
-    let mut dice = Dice::new("sky", SEED);
-    let scenes: Vec<Scene> = [0, 1, 6, 30, 90]
-        .into_iter()
-        .cycle()
-        .take(10)
-        .map(|count| {
-            let objects = (0..count).map(|_| dice.object()).collect();
-            dice.scene(objects)
-        })
-        .collect();
-    hold(&scenes);
+    hold_each(&mut Dice::new("sky", SEED), (&[0, 1, 6, 30, 90], 10), |dice, count| {
+        let objects = (0..count).map(|_| dice.object()).collect();
+        dice.scene(objects)
+    });
 }
 
 #[test]
 fn a_background_of_one_colour_has_its_tone() {
-    let mut dice = Dice::new("background", SEED);
-    let scenes: Vec<Scene> = [0, 1, 6, 90]
-        .into_iter()
-        .cycle()
-        .take(12)
-        .map(|count| {
-            let objects = (0..count).map(|_| dice.object()).collect();
-            let mut scene = dice.scene(objects);
-            scene.set_background(dice.color()).unwrap();
-            scene
-        })
-        .collect();
-    hold(&scenes);
+    hold_each(&mut Dice::new("background", SEED), (&[0, 1, 6, 90], 12), |dice, count| {
+        let objects = (0..count).map(|_| dice.object()).collect();
+        let mut scene = dice.scene(objects);
+        scene.set_background(dice.color()).unwrap();
+        scene
+    });
 }
 
 #[test]
 fn groups_are_the_references() {
-    let mut dice = Dice::new("groups", SEED);
-    let scenes: Vec<Scene> = [1, 6, 30, 90]
-        .into_iter()
-        .cycle()
-        .take(12)
-        .map(|count| {
-            let objects = (0..count)
-                .map(|_| {
-                    let object = dice.object();
-                    placed(&mut dice, object)
-                })
-                .collect();
-            dice.scene(objects)
-        })
-        .collect();
-    hold(&scenes);
+    hold_each(&mut Dice::new("groups", SEED), (&[1, 6, 30, 90], 12), |dice, count| {
+        let objects = (0..count)
+            .map(|_| {
+                let object = dice.object();
+                placed(dice, object)
+            })
+            .collect();
+        dice.scene(objects)
+    });
 }
 
 impl Dice {

@@ -55,31 +55,6 @@ fn frames_in_bands_are_put_together_whatever_happens() {
     assert!(put_together > SEEDS / 20, "few runs have bands: {put_together}");
 }
 
-/// A user flickered a script while the sweep deleted what was superseded: the deleted frame was current again, and
-/// pending until the next sweep.
-#[test]
-fn what_comes_back_while_it_is_tidied_away_is_drawn_again() {
-    run(141, None).unwrap_or_else(|violation| panic!("{violation}"));
-}
-
-/// An assembler that had waited for most of its time refused a set for which only a moment was left.
-#[test]
-fn a_set_that_becomes_whole_late_is_not_refused() {
-    run(23_812, None).unwrap_or_else(|violation| panic!("{violation}"));
-}
-
-/// An attempt that found the lease of an earlier one, and could not renew it, took it for another's and left.
-#[test]
-fn an_assembler_knows_its_own_lease() {
-    run(61_305, None).unwrap_or_else(|violation| panic!("{violation}"));
-}
-
-/// The answer was lost when an assembler took a lease that was handed over: it left, and held off all others.
-#[test]
-fn an_assembler_that_takes_a_left_lease_knows_it_without_an_answer() {
-    run(13_794, None).unwrap_or_else(|violation| panic!("{violation}"));
-}
-
 #[test]
 fn a_seed_gives_the_same_run() {
     let (mut first, mut second) = (Vec::new(), Vec::new());

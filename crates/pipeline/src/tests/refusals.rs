@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::fold::Folded;
+use crate::lease::Held;
 
 /// Each of the errors after which a conditional put may succeed when all is looked at anew.
 fn passing() -> [Error; 5] {
@@ -67,6 +68,22 @@ async fn ones_own_lease_need_not_be_renewed() {
     });
     let taken = world.with(async |invocation| invocation.take_lease(&World::film()).await).await;
     assert!(taken.unwrap().is_some());
+}
+
+/// The put took place and its answer was lost. Whoever takes the lease for another's leaves, and holds off all others.
+#[tokio::test]
+async fn a_left_lease_that_was_taken_without_an_answer_is_ones_own() {
+    const TAKEN: &str = r#"{"assembler":"request-0","until":9000000,"checkpoint":true}"#;
+    let world = World::new();
+    world.put(LEASE, r#"{"assembler":"","until":0,"checkpoint":true}"#);
+    world.meddle(|request, bucket, now| {
+        if request == PUT_LEASE {
+            bucket.put(now, LEASE, TAKEN.into(), PutOptions::always()).unwrap();
+        }
+    });
+    let taken = world.with(async |invocation| invocation.take_left_lease(&World::film()).await).await;
+    assert_eq!(taken.unwrap(), Some(Held { has_checkpoint: true }));
+    assert_eq!(world.store.bucket.lock().unwrap().get(LEASE).unwrap().body, TAKEN);
 }
 
 #[tokio::test]

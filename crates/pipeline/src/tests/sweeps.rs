@@ -187,15 +187,21 @@ async fn error_receipts_that_cannot_be_read_go_and_their_frames_are_woken() {
     assert_eq!(world.keys("retries/").len(), 2);
 }
 
+/// Puts a refusal of this set and one of another.
+fn refusals(world: &World, body: &str) -> [String; 2] {
+    let this = world.manifest().head.generation.as_str().to_owned();
+    [this, "0a".repeat(16)].map(|generation| {
+        let key = format!("frames/film/@{generation}.error.json");
+        world.put(&key, body);
+        key
+    })
+}
+
 #[tokio::test]
 async fn a_refusal_that_cannot_be_read_goes() {
     let world = World::new();
     world.upload("1.txt", "frame 1").await;
-    let refusal = format!("frames/film/@{}.error.json", world.manifest().head.generation.as_str());
-    let other = format!("frames/film/@{}.error.json", "0a".repeat(16));
-    for key in [&refusal, &other] {
-        world.put(key, "garbage");
-    }
+    let [refusal, other] = refusals(&world, "garbage");
     let visit = world.visit().await;
     assert_eq!(visit, Visit { deleted: 1, claimed: true, ..Visit::default() });
     let left = world.keys("frames/");
@@ -206,11 +212,7 @@ async fn a_refusal_that_cannot_be_read_goes() {
 async fn refusals_of_other_sets_go_after_a_week_and_that_of_this_set_stays() {
     let world = World::new();
     world.upload("1.txt", "frame 1").await;
-    let refusal = format!("frames/film/@{}.error.json", world.manifest().head.generation.as_str());
-    let other = format!("frames/film/@{}.error.json", "0a".repeat(16));
-    for key in [&refusal, &other] {
-        world.put(key, r#"{"message":"why"}"#);
-    }
+    let [refusal, other] = refusals(&world, r#"{"message":"why"}"#);
     world.until(&other, 7 * DAY - MOMENT).await;
     assert_eq!(world.visit().await.deleted, 0);
     world.later(MOMENT).await;
@@ -277,4 +279,28 @@ async fn what_came_of_older_versions_goes_after_a_week_and_all_else_stays() {
     // The split, its two frames, what says that one has begun, one part; the error and what says that it has begun.
     assert_eq!(visit.deleted, 7);
     assert_eq!(there.len() - kept.len(), 7);
+}
+
+/// The script is what it was before, and its event finds the frame that goes in the next moment.
+#[tokio::test]
+async fn what_comes_back_while_it_is_tidied_away_is_drawn_again() {
+    let world = World::new();
+    let version = world.put(SCRIPT, "frame 1");
+    world.render(SCRIPT).await;
+    world.put(SCRIPT, "frame 2");
+    world.render(SCRIPT).await;
+    let frame = format!("frames/film/1@{version}-p1.png");
+    world.until(&frame, 8 * DAY).await;
+    let (doomed, mut has_met) = (format!("delete {frame}"), false);
+    world.meddle(move |request, bucket, now| {
+        if request == doomed && !std::mem::replace(&mut has_met, true) {
+            bucket.put(now, SCRIPT, "frame 1".into(), PutOptions::always()).unwrap();
+        }
+    });
+    let visit = world.visit().await;
+    assert_eq!((visit.deleted, visit.woken), (1, 1));
+    let retries = world.keys("retries/");
+    assert!(retries.len() == 1 && retries[0].contains(version.as_str()), "{retries:?}");
+    world.render(&retries[0]).await;
+    assert!(world.keys("frames/").contains(&frame));
 }
