@@ -280,27 +280,3 @@ async fn what_came_of_older_versions_goes_after_a_week_and_all_else_stays() {
     assert_eq!(visit.deleted, 7);
     assert_eq!(there.len() - kept.len(), 7);
 }
-
-/// The script is what it was before, and its event finds the frame that goes in the next moment.
-#[tokio::test]
-async fn what_comes_back_while_it_is_tidied_away_is_drawn_again() {
-    let world = World::new();
-    let version = world.put(SCRIPT, "frame 1");
-    world.render(SCRIPT).await;
-    world.put(SCRIPT, "frame 2");
-    world.render(SCRIPT).await;
-    let frame = format!("frames/film/1@{version}-p1.png");
-    world.until(&frame, 8 * DAY).await;
-    let (doomed, mut has_met) = (format!("delete {frame}"), false);
-    world.meddle(move |request, bucket, now| {
-        if request == doomed && !std::mem::replace(&mut has_met, true) {
-            bucket.put(now, SCRIPT, "frame 1".into(), PutOptions::always()).unwrap();
-        }
-    });
-    let visit = world.visit().await;
-    assert_eq!((visit.deleted, visit.woken), (1, 1));
-    let retries = world.keys("retries/");
-    assert!(retries.len() == 1 && retries[0].contains(version.as_str()), "{retries:?}");
-    world.render(&retries[0]).await;
-    assert!(world.keys("frames/").contains(&frame));
-}
