@@ -34,7 +34,7 @@ impl<E> AsMut<[E]> for Column<E> {
 pub(super) type Columns<E> = [Column<E>; 3];
 
 impl<E: Real> Column<E> {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self([E::narrow(0.0); ROOM])
     }
 }
@@ -67,6 +67,9 @@ pub(super) struct Hits<E> {
     pub(super) order: Column<E>,
     pub(super) start: Columns<E>,
     pub(super) normal: Columns<E>,
+    /// How far the start is off the surface, and 1 for rays that come from within the object, 0 for the others; made for
+    /// scenes that have glass.
+    pub(super) sides: [Column<E>; 2],
     /// Diffuse coefficient times the ray's weight.
     pub(super) diffuse: Columns<E>,
     pub(super) color: Columns<E>,
@@ -85,6 +88,7 @@ impl<E: Real> Hits<E> {
             order: Column::new(),
             start: columns(),
             normal: columns(),
+            sides: [Column::new(), Column::new()],
             diffuse: columns(),
             color: columns(),
             mirror: [vec![], vec![], vec![]],

@@ -9,7 +9,7 @@ use fearless_simd::prelude::*;
 use rayfold_scene::{Object, Scene, Tone};
 
 use super::packet::Surface;
-use super::real::{Lanes, Real, Vec3, constant, splat};
+use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
 use crate::reference;
 
 /// The glass of a scene.
@@ -19,7 +19,7 @@ pub(super) struct Glass<E> {
     panes: Vec<Option<Pane<E>>>,
     /// Surfaces of glass that a straight line meets at most.
     pub(super) surfaces: usize,
-    /// Once a path has met glass, a ray that counts for less than this in every channel is not followed.
+    /// Once a path has met glass, a ray that counts for less than this in every channel is not followed. A power of two.
     faint: f64,
 }
 
@@ -63,14 +63,20 @@ impl<E: Real> Glass<E> {
         self.panes[order.to_index()].as_ref()
     }
 
-    /// Whether a ray is followed that counts for `weight`.
+    /// Which rays are followed that count for `weight`.
     #[inline(always)]
-    pub(super) fn is_followed(&self, weight: [E; 3], has_met_glass: bool) -> bool {
-        let counts = |weight: E| {
-            let weight = weight.widen().abs();
-            if has_met_glass { weight >= self.faint } else { weight != 0.0 }
+    pub(super) fn followed<S: Simd>(
+        &self,
+        simd: S,
+        weight: Vec3<S, E>,
+        have_met_glass: Mask<S, E>,
+    ) -> Mask<S, E> {
+        let (zero, faint) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, self.faint));
+        let counts = |weight: Lanes<S, E>| {
+            let weight = weight.abs();
+            (have_met_glass & weight.simd_ge(faint)) | (!have_met_glass & weight.simd_gt(zero))
         };
-        weight.into_iter().any(counts)
+        counts(weight.x) | counts(weight.y) | counts(weight.z)
     }
 }
 

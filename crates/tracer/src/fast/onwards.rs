@@ -6,37 +6,18 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
-use super::bounce::{Hits, Queue};
-use super::features::Features;
+use super::bounce::{Hits, Queue, count_from};
 use super::glass::{Glass, Refraction};
-use super::packet::Ray;
+use super::packet::{Ray, Surface, no_lane};
 use super::prepare::Prepared;
-use super::real::{Real, Vec3, constant};
-use super::surfaces::{Met, mirrored, surface};
-use super::waiting::{OneRay, Waiting};
-
-/// A packet of rays, lane by lane.
-struct Lane<E>([[E; 16]; 3]);
-
-impl<E: Real> Lane<E> {
-    #[inline(always)]
-    fn of<S: Simd>(v: Vec3<S, E>) -> Self {
-        let mut columns = [[E::narrow(0.0); 16]; 3];
-        v.store(&mut columns, 0);
-        Self(columns)
-    }
-
-    #[inline(always)]
-    fn at(&self, lane: usize) -> [E; 3] {
-        let Self([x, y, z]) = self;
-        [x[lane], y[lane], z[lane]]
-    }
-}
+use super::real::{Lanes, Mask, Real, Vec3, constant};
+use super::surfaces::{Met, mirrored};
+use super::waiting::{SentOn, Waiting};
 
 /// Adds the rays that mirrors and glass send on to those that wait; `PAINTED` says that the mirror coefficients are among
 /// the hits.
 #[inline(never)]
-pub(super) fn send_on<S: Simd, E: Real, F: Features<E>, const EYE: bool, const PAINTED: bool>(
+pub(super) fn send_on<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>(
     simd: S,
     scene: &Prepared<E>,
     glass: &Glass<E>,
@@ -55,10 +36,18 @@ pub(super) fn send_on<S: Simd, E: Real, F: Features<E>, const EYE: bool, const P
                 let ray = Ray { origin, direction: Vec3::load(simd, &queue.direction, at) };
                 let weight =
                     if EYE { Vec3::<S, E>::new(one, one, one) } else { Vec3::load(simd, &queue.weight, at) };
+                let normal = Vec3::load(simd, &hits.normal, at);
+                let start = Vec3::load(simd, &hits.start, at);
+                let lanes = at..at + Lanes::<S, E>::LEN;
+                let [offset, within] = [0, 1].map(
+                    #[inline(always)]
+                    |k| Lanes::<S, E>::from_slice(simd, &hits.sides[k].0[lanes.clone()]),
+                );
+                let surface = Surface { start, normal, offset, within: within.simd_ne(zero.x) };
                 // What the mirrored ray counts for, and the refracted one.
                 let mut mirror = if PAINTED { Vec3::load(simd, &hits.mirror, at) } else { zero };
-                let (mut through, mut beyond, mut bent) = (zero, zero, zero);
-                let mut of_glass = 0;
+                let (mut through, mut bent) = (zero, zero);
+                let mut of_glass = no_lane::<S, E>(simd);
                 let mut rest = bits;
                 while rest != 0 {
                     let lane = rest.trailing_zeros();
@@ -68,43 +57,36 @@ pub(super) fn send_on<S: Simd, E: Real, F: Features<E>, const EYE: bool, const P
                         mirror = Vec3::select(same, Vec3::splat(simd, entry.mirror).mul(weight), mirror);
                     }
                     let Some(pane) = glass.of(met.orders[lane as usize]) else { continue };
-                    of_glass |= same.to_bitmask();
-                    let surface = surface::<S, E, F, EYE>(simd, scene, entry, ray, met.found.distance);
+                    of_glass |= same;
                     let Refraction { mirrored, direction } = pane.refract(simd, ray.direction, surface);
                     let share = Vec3::splat(simd, pane.color).scale(one - mirrored).mul(weight);
                     mirror = Vec3::select(same, weight.scale_add(mirrored, mirror), mirror);
                     through = Vec3::select(same, share, through);
-                    beyond = Vec3::select(same, surface.beyond(simd), beyond);
                     bent = Vec3::select(same, direction, bent);
                 }
-                let normal = Vec3::load(simd, &hits.normal, at);
-                let [start, away] =
-                    [Vec3::load(simd, &hits.start, at), mirrored(simd, ray.direction, normal)];
-                let [mirror, start, away] = [mirror, start, away].map(Lane::of);
-                let [through, beyond, bent] = [through, beyond, bent].map(Lane::of);
-                let mut rest = bits;
-                while rest != 0 {
-                    let lane = rest.trailing_zeros() as usize;
-                    rest &= rest - 1;
-                    let slot = at + lane;
-                    let pixel = if EYE { E::narrow(slot as f64) } else { queue.pixel.0[slot] };
+                let mut sent = Mask::<S, E>::from_bitmask(simd, bits);
+                let pixel = if EYE {
+                    count_from::<S, E>(simd, at)
+                } else {
+                    let pixel = Lanes::<S, E>::from_slice(simd, &queue.pixel.0[lanes]);
                     // Lanes that only repeat another send nothing on.
-                    if pixel < E::narrow(0.0) {
-                        continue;
-                    }
-                    let is_glass = of_glass >> lane & 1 != 0;
-                    let has_met_glass = is_glass || waiting.has_met_glass(slot);
-                    let weight = mirror.at(lane);
-                    if glass.is_followed(weight, has_met_glass) {
-                        let (origin, direction) = (start.at(lane), away.at(lane));
-                        waiting.push(OneRay { origin, direction, weight, pixel, has_met_glass });
-                    }
-                    let weight = through.at(lane);
-                    if is_glass && glass.is_followed(weight, has_met_glass) {
-                        let (origin, direction) = (beyond.at(lane), bent.at(lane));
-                        waiting.push(OneRay { origin, direction, weight, pixel, has_met_glass });
-                    }
-                }
+                    sent &= pixel.simd_ge(zero.x);
+                    pixel
+                };
+                let have_met_glass = of_glass | waiting.have_met_glass(simd, at);
+                let mirrored = SentOn {
+                    origin: start,
+                    direction: mirrored(simd, ray.direction, normal),
+                    weight: mirror,
+                    lanes: sent & glass.followed(simd, mirror, have_met_glass),
+                };
+                let refracted = SentOn {
+                    origin: surface.beyond(simd),
+                    direction: bent,
+                    weight: through,
+                    lanes: sent & of_glass & glass.followed(simd, through, have_met_glass),
+                };
+                waiting.push(simd, pixel, have_met_glass, [mirrored, refracted]);
             }
         },
     );

@@ -101,10 +101,18 @@ impl<S: Simd, E: Real> Share<S, E> {
         let rest = if self.is_first { rest } else { Vec3::load(simd, into, self.at) };
         Vec3::select(self.lanes, of, rest).store(into, self.at);
     }
+
+    /// Writes its lanes of one number a ray.
+    #[inline(always)]
+    fn put_one(self, simd: S, of: Lanes<S, E>, into: &mut Column<E>) {
+        let into = &mut into.0[self.at..self.at + Lanes::<S, E>::LEN];
+        self.lanes.select(of, Lanes::<S, E>::from_slice(simd, into)).store_slice(into);
+    }
 }
 
 /// The colour of hits without light, and how their surfaces lie: those of all, if light is to fall on them (`LIT`), or
-/// those alone that send rays on. Which lanes do is noted if any can (`MIRRORS`).
+/// those alone that send rays on. Which lanes do is noted if any can (`MIRRORS`), and of all on which side of its surface a
+/// ray comes, if some may go through (`GLASS`).
 #[inline(never)]
 pub(super) fn surfaces<
     S: Simd,
@@ -113,6 +121,7 @@ pub(super) fn surfaces<
     const EYE: bool,
     const LIT: bool,
     const MIRRORS: bool,
+    const GLASS: bool,
 >(
     simd: S,
     scene: &Prepared<E>,
@@ -123,7 +132,8 @@ pub(super) fn surfaces<
     simd.vectorize(
         #[inline(always)]
         || {
-            let Hits { distance, order, start, normal, diffuse, color, packets, mirrors, mirror: _ } = hits;
+            let Hits { distance, order, start, normal, sides, diffuse, color, packets, mirrors, mirror: _ } =
+                hits;
             mirrors.clear();
             let zero = Vec3::zero(simd);
             for (at, others) in packets {
@@ -148,6 +158,12 @@ pub(super) fn surfaces<
                         let ray = Ray { origin, direction: Vec3::load(simd, &queue.direction, at) };
                         let surface = surface::<S, E, F, EYE>(simd, scene, entry, ray, met.found.distance);
                         share.put(simd, surface.normal, zero, normal);
+                        if GLASS {
+                            let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
+                            let [offset, within] = &mut *sides;
+                            share.put_one(simd, surface.offset, offset);
+                            share.put_one(simd, surface.within.select(one, zero), within);
+                        }
                         if LIT {
                             share.put(
                                 simd,

@@ -271,7 +271,7 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     if hits.packets.is_empty() {
         return;
     }
-    surfaces::<S, E, Anything<N::By>, EYE, true, true>(simd, scene, met.background, queue, hits);
+    surfaces_of_all::<S, E, N, EYE>(simd, scene, met.background, queue, hits);
     let is_painted = paint::<S, E, EYE>(beyond, queue, hits);
     in_the_way.find(simd, scene, hits);
     if beyond.bodies().is_some() {
@@ -283,6 +283,22 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
         light_up_beyond::<S, E, Anything<N::By>, EYE, false>(simd, scene, beyond, queue, hits, in_the_way);
     }
     go_on::<S, E, N, EYE>(simd, scene, is_painted, met, hits);
+}
+
+/// The surfaces of whatever a scene can have.
+#[inline(always)]
+fn surfaces_of_all<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    background: [E; 3],
+    queue: &Queue<E>,
+    hits: &mut Hits<E>,
+) {
+    if scene.has_glass() {
+        surfaces::<S, E, Anything<N::By>, EYE, true, true, true>(simd, scene, background, queue, hits);
+    } else {
+        surfaces::<S, E, Anything<N::By>, EYE, true, true, false>(simd, scene, background, queue, hits);
+    }
 }
 
 /// In pictures whose lights have an extent.
@@ -302,7 +318,7 @@ fn shade_softly<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     if hits.packets.is_empty() {
         return;
     }
-    surfaces::<S, E, Anything<N::By>, EYE, true, true>(simd, scene, met.background, queue, hits);
+    surfaces_of_all::<S, E, N, EYE>(simd, scene, met.background, queue, hits);
     let is_painted = beyond.is_some_and(|beyond| paint::<S, E, EYE>(beyond, queue, hits));
     in_the_way.find(simd, scene, hits);
     if beyond.is_some_and(|beyond| beyond.bodies().is_some()) {
@@ -337,11 +353,7 @@ fn go_on<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
 ) {
     if let Some(glass) = scene.beyond.as_ref().and_then(Beyond::glass) {
         if !waiting.is_at_the_end() {
-            let send_on = if is_painted {
-                send_on::<S, E, Anything<N::By>, EYE, true>
-            } else {
-                send_on::<S, E, Anything<N::By>, EYE, false>
-            };
+            let send_on = if is_painted { send_on::<S, E, EYE, true> } else { send_on::<S, E, EYE, false> };
             send_on(simd, scene, glass, queue, hits, waiting);
         }
         return;
@@ -370,11 +382,11 @@ fn shade_plain<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
         // Whether objects are found down a tree makes no difference to surfaces.
         if mirrors {
             fitted!(N, kinds, C T => {
-                surfaces::<S, E, Variant<N::By, C, T, false>, EYE, true, true>(simd, scene, background, queue, hits)
+                surfaces::<S, E, Variant<N::By, C, T, false>, EYE, true, true, false>(simd, scene, background, queue, hits)
             });
         } else {
             fitted!(N, kinds, C T => {
-                surfaces::<S, E, Variant<N::By, C, T, false>, EYE, true, false>(simd, scene, background, queue, hits)
+                surfaces::<S, E, Variant<N::By, C, T, false>, EYE, true, false, false>(simd, scene, background, queue, hits)
             });
         }
         if BUILT.shadows && scene.needs.shadows {
@@ -388,7 +400,7 @@ fn shade_plain<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
         }
     } else if mirrors {
         fitted!(N, kinds, C T => {
-            surfaces::<S, E, Variant<N::By, C, T, false>, EYE, false, true>(simd, scene, background, queue, hits)
+            surfaces::<S, E, Variant<N::By, C, T, false>, EYE, false, true, false>(simd, scene, background, queue, hits)
         });
     } else {
         ambient::<S, E, EYE>(simd, scene, background, queue, hits);

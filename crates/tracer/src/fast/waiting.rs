@@ -1,68 +1,143 @@
 //! Rays of a tile that wait to be traced, by how often they were mirrored or refracted.
 //!
-//! Where glass makes two rays of one, the rays of a bounce can be many times the pixels. They are traced a queue at a time,
-//! of the farthest bounce that fills one: so no bounce has more than [`MOST`] rays that wait, however many there are in
-//! all. Those of a bounce are taken in the order in which they were added, and each bounce has a sum of its own: which rays
-//! share a queue changes no sum, and a picture depends on neither tiles nor widths.
+//! Where glass makes two rays of one, the rays of a bounce can be many times the pixels. Those that were mirrored last and
+//! those that were refracted last stand in lines of their own, since neighbours in a line go alike. They are traced a queue
+//! at a time, of the farthest bounce with a line that fills one: so no line has more than [`MOST`] rays, however many there
+//! are in all. What they add to a pixel is summed in whole numbers, exactly: a picture depends neither on which rays share a
+//! queue nor on which go first, and so on neither tiles nor widths.
 
-use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::bounce::{Columns, Hits, PIXELS, Queue, ROOM, columns};
-use super::real::Real;
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+
+use super::bounce::{Column, Columns, Hits, PIXELS, Queue, ROOM};
+use super::real::{Lanes, Mask, Real, Vec3, constant};
 
 /// Rays of a full queue.
 const FULL: usize = PIXELS;
 
-/// Rays of a bounce that wait at most: with fewer than a queue's it is given two each for those of a full one.
-const MOST: usize = 3 * FULL;
+/// Rays of a line at most: with fewer than a queue's it is given one each for those of a full one.
+const MOST: usize = 2 * FULL;
 
-/// A ray that waits.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct OneRay<E> {
-    pub(super) origin: [E; 3],
-    pub(super) direction: [E; 3],
-    /// What its colour counts for in the pixel's.
-    pub(super) weight: [E; 3],
-    pub(super) pixel: E,
-    pub(super) has_met_glass: bool,
+/// Of what one ray adds to a pixel, where white is 1: a ray counts for no more than 2²³ times white.
+const ONE: f64 = (1u64 << 40) as f64;
+
+/// Numbers of a ray that waits: where it starts and goes, what its colour counts for in the pixel's, its pixel, and whether
+/// it has met glass.
+const NUMBERS: usize = 11;
+
+/// A packet of rays that are sent on.
+#[derive(Clone, Copy)]
+pub(super) struct SentOn<S: Simd, E: Real> {
+    pub(super) origin: Vec3<S, E>,
+    pub(super) direction: Vec3<S, E>,
+    pub(super) weight: Vec3<S, E>,
+    /// Which of them are: the others are nothing.
+    pub(super) lanes: Mask<S, E>,
 }
 
-/// The rays of a tile that were sent on equally often.
-struct Bounce<E> {
-    rays: VecDeque<OneRay<E>>,
-    /// What they add to each pixel.
-    sum: Columns<E>,
-    is_used: bool,
+impl<S: Simd, E: Real> SentOn<S, E> {
+    #[inline(always)]
+    fn numbers(self, pixel: Lanes<S, E>, has_met_glass: Lanes<S, E>) -> [Lanes<S, E>; NUMBERS] {
+        let [o, d, w] = [self.origin, self.direction, self.weight];
+        [o.x, o.y, o.z, d.x, d.y, d.z, w.x, w.y, w.z, pixel, has_met_glass]
+    }
+}
+
+/// Rays that stand in line: the first to come are the first to go.
+struct Line<E> {
+    columns: [Vec<E>; NUMBERS],
+    first: usize,
+    end: usize,
+}
+
+impl<E: Real> Line<E> {
+    fn new() -> Self {
+        Self { columns: core::array::from_fn(|_| vec![E::narrow(0.0); MOST + FULL]), first: 0, end: 0 }
+    }
+
+    fn len(&self) -> usize {
+        self.end - self.first
+    }
+
+    /// Adds some lanes of a packet.
+    #[inline(always)]
+    fn push<S: Simd>(&mut self, numbers: [Lanes<S, E>; NUMBERS], lanes: Mask<S, E>) {
+        if self.end + Lanes::<S, E>::LEN > self.columns[0].len() {
+            self.move_up(Lanes::<S, E>::LEN);
+        }
+        let room = self.end..self.end + Lanes::<S, E>::LEN;
+        for (column, numbers) in self.columns.iter_mut().zip(numbers) {
+            numbers.compress(lanes).store_slice(&mut column[room.clone()]);
+        }
+        self.end += lanes.to_bitmask().count_ones() as usize;
+    }
+
+    /// Moves all to the beginning, so that there is room for so many more.
+    #[cold]
+    fn move_up(&mut self, count: usize) {
+        let len = self.len();
+        for column in &mut self.columns {
+            column.copy_within(self.first..self.end, 0);
+            if column.len() < len + count {
+                column.resize(len + count, E::narrow(0.0));
+            }
+        }
+        (self.first, self.end) = (0, len);
+    }
+
+    /// Moves the first ones to the columns.
+    fn take(&mut self, count: usize, into: [&mut Column<E>; NUMBERS]) {
+        for (from, into) in self.columns.iter().zip(into) {
+            into.0[..count].copy_from_slice(&from[self.first..self.first + count]);
+        }
+        self.first += count;
+        if self.first == self.end {
+            (self.first, self.end) = (0, 0);
+        }
+    }
 }
 
 /// All rays that wait.
 pub(super) struct Waiting<'a, E> {
     /// Once it is raised no more rays are taken.
     cancel: Option<&'a AtomicBool>,
-    /// The first is that of rays sent on once.
-    bounces: Vec<Bounce<E>>,
+    /// The first are those of rays sent on once: the mirrored and the refracted.
+    bounces: Vec<[Line<E>; 2]>,
+    /// What all rays add to each pixel, a channel each.
+    sums: [Vec<i128>; 3],
     /// How often the rays in the queue were sent on.
     depth: u32,
     /// How often rays are.
     most: u32,
-    /// Which of them have met glass.
-    has_met_glass: [bool; ROOM],
+    /// 1 for those of them that have met glass, 0 for the others.
+    have_met_glass: Column<E>,
 }
 
 impl<'a, E: Real> Waiting<'a, E> {
     pub(super) fn new(cancel: Option<&'a AtomicBool>) -> Self {
-        Self { cancel, bounces: Vec::new(), depth: 0, most: 0, has_met_glass: [false; ROOM] }
+        Self {
+            cancel,
+            bounces: Vec::new(),
+            sums: [vec![], vec![], vec![]],
+            depth: 0,
+            most: 0,
+            have_met_glass: Column::new(),
+        }
     }
 
     /// Starts a tile: the rays in the queue are those of the camera, and are sent on so often at most.
     pub(super) fn begin(&mut self, most: u32) {
         self.depth = 0;
         self.most = most;
-        self.has_met_glass.fill(false);
-        for bounce in &mut self.bounces {
-            bounce.rays.clear();
-            bounce.is_used = false;
+        self.have_met_glass.0.fill(E::narrow(0.0));
+        for line in self.bounces.as_flattened_mut() {
+            (line.first, line.end) = (0, 0);
+        }
+        for sums in &mut self.sums {
+            sums.clear();
+            sums.resize(ROOM, 0);
         }
     }
 
@@ -71,68 +146,76 @@ impl<'a, E: Real> Waiting<'a, E> {
         self.depth == self.most
     }
 
-    /// Whether the ray at a place of the queue has met glass.
+    /// Which rays of the packet at a place of the queue have met glass.
     #[inline(always)]
-    pub(super) fn has_met_glass(&self, at: usize) -> bool {
-        self.has_met_glass[at]
+    pub(super) fn have_met_glass<S: Simd>(&self, simd: S, at: usize) -> Mask<S, E> {
+        let met = Lanes::<S, E>::from_slice(simd, &self.have_met_glass.0[at..at + Lanes::<S, E>::LEN]);
+        met.simd_ne(constant::<S, E>(simd, 0.0))
     }
 
-    /// Adds a ray that a ray of the queue is sent on as; those of a pixel in the order of theirs.
-    pub(super) fn push(&mut self, ray: OneRay<E>) {
+    /// Adds the rays that those of a packet are sent on as: the mirrored and the refracted.
+    #[inline(always)]
+    pub(super) fn push<S: Simd>(
+        &mut self,
+        simd: S,
+        pixel: Lanes<S, E>,
+        have_met_glass: Mask<S, E>,
+        rays: [SentOn<S, E>; 2],
+    ) {
         let next = self.depth as usize;
         if self.bounces.len() == next {
-            let rays = VecDeque::with_capacity(MOST);
-            self.bounces.push(Bounce { rays, sum: columns(), is_used: false });
+            self.add_bounce();
         }
-        self.bounces[next].rays.push_back(ray);
+        let glass = have_met_glass.select(constant::<S, E>(simd, 1.0), constant::<S, E>(simd, 0.0));
+        for (line, ray) in self.bounces[next].iter_mut().zip(rays) {
+            line.push::<S>(ray.numbers(pixel, glass), ray.lanes);
+        }
+    }
+
+    #[cold]
+    fn add_bounce(&mut self) {
+        self.bounces.push([Line::new(), Line::new()]);
     }
 
     /// Fills the queue with rays of a bounce; false if there are none, or the drawing was cancelled.
     pub(super) fn take(&mut self, queue: &mut Queue<E>) -> bool {
-        let is_full = |bounce: &Bounce<E>| bounce.rays.len() >= FULL;
-        let some = |bounce: &Bounce<E>| !bounce.rays.is_empty();
-        let found = self.bounces.iter().rposition(is_full).or_else(|| self.bounces.iter().position(some));
+        let lines = self.bounces.as_flattened_mut();
+        let full = lines.iter().rposition(|line| line.len() >= FULL);
+        let found = full.or_else(|| lines.iter().position(|line| line.len() > 0));
         let Some(at) = found else { return false };
         if self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
             return false;
         }
-        let rays = &mut self.bounces[at].rays;
+        let rays = &mut lines[at];
         debug_assert!(rays.len() <= MOST, "{} rays wait", rays.len());
-        self.depth = at as u32 + 1;
+        self.depth = at as u32 / 2 + 1;
         queue.count = rays.len().min(FULL);
-        for (slot, ray) in rays.drain(..queue.count).enumerate() {
-            for axis in 0..3 {
-                queue.origin[axis].0[slot] = ray.origin[axis];
-                queue.direction[axis].0[slot] = ray.direction[axis];
-                queue.weight[axis].0[slot] = ray.weight[axis];
-            }
-            queue.pixel.0[slot] = ray.pixel;
-            self.has_met_glass[slot] = ray.has_met_glass;
-        }
+        let [ox, oy, oz] = &mut queue.origin;
+        let [dx, dy, dz] = &mut queue.direction;
+        let [wx, wy, wz] = &mut queue.weight;
+        let glass = &mut self.have_met_glass;
+        rays.take(queue.count, [ox, oy, oz, dx, dy, dz, wx, wy, wz, &mut queue.pixel, glass]);
         true
     }
 
-    /// Adds the colours of the rays in the queue to the sums of their bounce.
+    /// Adds the colours of the rays in the queue to the sums.
     pub(super) fn add(&mut self, queue: &Queue<E>, hits: &Hits<E>) {
-        let bounce = &mut self.bounces[self.depth as usize - 1];
-        for (sum, color) in bounce.sum.iter_mut().zip(&hits.color) {
-            if !bounce.is_used {
-                sum.0.fill(E::narrow(0.0));
-            }
-            for (pixel, color) in queue.pixel.0[..queue.count].iter().zip(&color.0) {
-                sum.0[pixel.to_index()] += *color;
+        for (ray, pixel) in queue.pixel.0[..queue.count].iter().enumerate() {
+            let pixel = pixel.to_index();
+            for (sums, color) in self.sums.iter_mut().zip(&hits.color) {
+                let color = color.0[ray].widen();
+                #[cfg(feature = "accuracy")]
+                crate::nans::add(color.is_nan().into());
+                sums[pixel] += i128::from((color * ONE) as i64);
             }
         }
-        bounce.is_used = true;
     }
 
-    /// Adds what all bounces have to the pixels.
+    /// Adds the sums to the pixels.
     pub(super) fn sum_up(&self, pixels: &mut Columns<E>) {
-        for bounce in self.bounces.iter().filter(|bounce| bounce.is_used) {
-            for (pixels, sum) in pixels.iter_mut().zip(&bounce.sum) {
-                for (pixel, sum) in pixels.0.iter_mut().zip(&sum.0) {
-                    *pixel += *sum;
-                }
+        for (pixels, sums) in pixels.iter_mut().zip(&self.sums) {
+            for (pixel, sum) in pixels.0.iter_mut().zip(sums) {
+                *pixel += E::narrow(*sum as f64 / ONE);
             }
         }
     }
@@ -140,29 +223,49 @@ impl<'a, E: Real> Waiting<'a, E> {
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::{Level, dispatch};
+
     use super::*;
 
-    fn ray(pixel: usize) -> OneRay<f64> {
-        let vector = [1.0; 3];
-        OneRay { origin: vector, direction: vector, weight: vector, pixel: pixel as f64, has_met_glass: true }
+    /// Two rays of a pixel, of which those are added that `are_sent` says.
+    fn push(waiting: &mut Waiting<f64>, pixel: usize, are_sent: [bool; 2]) {
+        dispatch!(Level::new(), simd => push_with(simd, waiting, pixel, are_sent));
+    }
+
+    fn push_with<S: Simd>(simd: S, waiting: &mut Waiting<f64>, pixel: usize, are_sent: [bool; 2]) {
+        let rays = are_sent.map(|is_sent| {
+            let one = Vec3::splat(simd, [1.0; 3]);
+            // In one lane, which is another one each time.
+            let lane = pixel % Lanes::<S, f64>::LEN;
+            let lanes = Mask::<S, f64>::from_bitmask(simd, u64::from(is_sent) << lane);
+            SentOn { origin: one, direction: one, weight: one, lanes }
+        });
+        let pixel = constant::<S, f64>(simd, pixel as f64);
+        waiting.push(simd, pixel, pixel.simd_eq(pixel), rays);
+    }
+
+    /// Whether the first ray of the queue has.
+    fn has_met_glass(waiting: &Waiting<f64>) -> bool {
+        dispatch!(Level::new(), simd => waiting.have_met_glass(simd, 0).to_bitmask() & 1 != 0)
+    }
+
+    fn pixels(queue: &Queue<f64>) -> Vec<usize> {
+        queue.pixel.0[..queue.count].iter().map(|pixel| pixel.to_index()).collect()
     }
 
     #[test]
     fn few_rays_wait_however_many_come() {
         let (mut waiting, mut queue) = (Waiting::<f64>::new(None), Queue::new());
         waiting.begin(8);
-        (0..2 * FULL).for_each(|k| waiting.push(ray(k / 2)));
+        (0..FULL).for_each(|pixel| push(&mut waiting, pixel, [true; 2]));
         let (mut traced, mut most) = ([0; 9], 0);
         while waiting.take(&mut queue) {
             assert!((1..=FULL).contains(&queue.count));
             traced[waiting.depth as usize] += queue.count;
             if !waiting.is_at_the_end() {
-                let pixels = queue.pixel.0[..queue.count].iter();
-                pixels.for_each(|&pixel| {
-                    [pixel; 2].map(f64::to_index).into_iter().for_each(|k| waiting.push(ray(k)))
-                });
+                pixels(&queue).into_iter().for_each(|pixel| push(&mut waiting, pixel, [true; 2]));
             }
-            most = waiting.bounces.iter().map(|bounce| bounce.rays.len()).fold(most, usize::max);
+            most = waiting.bounces.as_flattened().iter().map(Line::len).fold(most, usize::max);
         }
         let expected: Vec<usize> = (1..9).map(|depth| FULL << depth).collect();
         assert_eq!(traced[1..], expected);
@@ -170,17 +273,53 @@ mod tests {
     }
 
     #[test]
-    fn rays_of_a_bounce_are_taken_as_they_came() {
-        let (mut waiting, mut queue) = (Waiting::<f64>::new(None), Queue::new());
-        waiting.begin(1);
-        (0..600).for_each(|k| waiting.push(ray(k % ROOM)));
-        let mut taken = vec![];
-        while waiting.take(&mut queue) {
-            taken.extend(queue.pixel.0[..queue.count].iter().map(|pixel| pixel.to_index()));
-            assert!(waiting.has_met_glass(0) && waiting.is_at_the_end());
+    fn rays_of_a_line_are_taken_as_they_came_and_none_is_lost() {
+        for sent in 0..2 {
+            let (mut waiting, mut queue) = (Waiting::<f64>::new(None), Queue::new());
+            waiting.begin(1);
+            let (mut expected, mut taken) = (vec![], vec![]);
+            for k in 0..1200 {
+                let is_sent = k % 3 != 0;
+                push(&mut waiting, k % PIXELS, [is_sent && sent == 0, is_sent && sent == 1]);
+                expected.extend(is_sent.then_some(k % PIXELS));
+                // So that the line moves up while some of it still waits.
+                if k % 500 == 499 {
+                    assert!(waiting.take(&mut queue));
+                    waiting.depth = 0;
+                    taken.extend(pixels(&queue));
+                }
+            }
+            while waiting.take(&mut queue) {
+                taken.extend(pixels(&queue));
+                assert!(has_met_glass(&waiting) && waiting.is_at_the_end());
+            }
+            assert_eq!(taken, expected);
+            waiting.begin(1);
+            assert!(!has_met_glass(&waiting) && !waiting.is_at_the_end());
         }
-        assert!(taken.into_iter().eq((0..600).map(|k| k % ROOM)));
-        waiting.begin(1);
-        assert!(!waiting.has_met_glass(0) && !waiting.is_at_the_end());
+    }
+
+    #[test]
+    fn what_rays_add_depends_on_no_order() {
+        let (mut queue, mut hits) = (Queue::<f64>::new(), Hits::new());
+        let colors = [0.1, 0.7, 1e-7, 3.3, -0.2, 1e30, -1e12, 0.3];
+        let mut sums = vec![];
+        for first in 0..colors.len() {
+            let mut waiting = Waiting::new(None);
+            waiting.begin(1);
+            queue.count = colors.len();
+            for k in 0..colors.len() {
+                let color = colors[(first + 3 * k) % colors.len()];
+                hits.color.iter_mut().for_each(|column| column.0[k] = color);
+                queue.pixel.0[k] = 5.0;
+            }
+            waiting.add(&queue, &hits);
+            let mut pixels = [Column::new(), Column::new(), Column::new()];
+            waiting.sum_up(&mut pixels);
+            sums.push(pixels.map(|column| column.0[5]));
+        }
+        assert!(sums.iter().all(|sum| *sum == sums[0]));
+        // The two that are farthest from white are cut to the same size.
+        assert!((sums[0][0] - colors[..5].iter().sum::<f64>() - 0.3).abs() < 1e-9, "{sums:?}");
     }
 }
