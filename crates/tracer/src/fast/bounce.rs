@@ -57,6 +57,20 @@ impl<E: Real> Queue<E> {
     pub(super) fn new() -> Self {
         Self { origin: columns(), direction: columns(), weight: columns(), pixel: Column::new(), count: 0 }
     }
+
+    /// Fills the last packet of so many lanes up with the last ray, of no pixel.
+    #[inline(always)]
+    pub(super) fn fill_up(&mut self, lanes: usize) {
+        let last = self.count - 1;
+        let end = self.count.next_multiple_of(lanes);
+        for columns in [&mut self.origin, &mut self.direction, &mut self.weight] {
+            for column in columns {
+                let value = column.0[last];
+                column.0[last + 1..end].fill(value);
+            }
+        }
+        self.pixel.0[last + 1..end].fill(E::narrow(-1.0));
+    }
 }
 
 /// What the rays of a tile meet.

@@ -118,16 +118,7 @@ pub(super) fn look<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
     simd.vectorize(
         #[inline(always)]
         || {
-            // The last packet is filled up with the last ray.
-            let last = queue.count - 1;
-            let end = queue.count.next_multiple_of(Lanes::<S, E>::LEN);
-            for columns in [&mut queue.origin, &mut queue.direction, &mut queue.weight] {
-                for column in columns {
-                    let value = column.0[last];
-                    column.0[last + 1..end].fill(value);
-                }
-            }
-            queue.pixel.0[last + 1..end].fill(E::narrow(-1.0));
+            queue.fill_up(Lanes::<S, E>::LEN);
             for at in (0..queue.count).step_by(Lanes::<S, E>::LEN) {
                 let origin = if EYE { Vec3::zero(simd) } else { Vec3::load(simd, &queue.origin, at) };
                 let ray = Ray { origin, direction: Vec3::load(simd, &queue.direction, at) };

@@ -8,6 +8,7 @@ mod band;
 mod beyond;
 mod bodies;
 mod bounce;
+mod bounding_cone;
 mod bounds;
 mod candidates;
 mod coincidence;

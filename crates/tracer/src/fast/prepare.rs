@@ -5,11 +5,14 @@
 
 use std::sync::Arc;
 
+use fearless_simd::Simd;
 use glam::DVec3;
 use rayfold_scene::{Material, Object, Scene};
 
 use super::beyond::Beyond;
 use super::bodies::{ANY, Bodies};
+use super::bounce::Queue;
+use super::bounding_cone::Balls;
 use super::candidates::{Candidates, MASKED, Masks};
 use super::features::{BUILT, Needs};
 use super::geometry::{Geometry, View};
@@ -18,6 +21,7 @@ use super::lights::buffer::LightBuffer;
 use super::lights::sun::{Direction, Outline, Outlines, Sun};
 use super::lists::LISTED;
 use super::parts;
+use super::placed::Placed;
 use super::rays::Rays;
 use super::real::Real;
 use super::shapes::{Obstacles, Shape, Shapes, Solid, Sorted};
@@ -88,6 +92,8 @@ pub(super) struct Prepared<E> {
     pub(super) needs: Needs,
     /// What few scenes have.
     pub(super) beyond: Option<Beyond<E>>,
+    /// Of scenes with glass and few objects: those of the row, and the bodies that have bounds.
+    balls: Option<[Balls; 2]>,
 }
 
 impl<E: Real> Prepared<E> {
@@ -145,6 +151,10 @@ impl<E: Real> Prepared<E> {
             .flatten();
         let boxes = beyond.as_ref().and_then(Beyond::bodies).and_then(Bodies::boxes);
         let suns = geometry.suns.iter().map(|sun| standing.lit_by(sun, search, boxes)).collect();
+        let balls = (needs.glass && search == Search::Masks).then(|| {
+            let of_bodies = boxes.unwrap_or_default().iter().map(Placed::bounds);
+            [Balls::new(standing.shapes().map(Placed::bounds)), Balls::new(of_bodies)]
+        });
         let shapes = Shapes::new(solids, sorted);
         let alone = match (&solids[..], &geometry.view) {
             ([solid], View::Pinhole { .. }) if grid.lens.is_none() => {
@@ -169,6 +179,7 @@ impl<E: Real> Prepared<E> {
             sights,
             entries,
             beyond,
+            balls,
         })
     }
 
@@ -216,6 +227,13 @@ impl<E: Real> Prepared<E> {
     #[inline(always)]
     pub(super) fn all(&self) -> Candidates<'static> {
         Candidates { masks: self.masks(u64::MAX), list: None, kinds: self.needs.kinds }
+    }
+
+    /// What the rays of a queue, which is filled up, can meet: objects, and bodies by bits.
+    #[inline(always)]
+    pub(super) fn met_by<S: Simd>(&self, simd: S, queue: &Queue<E>) -> (Candidates<'static>, u64) {
+        let Some([shapes, bodies]) = &self.balls else { return (self.all(), ANY) };
+        (Candidates::masked(self.masks(shapes.met_by(simd, queue))), bodies.met_by(simd, queue))
     }
 
     /// The objects whose bits are set in a word in which all stand in a row.

@@ -178,22 +178,32 @@ fn follow_through_glass<S: Simd, E: Real, N: Kernel<E>>(
     scratch: &mut Scratch<E>,
 ) {
     let Scratch { queue, hits, waiting, pixels, in_the_way, .. } = scratch;
-    let all = scene.all();
     let tree = BUILT.tree && scene.tree.is_some();
     core::mem::swap(&mut hits.color, pixels);
     while waiting.take(queue) {
         hits.packets.clear();
-        fitted!(N, all.kinds, tree, C T D => {
-            look::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, all, scene.background, queue, hits)
+        queue.fill_up(Lanes::<S, E>::LEN);
+        let (near, bodies) = met_by::<S, E>(simd, scene, queue);
+        let (kinds, background, count) = (near.kinds, scene.background, queue.count);
+        fitted!(N, kinds, tree, C T D => {
+            look::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, near, background, queue, hits)
         });
-        let (kinds, background, count) = (all.kinds, scene.background, queue.count);
         let waiting = &mut *waiting;
-        let met = Met { kinds, bodies: ANY, background, queue, count, next: None, waiting, soft };
+        let met = Met { kinds, bodies, background, queue, count, next: None, waiting, soft };
         shade_more::<S, E, N, false>(simd, scene, met, hits, in_the_way);
         waiting.add(queue, hits);
     }
     waiting.sum_up(pixels);
     core::mem::swap(&mut hits.color, pixels);
+}
+
+/// What the rays of a queue can meet.
+#[inline(never)]
+fn met_by<S: Simd, E: Real>(simd: S, scene: &Prepared<E>, queue: &Queue<E>) -> (Candidates<'static>, u64) {
+    simd.vectorize(
+        #[inline(always)]
+        || scene.met_by(simd, queue),
+    )
 }
 
 /// Rays that have met something.
