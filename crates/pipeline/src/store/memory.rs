@@ -121,12 +121,20 @@ impl<C: Clock + Clone + 'static> Upload for MemoryUpload<C> {
 
 #[cfg(test)]
 mod tests {
-    use crate::store::{MemoryStore, PutOptions, Store, conformance};
+    use crate::store::{Condition, MemoryStore, PutOptions, Store, conformance};
 
     #[tokio::test]
     async fn the_memory_store_conforms() {
         conformance::check(&MemoryStore::new(crate::SystemClock), "suite").await;
     }
+
+    #[test]
+    fn options_keep_what_they_are_given() {
+        let options = PutOptions::if_absent().content_type("image/gif").metadata("generation", "g");
+        assert_eq!((options.content_type, options.condition), ("image/gif", Condition::IfAbsent));
+        assert_eq!(options.metadata.get("generation").map(String::as_str), Some("g"));
+    }
+
     #[tokio::test]
     async fn keys_are_as_long_as_those_of_s3() {
         let store = MemoryStore::new(crate::SystemClock);

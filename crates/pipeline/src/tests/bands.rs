@@ -233,9 +233,12 @@ async fn a_band_that_cannot_be_read_is_drawn_anew() {
     let version = world.upload_big("big frame 1").await;
     world.render(&woken(&version, "1-of-3", 0)).await;
     world.render(&woken(&version, "2-of-3", 0)).await;
-    world.put(&banded(&version, "1-of-3"), "garbled");
+    let band = banded(&version, "1-of-3");
+    let before = world.store.bucket.lock().unwrap().get(&band).unwrap().body;
+    world.put(&band, "garbled");
     assert_eq!(world.render(&woken(&version, "3-of-3", 0)).await, Outcome::Drawn);
     assert_eq!(world.frame(&version).unwrap(), picture(&name(), b"big frame 1", None));
+    assert_eq!(world.store.bucket.lock().unwrap().get(&band).unwrap().body, before);
 }
 
 /// A band goes between the listing and its reading.

@@ -65,6 +65,18 @@ async fn a_fold_leaves_at_once_when_the_manifest_shows_the_fact() {
     }
 }
 
+/// What cannot be read shows nothing, not even that something is not there.
+#[tokio::test]
+async fn a_manifest_that_cannot_be_read_is_made_anew_whatever_the_fact_is() {
+    for fact in [Fact::Absent(name()), Fact::Settings(None), Fact::Fold] {
+        let world = World::new();
+        world.put("scripts/film/2.txt", "hang 1");
+        world.put(MANIFEST, "garbage");
+        assert_eq!(world.fold(&fact, Age::Old).await, Folded::Committed, "{fact:?}");
+        assert_eq!(world.manifest().frames.len(), 1, "{fact:?}");
+    }
+}
+
 /// The manifest is replaced between the look at its beginning and that at its lines: the lines may be others'.
 #[tokio::test]
 async fn lines_of_another_manifest_show_nothing() {

@@ -67,12 +67,8 @@ impl Cone {
             high = Vec3::<S, E>::new(high.x.max(x), high.y.max(y), high.z.max(z));
             sum = Vec3::load(simd, &queue.direction, at).scale_add(one, sum);
         }
-        let [x, y, z] = [sum.x, sum.y, sum.z].map(|lanes| {
-            let mut numbers = [E::narrow(0.0); 16];
-            lanes.store_slice(&mut numbers[..Lanes::<S, E>::LEN]);
-            numbers.into_iter().map(E::widen).sum()
-        });
-        let axis = DVec3::new(x, y, z).normalize_or_zero();
+        let mean = DVec3::new(total::<S, E>(sum.x), total::<S, E>(sum.y), total::<S, E>(sum.z));
+        let axis = mean.normalize_or_zero();
         let along = Vec3::splat(simd, axis.to_array().map(E::narrow));
         let mut least = one;
         for at in packets() {
@@ -110,6 +106,18 @@ impl Cone {
         }
         bits
     }
+}
+
+/// The sum of the lanes.
+#[inline(always)]
+fn total<S: Simd, E: Real>(lanes: Lanes<S, E>) -> f64 {
+    let mut numbers = [E::narrow(0.0); 16];
+    lanes.store_slice(&mut numbers[..Lanes::<S, E>::LEN]);
+    let mut total = 0.0;
+    for number in numbers {
+        total += number.widen();
+    }
+    total
 }
 
 #[cfg(test)]

@@ -39,10 +39,9 @@ pub(super) fn send_on<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>(
                 let normal = Vec3::load(simd, &hits.normal, at);
                 let start = Vec3::load(simd, &hits.start, at);
                 let lanes = at..at + Lanes::<S, E>::LEN;
-                let [offset, within] = [0, 1].map(
-                    #[inline(always)]
-                    |k| Lanes::<S, E>::from_slice(simd, &hits.sides[k].0[lanes.clone()]),
-                );
+                let [offset, within] = &hits.sides;
+                let offset = Lanes::<S, E>::from_slice(simd, &offset.0[lanes.clone()]);
+                let within = Lanes::<S, E>::from_slice(simd, &within.0[lanes.clone()]);
                 let surface = Surface { start, normal, offset, within: within.simd_ne(zero.x) };
                 // What the mirrored ray counts for, and the refracted one.
                 let mut mirror = if PAINTED { Vec3::load(simd, &hits.mirror, at) } else { zero };
