@@ -53,6 +53,7 @@ fn sts(server: &Server, credentials: Credentials) -> aws_sdk_sts::Client {
 /// The keys of a session that may do what the statements say.
 async fn assume(server: &Server, statements: &str) -> Credentials {
     let policy = format!(r#"{{"Version":"2012-10-17","Statement":[{statements}]}}"#);
+    let share = policy.chars().count() * 100 / 2_048;
     let answer = sts(server, owner())
         .assume_role()
         .role_arn("arn:aws:iam::000000000000:role/tester")
@@ -61,6 +62,9 @@ async fn assume(server: &Server, statements: &str) -> Credentials {
         .send()
         .await
         .unwrap();
+    #[expect(deprecated, reason = "AWS still answers it, and so do we")]
+    let told = answer.packed_policy_size();
+    assert_eq!(told, Some(share as i32), "percent of what a policy may be long");
     let given = answer.credentials().unwrap();
     let left =
         given.expiration().secs() - std::time::SystemTime::UNIX_EPOCH.elapsed().unwrap().as_secs() as i64;

@@ -159,6 +159,23 @@ impl Session {
 mod tests {
     use super::*;
 
+    #[test]
+    fn only_the_very_token_is_a_sessions() {
+        let session = Session::example("abc", UNIX_EPOCH);
+        assert!(session.has_token("token of abc"));
+        // One letter is another one, two are off by the same bit, the end is missing, something follows.
+        for other in ["token of abd", "token of `cc", "token of ab", "", "token of abc ", "TOKEN OF ABC"] {
+            assert!(!session.has_token(other), "{other}");
+        }
+    }
+
+    #[test]
+    fn a_session_is_shown_without_its_secrets() {
+        let shown = format!("{:?}", Session::example("abc", UNIX_EPOCH));
+        assert!(shown.contains("assumed-role/role/abc"), "{shown}");
+        assert!(!shown.contains("secret of") && !shown.contains("token of"), "{shown}");
+    }
+
     #[tokio::test]
     async fn sessions_survive_until_they_are_over_and_are_then_forgotten() {
         let folder = tempfile::tempdir().unwrap();

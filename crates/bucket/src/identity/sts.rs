@@ -347,6 +347,39 @@ mod tests {
     }
 
     #[test]
+    fn a_policy_may_be_as_long_as_awss() {
+        let policy = "x".repeat(LONGEST_POLICY);
+        let form = GOOD.replace("Policy=%7B%7D+", &format!("Policy={policy}"));
+        assert_eq!(Wish::read(form.as_bytes()).unwrap().policy, policy);
+    }
+
+    #[test]
+    fn only_a_form_that_is_posted_to_the_root_is_for_sts() {
+        let is_for = |method: Method, uri: &str, kind: Option<&str>| {
+            let kind = kind.map(|kind| (CONTENT_TYPE, HeaderValue::from_str(kind).unwrap()));
+            is_for_sts(&method, &uri.parse().unwrap(), &kind.into_iter().collect())
+        };
+        assert!(is_for(Method::POST, "/", Some(FORM)));
+        assert!(is_for(Method::POST, "/", Some(&format!("{FORM}; charset=utf-8"))));
+        for (method, uri, kind) in [
+            (Method::GET, "/", Some(FORM)),
+            (Method::POST, "/bucket", Some(FORM)),
+            (Method::POST, "/?delete", Some(FORM)),
+            (Method::POST, "/", Some("text/plain")),
+            (Method::POST, "/", None),
+            (Method::PUT, "/bucket?acl", None),
+        ] {
+            assert!(!is_for(method.clone(), uri, kind), "{method} {uri} {kind:?}");
+        }
+    }
+
+    #[test]
+    fn keys_are_of_all_32_letters() {
+        let letters: std::collections::BTreeSet<char> = random(10_000).unwrap().chars().collect();
+        assert_eq!(letters.into_iter().collect::<String>(), "234567ABCDEFGHIJKLMNOPQRSTUVWXYZ");
+    }
+
+    #[test]
     fn errors_are_xml_whatever_they_say() {
         let text = shown(&Refusal::invalid("a < b & \u{1}c"));
         assert!(text.contains("<Message>a &lt; b &amp;  c</Message>"), "{text}");
