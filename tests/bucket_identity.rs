@@ -11,7 +11,7 @@ use aws_sdk_s3::config::{BehaviorVersion, Credentials, Region};
 use aws_sdk_s3::error::{ProvideErrorMetadata, SdkError};
 use aws_sdk_s3::presigning::PresigningConfig;
 use aws_sdk_s3::primitives::ByteStream;
-use aws_sdk_s3::types::{CompletedMultipartUpload, Delete, ObjectIdentifier};
+use aws_sdk_s3::types::{CompletedMultipartUpload, Delete, ObjectCannedAcl, ObjectIdentifier};
 use aws_smithy_http_client::Builder as HttpBuilder;
 use rayfold_bucket::{Options, Server};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -242,6 +242,14 @@ async fn what_no_statement_names_is_denied() {
         assert_eq!(outcome(client.list_objects().bucket(BUCKET).prefix(prefix).send().await), denied);
     }
     assert!(outcome(client.head_bucket().bucket(BUCKET).send().await) == "ok");
+    // To say who may read an object is a right of its own.
+    const SHARE: &str =
+        r#"{"Effect":"Allow","Action":"s3:PutObjectAcl","Resource":"arn:aws:s3:::films/open/*"}"#;
+    let sharer = s3(&server, assume(&server, &format!("{WRITE},{SHARE}")).await);
+    for (client, expected) in [(&client, denied), (&sharer, "ok")] {
+        let put = client.put_object().bucket(BUCKET).key("open/shared").acl(ObjectCannedAcl::Private);
+        assert_eq!(outcome(put.body(ByteStream::from_static(b"body")).send().await), expected);
+    }
     assert_eq!(outcome(client.list_objects_v2().bucket("others").send().await), denied);
     server.stop().await;
 }
