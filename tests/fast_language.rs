@@ -19,7 +19,7 @@ use hold::{draw, hold, off, placed, scripted};
 
 const SEED: u64 = 20_261_122;
 
-/// That scenes of `counts` objects in turn are drawn as the reference draws them: `count` of them.
+/// Holds `count` scenes against the reference; they have as many objects as `counts` says, in turn.
 fn hold_each(
     dice: &mut Dice,
     (counts, count): (&[usize], usize),

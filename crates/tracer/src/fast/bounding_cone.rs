@@ -40,7 +40,7 @@ impl Balls {
     /// Those that a ray of the queue can meet, by bits; the queue is filled up.
     #[inline(always)]
     pub(super) fn met_by<S: Simd, E: Real>(&self, simd: S, queue: &Queue<E>) -> u64 {
-        // No more is found of one than it costs to ask.
+        // One ball is tried as soon as asked for.
         if self.0.len() < 2 {
             return u64::MAX;
         }

@@ -20,7 +20,7 @@ const FULL: usize = PIXELS;
 /// Rays of a line at most: with fewer than a queue's it is given one each for those of a full one.
 const MOST: usize = 2 * FULL;
 
-/// Of what one ray adds to a pixel, where white is 1: a ray counts for no more than 2²³ times white.
+/// How many parts white has, in which it is counted what a ray adds to a pixel: at most 2²³ times white.
 const ONE: f64 = (1u64 << 40) as f64;
 
 /// Numbers of a ray that waits: where it starts and goes, what its colour counts for in the pixel's, its pixel, and whether
