@@ -291,6 +291,55 @@ async fn whoever_may_not_assume_a_role_is_told_why() {
     server.stop().await;
 }
 
+/// AWS's own signer, told to sign what its clients would not.
+#[tokio::test]
+async fn a_request_to_sts_is_signed_for_sts_and_with_its_body() {
+    use aws_sigv4::http_request::{
+        PayloadChecksumKind, SignableBody, SignableRequest, SigningSettings, sign,
+    };
+
+    let data = tempfile::tempdir().unwrap();
+    let server = server(data.path()).await;
+    let policy = "%7B%22Version%22%3A%222012-10-17%22%2C%22Statement%22%3A%7B%22Effect%22%3A%22Allow%22%2C\
+                  %22Action%22%3A%22%2A%22%2C%22Resource%22%3A%22%2A%22%7D%7D";
+    let form = format!(
+        "Action=AssumeRole&Version=2011-06-15&RoleArn=arn%3Aaws%3Aiam%3A%3A000000000000%3Arole%2Ftester\
+         &RoleSessionName=test&Policy={policy}"
+    );
+    let answer = async |service: &str, body: SignableBody<'_>| {
+        let identity = owner().into();
+        let mut settings = SigningSettings::default();
+        settings.payload_checksum_kind = PayloadChecksumKind::XAmzSha256;
+        let signing = aws_sigv4::sign::v4::SigningParams::builder()
+            .identity(&identity)
+            .region("us-east-1")
+            .name(service)
+            .time(std::time::SystemTime::now())
+            .settings(settings)
+            .build()
+            .unwrap()
+            .into();
+        let (uri, host) = (format!("http://{}/", server.address()), server.address().to_string());
+        let kind = ("content-type", "application/x-www-form-urlencoded");
+        let headers = [kind, ("host", host.as_str())];
+        let request = SignableRequest::new("POST", &uri, headers.into_iter(), body).unwrap();
+        let (instructions, _) = sign(request, &signing).unwrap().into_parts();
+        let signed = instructions.headers().map(|(name, value)| format!("{name}: {value}\r\n"));
+        let headers = format!("{}: {}\r\n{}", kind.0, kind.1, signed.collect::<String>());
+        raw(&server, "POST /", &headers, &form).await
+    };
+    let good = answer("sts", SignableBody::Bytes(form.as_bytes())).await;
+    assert!(good.starts_with("HTTP/1.1 200") && good.contains("<SessionToken>"), "{good}");
+    let unsigned = answer("sts", SignableBody::UnsignedPayload).await;
+    assert!(
+        unsigned.starts_with("HTTP/1.1 403") && unsigned.contains("the body must be signed"),
+        "{unsigned}"
+    );
+    let elsewhere = answer("s3", SignableBody::Bytes(form.as_bytes())).await;
+    assert!(elsewhere.starts_with("HTTP/1.1 403") && elsewhere.contains("another service"), "{elsewhere}");
+    server.stop().await;
+}
+
 /// A request as it stands.
 async fn raw(server: &Server, line: &str, headers: &str, body: &str) -> String {
     let mut stream = tokio::net::TcpStream::connect(server.address()).await.unwrap();

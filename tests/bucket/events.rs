@@ -55,6 +55,17 @@ async fn an_objects_events_stay_in_order_while_the_listener_refuses() {
     }
 }
 
+/// The pauses are doubled, from 20 ms on: within half a second it is asked five times, not thousands.
+#[tokio::test]
+async fn a_listener_that_refuses_is_not_pressed() {
+    let (webhook, heard) = listener(usize::MAX).await;
+    let stage = stage_with(Some(webhook)).await;
+    stage.notify().await;
+    stage.put("a", "1").await;
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    assert!((1..=6).contains(&heard.refused()), "asked {} times", heard.refused());
+}
+
 #[tokio::test]
 async fn events_wait_for_a_listener_across_restarts() {
     let stage = stage().await;

@@ -169,6 +169,101 @@ async fn listings_are_as_the_model_says() {
     }
 }
 
+/// All pages of a listing of uploads, as key and id; each page checked by itself.
+async fn uploads_listed(
+    stage: &Stage,
+    prefix: &str,
+    delimiter: &str,
+    after: (&str, &str),
+    most: i32,
+) -> (Vec<(String, String)>, Vec<String>) {
+    let (mut uploads, mut prefixes) = (Vec::new(), Vec::new());
+    let mut markers = (after.0.to_owned(), after.1.to_owned());
+    loop {
+        let page = stage
+            .client
+            .list_multipart_uploads()
+            .bucket(BUCKET)
+            .prefix(prefix)
+            .set_delimiter((!delimiter.is_empty()).then(|| delimiter.to_owned()))
+            .key_marker(&markers.0)
+            .upload_id_marker(&markers.1)
+            .max_uploads(most)
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(
+            (page.bucket(), page.prefix(), page.max_uploads()),
+            (Some(BUCKET), Some(prefix), Some(most))
+        );
+        assert_eq!(page.delimiter().unwrap_or_default(), delimiter);
+        assert_eq!(page.key_marker(), Some(&*markers.0));
+        // An id alone says nothing.
+        let id = if markers.0.is_empty() { "" } else { &markers.1 };
+        assert_eq!(page.upload_id_marker(), Some(id));
+        let count = page.uploads().len() + page.common_prefixes().len();
+        for upload in page.uploads() {
+            uploads.push((upload.key().unwrap().to_owned(), upload.upload_id().unwrap().to_owned()));
+        }
+        prefixes.extend(page.common_prefixes().iter().map(|p| p.prefix().unwrap().to_owned()));
+        if page.is_truncated != Some(true) {
+            assert_eq!((page.next_key_marker, page.next_upload_id_marker), (None, None));
+            return (uploads, prefixes);
+        }
+        assert_eq!(count, usize::try_from(most).unwrap());
+        markers = (page.next_key_marker.unwrap(), page.next_upload_id_marker.unwrap());
+    }
+}
+
+#[tokio::test]
+async fn listings_of_uploads_are_as_the_model_says() {
+    let seed = std::env::var("RAYFOLD_SEED").map_or_else(|_| fastrand::u64(..), |seed| seed.parse().unwrap());
+    println!("RAYFOLD_SEED={seed}");
+    let mut random = Rng::with_seed(seed);
+    let stage = stage().await;
+    let mut model = BTreeMap::new();
+    for _ in 0..40 {
+        let key = name(&mut random);
+        // Some keys have several.
+        for _ in 0..random.usize(1..3) {
+            let begun = stage.client.create_multipart_upload().bucket(BUCKET).key(&key).send().await.unwrap();
+            model.insert((key.clone(), begun.upload_id.unwrap()), ());
+        }
+    }
+    let keys: BTreeMap<_, _> = model.keys().map(|(key, _)| (key.clone(), String::new())).collect();
+    for _ in 0..60 {
+        let prefix = if random.bool() { String::new() } else { name(&mut random) };
+        let delimiter = *random.choice(&["", "/", "//", "a", "-"]).unwrap();
+        let most = random.i32(1..10);
+        let (key, id) = random.choice(model.keys()).unwrap();
+        let after = match random.u8(0..4) {
+            0 => (key.as_str(), id.as_str()),
+            1 => (key.as_str(), ""),
+            2 => ("", id.as_str()),
+            _ => ("", ""),
+        };
+        let Listing { keys: alone, prefixes } = expected(&keys, &prefix, delimiter, after.0);
+        let is_behind = |(key, id): &(String, String)| {
+            let at_marker = key == after.0 && !after.1.is_empty() && id.as_str() > after.1;
+            let rolled = alone.contains(key);
+            let at_marker = at_marker && key.starts_with(&prefix) && {
+                // A key that stands for a common prefix is told as that.
+                delimiter.is_empty() || !key[prefix.len()..].contains(delimiter)
+            };
+            rolled || at_marker
+        };
+        let uploads: Vec<_> = model.keys().filter(|upload| is_behind(upload)).cloned().collect();
+        let found = uploads_listed(&stage, &prefix, delimiter, after, most).await;
+        let shown = format!("prefix {prefix:?} delimiter {delimiter:?} after {after:?} pages of {most}");
+        assert_eq!(found, (uploads, prefixes), "{shown}");
+    }
+    let list = || stage.client.list_multipart_uploads().bucket(BUCKET);
+    let none = list().max_uploads(0).send().await.unwrap();
+    assert_eq!((none.is_truncated, none.uploads().len()), (Some(false), 0));
+    let url = list().encoding_type(EncodingType::Url).prefix("ü c/").send().await.unwrap();
+    assert_eq!((url.encoding_type(), url.prefix()), (Some(&EncodingType::Url), Some("%C3%BC%20c/")));
+}
+
 #[tokio::test]
 async fn the_edges_of_a_page() {
     let stage = stage().await;
@@ -187,6 +282,15 @@ async fn the_edges_of_a_page() {
     assert!(list().fetch_owner(true).send().await.unwrap().contents()[0].owner().is_some());
     let exact = list().delimiter("/").max_keys(3).send().await.unwrap();
     assert_eq!((exact.is_truncated, exact.key_count), (Some(false), Some(3)));
+    let versions = || stage.client.list_object_versions().bucket(BUCKET);
+    let without_key = versions().version_id_marker("null").send().await;
+    assert_eq!(failure(without_key), (400, "InvalidArgument".into()));
+    // A page that ends with a common prefix names no version.
+    for (most, version) in [(1, None), (2, Some("null"))] {
+        let page = versions().delimiter("/").max_keys(most).send().await.unwrap();
+        assert_eq!((page.delimiter(), page.next_version_id_marker()), (Some("/"), version));
+    }
+    assert_eq!(versions().delimiter("").send().await.unwrap().delimiter(), None);
 }
 
 #[tokio::test]

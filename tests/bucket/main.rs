@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
+mod answers;
 mod conditions;
 mod events;
 mod listing;

@@ -6,13 +6,7 @@ use aws_sdk_s3::presigning::PresigningConfig;
 use aws_sdk_s3::types::ObjectCannedAcl;
 use rayfold_bucket::{Error, Server};
 
-use crate::stage::{BUCKET, Stage, failure, options, raw, stage};
-
-/// The path and query of a URL.
-fn path(url: &str) -> &str {
-    let rest = url.strip_prefix("http://").unwrap();
-    &rest[rest.find('/').unwrap()..]
-}
+use crate::stage::{BUCKET, Stage, failure, options, path, raw, stage};
 
 fn host(stage: &Stage) -> String {
     stage.server.address().to_string()

@@ -2,6 +2,7 @@
 
 use std::net::SocketAddr;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -113,6 +114,12 @@ pub(crate) async fn raw(address: SocketAddr, request: &[u8]) -> String {
     String::from_utf8_lossy(&answer).into_owned()
 }
 
+/// The path and query of a URL.
+pub(crate) fn path(url: &str) -> &str {
+    let rest = url.strip_prefix("http://").unwrap();
+    &rest[rest.find('/').unwrap()..]
+}
+
 /// S3's code of an error, and the status.
 pub(crate) fn failure<T: std::fmt::Debug, E: ProvideErrorMetadata + std::fmt::Debug>(
     answer: Result<T, SdkError<E>>,
@@ -122,13 +129,22 @@ pub(crate) fn failure<T: std::fmt::Debug, E: ProvideErrorMetadata + std::fmt::De
     (status, error.code().unwrap_or_default().to_owned())
 }
 
-/// Names and keys of the events that a listener was told, in order.
+/// What a listener heard.
 #[derive(Clone, Default)]
-pub(crate) struct Heard(pub(crate) Arc<Mutex<Vec<(String, String)>>>);
+pub(crate) struct Heard {
+    /// Names and keys of the events that it took, in order.
+    told: Arc<Mutex<Vec<(String, String)>>>,
+    /// How many it did not take.
+    refused: Arc<AtomicUsize>,
+}
 
 impl Heard {
     pub(crate) fn all(&self) -> Vec<(String, String)> {
-        self.0.lock().unwrap().clone()
+        self.told.lock().unwrap().clone()
+    }
+
+    pub(crate) fn refused(&self) -> usize {
+        self.refused.load(Ordering::Relaxed)
     }
 
     /// Waits until so many were told.
@@ -152,32 +168,26 @@ pub(crate) async fn listener(refuse: usize) -> (Webhook, Heard) {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}/events", listener.local_addr().unwrap());
     let heard = Heard::default();
-    let refused = Arc::new(Mutex::new(refuse));
-    let told = heard.clone();
+    let hears = heard.clone();
     tokio::spawn(async move {
         loop {
             let (stream, _) = listener.accept().await.unwrap();
-            let (told, refused) = (told.clone(), refused.clone());
+            let hears = hears.clone();
             let service = hyper::service::service_fn(move |request: Request<Incoming>| {
-                let (told, refused) = (told.clone(), refused.clone());
+                let hears = hears.clone();
                 async move {
                     assert_eq!(request.headers()["authorization"], format!("Bearer {TOKEN}"));
                     let body = request.into_body().collect().await?.to_bytes();
                     let mut answer = Response::new(Empty::<Bytes>::new());
-                    let refuse = {
-                        let mut left = refused.lock().unwrap();
-                        let refuse = *left > 0;
-                        *left = left.saturating_sub(1);
-                        refuse
-                    };
-                    if refuse {
+                    let more = |refused| (refused < refuse).then_some(refused + 1);
+                    if hears.refused.fetch_update(Ordering::Relaxed, Ordering::Relaxed, more).is_ok() {
                         *answer.status_mut() = StatusCode::SERVICE_UNAVAILABLE;
                     } else {
                         let message: serde_json::Value = serde_json::from_slice(&body).unwrap();
                         let record = &message["Records"][0];
                         let name = record["eventName"].as_str().unwrap().to_owned();
                         let key = record["s3"]["object"]["key"].as_str().unwrap().to_owned();
-                        told.0.lock().unwrap().push((name, key));
+                        hears.told.lock().unwrap().push((name, key));
                     }
                     Ok::<_, hyper::Error>(answer)
                 }

@@ -50,3 +50,17 @@ impl std::fmt::Debug for Webhook {
         f.debug_struct("Webhook").field("url", &self.url).finish_non_exhaustive()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn secrets_are_not_shown() {
+        let root = Credentials { access_key: "owner".into(), secret_key: "hush-1".into() };
+        let webhook = Webhook { url: "http://127.0.0.1:9/events".into(), token: "hush-2".into() };
+        let shown = format!("{root:?} {webhook:?}");
+        assert!(shown.contains("owner") && shown.contains("http://127.0.0.1:9/events"), "{shown}");
+        assert!(!shown.contains("hush"), "{shown}");
+    }
+}

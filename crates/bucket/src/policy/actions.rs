@@ -58,3 +58,60 @@ pub fn needed(operation: &str) -> Option<(Scope, &'static [&'static str])> {
     };
     Some((scope, actions))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As the reference has it: operation, what it is asked on, actions.
+    const REFERENCE: &str = "
+        ListBuckets                         Account  s3:ListAllMyBuckets
+        CreateBucket                        Bucket   s3:CreateBucket
+        DeleteBucket                        Bucket   s3:DeleteBucket
+        HeadBucket                          Bucket   s3:ListBucket
+        ListObjects                         Bucket   s3:ListBucket
+        ListObjectsV2                       Bucket   s3:ListBucket
+        ListObjectVersions                  Bucket   s3:ListBucketVersions
+        ListMultipartUploads                Bucket   s3:ListBucketMultipartUploads
+        GetBucketAcl                        Bucket   s3:GetBucketAcl
+        GetBucketCors                       Bucket   s3:GetBucketCORS
+        GetBucketEncryption                 Bucket   s3:GetEncryptionConfiguration
+        GetBucketLifecycleConfiguration     Bucket   s3:GetLifecycleConfiguration
+        GetBucketLocation                   Bucket   s3:GetBucketLocation
+        GetBucketNotificationConfiguration  Bucket   s3:GetBucketNotification
+        GetBucketPolicy                     Bucket   s3:GetBucketPolicy
+        GetBucketTagging                    Bucket   s3:GetBucketTagging
+        GetBucketVersioning                 Bucket   s3:GetBucketVersioning
+        GetObjectLockConfiguration          Bucket   s3:GetBucketObjectLockConfiguration
+        PutBucketNotificationConfiguration  Bucket   s3:PutBucketNotification
+        GetObject                           Object   s3:GetObject
+        HeadObject                          Object   s3:GetObject
+        GetObjectAttributes                 Object   s3:GetObject s3:GetObjectAttributes
+        GetObjectAcl                        Object   s3:GetObjectAcl
+        GetObjectTagging                    Object   s3:GetObjectTagging
+        PutObject                           Object   s3:PutObject
+        CopyObject                          Object   s3:PutObject
+        CreateMultipartUpload               Object   s3:PutObject
+        UploadPart                          Object   s3:PutObject
+        UploadPartCopy                      Object   s3:PutObject
+        CompleteMultipartUpload             Object   s3:PutObject
+        PutObjectAcl                        Object   s3:PutObjectAcl
+        PutObjectTagging                    Object   s3:PutObjectTagging
+        DeleteObject                        Object   s3:DeleteObject
+        DeleteObjectTagging                 Object   s3:DeleteObjectTagging
+        AbortMultipartUpload                Object   s3:AbortMultipartUpload
+        ListParts                           Object   s3:ListMultipartUploadParts
+    ";
+
+    #[test]
+    fn operations_need_the_actions_of_the_reference() {
+        for line in REFERENCE.lines().map(str::trim).filter(|line| !line.is_empty()) {
+            let mut words = line.split_whitespace();
+            let (operation, on) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
+            let (scope, actions) = needed(operation).unwrap_or_else(|| panic!("{operation} is unknown"));
+            assert_eq!(format!("{scope:?}"), on, "{operation}");
+            assert_eq!(actions, words.collect::<Vec<_>>(), "{operation}");
+        }
+        assert_eq!(needed("PutBucketPolicy"), None);
+    }
+}

@@ -334,4 +334,23 @@ mod tests {
         let twice = GOOD.replace("[{", r#"[{"Sid":"List1","Effect":"Deny","Action":"*","Resource":"*"},{"#);
         assert!(read(&twice).unwrap_err().to_string().contains("List1"));
     }
+
+    /// A value of another kind is told what may stand in its place.
+    #[test]
+    fn what_may_stand_there_is_said() {
+        let with = |condition: &str| {
+            format!(
+                r#"{{"Version":"2012-10-17","Statement":{{"Effect":"Allow","Action":"*","Resource":"*","Condition":{condition}}}}}"#
+            )
+        };
+        for (condition, expected) in [
+            ("7", "a map from operators to conditions"),
+            (r#"{"Null": 7}"#, "a map from condition keys to values"),
+            (r#"{"Null": {"s3:prefix": [7]}}"#, "a string"),
+            (r#"{"Null": {"s3:prefix": 7}}"#, "one, or a list of them"),
+        ] {
+            let error = read(&with(condition)).expect_err(condition).to_string();
+            assert!(error.contains(&format!("expected {expected}")), "{condition}: {error}");
+        }
+    }
 }

@@ -97,3 +97,22 @@ pub(crate) fn body_failed(error: &StdError) -> S3Error {
         s3_error!(IncompleteBody, "The body ended before the number of bytes that Content-Length says.")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_body_that_broke_off_says_how() {
+        for (text, code) in [
+            ("AwsChunkedStreamError: SignatureMismatch", "SignatureDoesNotMatch"),
+            ("AwsChunkedStreamError: FormatError", "InvalidRequest"),
+            ("AwsChunkedStreamError: ChunkMetaTooLarge", "InvalidRequest"),
+            ("AwsChunkedStreamError: TooManyTrailerHeaders", "InvalidRequest"),
+            ("Sha256Mismatch", "XAmzContentSHA256Mismatch"),
+            ("connection reset", "IncompleteBody"),
+        ] {
+            assert_eq!(body_failed(&text.into()).code().as_str(), code, "{text}");
+        }
+    }
+}

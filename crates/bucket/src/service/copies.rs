@@ -5,7 +5,7 @@ use s3s::{S3Request, s3_error};
 
 use super::answer::{Answer, invalid_argument, invalid_request, not_implemented, time};
 use super::conditions::{ReadConditions, WriteConditions};
-use super::ingest::{Claims, LARGEST_BODY, etag, ingest};
+use super::ingest::{Claims, etag, ingest, is_too_large};
 use super::objects::{Destination, admit, check_key, check_metadata, expires, keep, place};
 use super::writes::{of, stored_encoding};
 use super::{Caller, Service};
@@ -44,7 +44,7 @@ impl Service {
             if_unmodified_since: input.copy_source_if_unmodified_since,
         };
         conditions_of_source.check_source(&from)?;
-        if from.size > LARGEST_BODY {
+        if is_too_large(from.size) {
             return Err(invalid_request(
                 "The specified copy source is larger than the maximum allowable size for a copy source: 5368709120",
             ));

@@ -20,7 +20,7 @@ const ROW_BYTES: usize = 128 * 1024;
 const BLOCK_BYTES: usize = 1024 * 1024;
 
 /// Of one request: S3's.
-pub(crate) const LARGEST_BODY: u64 = 5 * 1024 * 1024 * 1024;
+const LARGEST_BODY: u64 = 5 * 1024 * 1024 * 1024;
 
 /// What the client says of a body.
 pub(crate) struct Claims {
@@ -59,7 +59,7 @@ impl Claims {
         if length.is_none() {
             return Err(s3_error!(MissingContentLength, "You must provide the Content-Length HTTP header."));
         }
-        if length > Some(LARGEST_BODY) {
+        if length.is_some_and(is_too_large) {
             return Err(s3_error!(EntityTooLarge, "Your proposed upload exceeds the maximum allowed size"));
         }
         let md5 = match text("content-md5").map(bytes_of) {
@@ -93,6 +93,11 @@ impl Claims {
     pub(crate) fn none(algorithm: Algorithm) -> Self {
         Self { length: None, md5: None, algorithm, checksum: None, trailer: None }
     }
+}
+
+/// Whether a body is larger than one request may bring, or copy.
+pub(crate) fn is_too_large(size: u64) -> bool {
+    size > LARGEST_BODY
 }
 
 /// A checksum that has the right form.
@@ -221,5 +226,91 @@ impl Sink {
         let file = finished.map_err(S3Error::internal_error)?.map_err(file_failed)?;
         let (md5, checksum) = digests.finish();
         Ok(Ingested { size, md5, checksum, content: Content::File(file) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use futures_util::stream;
+
+    use super::*;
+
+    fn claims(headers: &[(&'static str, &str)]) -> Result<Claims, String> {
+        let headers = headers.iter().map(|(name, value)| {
+            (
+                hyper::header::HeaderName::from_static(name),
+                hyper::header::HeaderValue::from_str(value).unwrap(),
+            )
+        });
+        let claims = Claims::of_request(&headers.collect(), None, Algorithm::Crc32);
+        claims.map_err(|error| error.code().as_str().to_owned())
+    }
+
+    #[test]
+    fn what_is_said_of_a_body_is_read_or_refused() {
+        let largest = LARGEST_BODY.to_string();
+        assert_eq!(
+            claims(&[("content-length", &largest)]).map(|claims| claims.length),
+            Ok(Some(LARGEST_BODY))
+        );
+        let larger = (LARGEST_BODY + 1).to_string();
+        let length = ("content-length", "1");
+        let crc = ("x-amz-checksum-crc32", "AAAAAA==");
+        for (headers, code) in [
+            (vec![], "MissingContentLength"),
+            (vec![("content-length", "many")], "MissingContentLength"),
+            (vec![("content-length", &*larger)], "EntityTooLarge"),
+            (vec![length, ("content-md5", "YWJj")], "InvalidDigest"),
+            (vec![length, ("content-md5", "!")], "InvalidDigest"),
+            (vec![length, ("x-amz-checksum-crc32", "AAAA")], "InvalidRequest"),
+            (vec![length, crc, ("x-amz-checksum-sha1", "AAAAAAAAAAAAAAAAAAAAAAAAAAA=")], "InvalidRequest"),
+            (vec![length, crc, ("x-amz-trailer", "x-amz-checksum-crc32")], "InvalidRequest"),
+            (vec![length, ("x-amz-sdk-checksum-algorithm", "CRC32")], "InvalidRequest"),
+        ] {
+            assert_eq!(claims(&headers).map(|_| ()), Err(code.to_owned()), "{headers:?}");
+        }
+        let good = claims(&[length, crc, ("content-md5", "CZ7fAjxLoqlN0Cf2Vm8Zew==")]).unwrap();
+        assert_eq!((good.md5.map(|md5| md5.len()), good.algorithm), (Some(16), Algorithm::Crc32));
+        let behind = claims(&[length, ("x-amz-trailer", "x-amz-checksum-sha256")]).unwrap();
+        assert_eq!((behind.algorithm, behind.checksum), (Algorithm::Sha256, None));
+    }
+
+    /// However the pieces come: no more than a block is in memory, and what is kept is the same.
+    #[tokio::test]
+    async fn pieces_of_any_size_make_blocks() {
+        let folder = tempfile::tempdir().unwrap();
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
+        let mut sink = Sink::new(storage.clone(), Algorithm::Crc32);
+        for _ in 0..10 {
+            sink.take(&[7; 700_001]).await.unwrap();
+            assert!(sink.block.len() < BLOCK_BYTES);
+        }
+        let sunk = sink.end().await.unwrap();
+        let whole = stream::iter([Ok(Bytes::from(vec![7; 7_000_010]))]);
+        let at_once = ingest(&storage, Claims::none(Algorithm::Crc32), whole).await.unwrap();
+        assert_eq!((sunk.size, sunk.md5, &sunk.checksum), (7_000_010, at_once.md5, &at_once.checksum));
+        drop((sunk, at_once));
+        writing.end();
+    }
+
+    #[tokio::test]
+    async fn a_body_of_another_length_than_was_said_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
+        for (length, code) in [("4", "EntityTooLarge"), ("5", ""), ("6", "IncompleteBody")] {
+            let claims = claims(&[("content-length", length)]).unwrap();
+            let body = stream::iter([Ok(Bytes::from_static(b"he")), Ok(Bytes::from_static(b"llo"))]);
+            let ingested = ingest(&storage, claims, body).await;
+            assert_eq!(
+                ingested.err().map(|error| error.code().as_str().to_owned()).unwrap_or_default(),
+                code
+            );
+        }
+        writing.end();
+    }
+
+    #[test]
+    fn a_body_of_5_gib_is_not_too_large() {
+        assert!(!is_too_large(LARGEST_BODY) && is_too_large(LARGEST_BODY + 1));
     }
 }

@@ -92,7 +92,6 @@ pub(super) fn after(name: &str, prefix: &str, delimiter: &str) -> Vec<u8> {
         name.starts_with(prefix).then(|| common_prefix(name.as_bytes(), prefix, delimiter)).flatten();
     match within {
         Some(common) => behind(common).unwrap_or_else(|| [common, &[u8::MAX]].concat()),
-        None if name.is_empty() => Vec::new(),
         None => [name.as_bytes(), b"\0"].concat(),
     }
 }

@@ -93,6 +93,7 @@ mod tests {
             ("x-amz-tagging", "a=b"),
             ("x-amz-grant-read", "id=1"),
             ("x-amz-website-redirect-location", "/b"),
+            ("x-amz-object-ownership", "ObjectWriter"),
         ] {
             assert_eq!(code(name, value), Some(S3ErrorCode::NotImplemented), "{name}: {value}");
         }
@@ -102,6 +103,7 @@ mod tests {
             ("x-amz-storage-class", "STANDARD"),
             ("x-amz-meta-colour", "red"),
             ("x-amz-expected-bucket-owner", OWNER),
+            ("x-amz-object-ownership", "BucketOwnerEnforced"),
             ("x-amz-request-payer", "requester"),
             // Nothing is under retention here.
             ("x-amz-bypass-governance-retention", "true"),

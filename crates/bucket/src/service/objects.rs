@@ -37,7 +37,7 @@ pub(crate) fn admit(batch: &Batch<'_>, to: &Destination) -> Result<(Bucket, Opti
     let bucket = bucket(batch, &to.bucket)?;
     let existing = find(batch, Table::Objects, &key::object(&to.bucket, to.key.as_bytes()))?;
     to.conditions.check(existing.as_ref())?;
-    if !bucket.notifications.is_empty() && waiting(batch)? >= MOST_WAITING {
+    if !bucket.notifications.is_empty() && is_full(batch.count(Table::Outbox)?) {
         return Err(s3s::s3_error!(SlowDown, "too many events wait for their listener").into());
     }
     Ok((bucket, existing))
@@ -104,8 +104,9 @@ pub(crate) fn tell(
     Ok(())
 }
 
-fn waiting(batch: &Batch<'_>) -> Result<u64, StorageError> {
-    batch.count(Table::Outbox)
+/// Whether so many events wait that no more may.
+fn is_full(waiting: u64) -> bool {
+    waiting >= MOST_WAITING
 }
 
 impl records::Notification {
@@ -153,7 +154,13 @@ pub(crate) fn expires(date: Option<&Timestamp>) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::is_full;
     use crate::records::Notification;
+
+    #[test]
+    fn a_million_events_wait_and_no_more() {
+        assert!(!is_full(999_999) && is_full(1_000_000));
+    }
 
     #[test]
     fn rules_want_by_event_prefix_and_suffix() {

@@ -192,3 +192,21 @@ fn slice(bytes: &Bytes, within: &Range<u64>) -> Bytes {
     let at = |offset: u64| usize::try_from(offset).unwrap_or(usize::MAX).min(bytes.len());
     bytes.slice(at(within.start)..at(within.end))
 }
+
+#[cfg(test)]
+mod tests {
+    use futures_util::StreamExt;
+
+    use super::*;
+
+    /// A client must see that bytes are missing, not take the beginning for the whole.
+    #[tokio::test]
+    async fn a_body_that_lost_bytes_ends_with_an_error() {
+        for (left, whole) in [(5, false), (2, true)] {
+            let pieces = VecDeque::from([Piece::Bytes(Bytes::from_static(b"ab"))]);
+            let body = Outgest { pieces, reading: None, left, _pins: None };
+            let ends: Vec<bool> = body.map(|piece| piece.is_ok()).collect().await;
+            assert_eq!(ends, if whole { vec![true] } else { vec![true, false] });
+        }
+    }
+}

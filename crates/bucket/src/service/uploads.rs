@@ -9,7 +9,7 @@ use s3s::{S3Request, s3_error};
 use super::answer::{Answer, coded, invalid_argument, invalid_request, no_such_upload, time, unreadable};
 use super::conditions::{ReadConditions, WriteConditions};
 use super::copies::source;
-use super::ingest::{Claims, Ingested, LARGEST_BODY, etag, ingest};
+use super::ingest::{Claims, Ingested, etag, ingest, is_too_large};
 use super::objects::{Destination, admit, bucket, check_key, check_metadata, expires, keep, place};
 use super::writes::{of, stored_encoding};
 use super::{Caller, Service, Stop};
@@ -150,10 +150,10 @@ impl Service {
             None => 0..size,
             Some(range) => copied_range(range, size)?,
         };
-        if range.end - range.start > LARGEST_BODY {
+        let length = range.end - range.start;
+        if is_too_large(length) {
             return Err(s3_error!(EntityTooLarge, "Your proposed upload exceeds the maximum allowed size"));
         }
-        let length = range.end - range.start;
         let bytes = held.bytes(&self.storage, range)?;
         let ingested = ingest(&self.storage, Claims::none(upload.algorithm), bytes).await?;
         if ingested.size != length {
@@ -490,6 +490,23 @@ mod tests {
         let parts =
             ["0cc175b9c0f1b6a831c399e269772661", "92eb5ffee6ae2fec3ad71c777531578f"].map(str::to_owned);
         assert_eq!(combined(&parts), "96e024ba2074fe77e8e965ba43a704be-2");
+    }
+
+    #[test]
+    fn a_list_has_at_most_10_000_parts() {
+        let part = |number| CompletedPart {
+            part_number: Some(number),
+            e_tag: Some(ETag::Strong("0".to_owned())),
+            ..CompletedPart::default()
+        };
+        let count = |last| wanted((1..=last).map(part).collect()).map(|parts| parts.len());
+        assert_eq!(count(10_000).unwrap(), 10_000);
+        for wrong in [wanted(Vec::new()), wanted((0..=10_000).map(part).collect())] {
+            assert_eq!(
+                wrong.err().map(|error| error.code().as_str().to_owned()).as_deref(),
+                Some("MalformedXML")
+            );
+        }
     }
 
     #[test]

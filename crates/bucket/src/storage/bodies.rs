@@ -274,8 +274,13 @@ mod tests {
         let (orphan, owned) = (written(&first), written(&first));
         let second = Bodies::new(folder.path().to_owned(), 2);
         let fresh = written(&second);
+        // Where another request is just about to make a file.
+        let empty = second.path(BodyId(second.id().0 + (1 << (COUNTER_BITS - FOLDER_BITS))));
+        let empty = empty.parent().unwrap();
+        fs::create_dir_all(empty).unwrap();
         let removed = second.collect(|id| Ok::<_, io::Error>(id == owned)).unwrap();
         assert_eq!(removed, 1);
+        assert!(empty.exists(), "an empty folder of this run");
         assert!(!first.path(orphan).exists() && first.path(owned).exists() && second.path(fresh).exists());
         let removed = second.collect(|_| Ok::<_, io::Error>(false)).unwrap();
         assert_eq!(removed, 1);
