@@ -155,6 +155,8 @@ fn next_run(open: &database::Open, journal: &mut journal::Journal) -> Result<u64
 
 #[cfg(test)]
 mod tests {
+    use std::time::{Duration, Instant};
+
     use super::*;
 
     fn set(batch: &mut Batch<'_>, key: &str, value: &str) -> Result<(), StorageError> {
@@ -185,6 +187,59 @@ mod tests {
         assert_eq!(value(&killed, "stopped").as_deref(), Some("1"));
         assert_eq!(value(&killed, "killed").as_deref(), Some("2"));
         ending.end();
+        writing.end();
+    }
+
+    fn journal(folder: &Path) -> u64 {
+        std::fs::metadata(folder.join("journal")).unwrap().len()
+    }
+
+    #[tokio::test]
+    async fn the_journal_is_cleared_when_nothing_is_to_be_done_and_at_the_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
+        storage.change(Kind::Grows, |batch| set(batch, "a", "1")).await.unwrap();
+        assert!(journal(folder.path()) > 0, "the database caught up at once");
+        let patience = Instant::now() + Duration::from_secs(20);
+        while journal(folder.path()) > 0 {
+            assert!(Instant::now() < patience, "it never catches up");
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+        storage.change(Kind::Grows, |batch| set(batch, "b", "2")).await.unwrap();
+        writing.end();
+        assert_eq!(journal(folder.path()), 0);
+    }
+
+    /// While there is always something to do, it must not grow without end.
+    #[tokio::test]
+    async fn a_journal_that_is_long_is_cleared_under_load() {
+        let folder = tempfile::tempdir().unwrap();
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
+        let big = "x".repeat(1_000_000);
+        for _ in 0..40 {
+            let big = big.clone();
+            storage.change(Kind::Grows, move |batch| set(batch, "same", &big)).await.unwrap();
+            let length = journal(folder.path());
+            assert!(length < 10_000_000, "{length} bytes");
+        }
+        writing.end();
+    }
+
+    #[tokio::test]
+    async fn rows_and_changed_bytes_are_counted() {
+        let folder = tempfile::tempdir().unwrap();
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
+        let counts = storage.change(Kind::Grows, |batch| {
+            let mut counts = vec![(batch.count(Table::Objects)?, batch.changed_bytes())];
+            for key in ["a", "b", "c"] {
+                set(batch, key, &"x".repeat(1_000))?;
+                counts.push((batch.count(Table::Objects)?, batch.changed_bytes()));
+            }
+            Ok(counts)
+        });
+        let counts = counts.await.unwrap();
+        assert_eq!(counts.iter().map(|(rows, _)| *rows).collect::<Vec<_>>(), [0, 1, 2, 3]);
+        assert!(counts[0].1 == 0 && (3_000..3_200).contains(&counts[3].1), "{counts:?}");
         writing.end();
     }
 

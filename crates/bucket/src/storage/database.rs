@@ -278,14 +278,15 @@ mod tests {
         let disk = Arc::new(Disk { file, dead: AtomicBool::new(false), overlay: Mutex::default() });
         let handle = Handle(disk.clone());
         handle.set_len(8192).unwrap();
-        handle.write(0, &[1; 8192]).unwrap();
+        handle.write(0, &[1; 4096]).unwrap();
+        handle.write(4096, &[4; 4096]).unwrap();
         // From here on as on a full disk.
         disk.overlay().length = Some(8192);
         handle.set_len(20_000).unwrap();
         handle.write(4000, &[2; 200]).unwrap();
         handle.write(12_288, &[3; 4096]).unwrap();
         let expected: Vec<u8> =
-            [vec![1; 4000], vec![2; 200], vec![1; 3992], vec![0; 4096], vec![3; 4096]].concat();
+            [vec![1; 4000], vec![2; 200], vec![4; 3992], vec![0; 4096], vec![3; 4096]].concat();
         let mut found = vec![9; expected.len()];
         handle.read(0, &mut found).unwrap();
         assert!(found == expected);
@@ -299,5 +300,40 @@ mod tests {
         assert_eq!(written.len(), 20_000);
         written.truncate(expected.len());
         assert!(written == expected && disk.overlay().is_empty());
+    }
+
+    #[test]
+    fn what_was_cut_off_on_a_full_disk_does_not_come_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = File::create_new(folder.path().join("file")).unwrap();
+        drop(file);
+        let file = File::options().read(true).write(true).open(folder.path().join("file")).unwrap();
+        let disk = Arc::new(Disk { file, dead: AtomicBool::new(false), overlay: Mutex::default() });
+        disk.overlay().length = Some(0);
+        let handle = Handle(disk);
+        handle.set_len(3 * PAGE_BYTES).unwrap();
+        handle.write(0, &[7; 3 * PAGE_BYTES as usize]).unwrap();
+        handle.set_len(PAGE_BYTES).unwrap();
+        handle.set_len(3 * PAGE_BYTES).unwrap();
+        let mut found = vec![9; 3 * PAGE_BYTES as usize];
+        handle.read(0, &mut found).unwrap();
+        let (kept, cut) = found.split_at(PAGE_BYTES as usize);
+        assert!(kept.iter().all(|byte| *byte == 7) && cut.iter().all(|byte| *byte == 0));
+    }
+
+    /// A full disk is waited for; any other fault of it is told at once.
+    #[test]
+    fn faults_other_than_a_full_disk_are_told() {
+        assert!(is_full(&full()) && !is_full(&io::Error::other("a fault")));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        std::fs::write(&path, [0; 8192]).unwrap();
+        let file = File::open(&path).unwrap();
+        let disk = Arc::new(Disk { file, dead: AtomicBool::new(false), overlay: Mutex::default() });
+        let handle = Handle(disk.clone());
+        assert!(handle.write(0, &[1; 10]).is_err(), "the file is open for reading alone");
+        assert!(handle.set_len(10).is_err());
+        disk.overlay().length = Some(10);
+        assert!(handle.sync_data().is_err());
     }
 }

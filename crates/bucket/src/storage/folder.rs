@@ -161,8 +161,31 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join(MARKER), "format 2\n").unwrap();
         assert!(matches!(Folder::take(folder.path()), Err(Error::Newer { found: 2, known: 1, .. })));
-        fs::write(folder.path().join(MARKER), "a letter\n").unwrap();
-        assert!(matches!(Folder::take(folder.path()), Err(Error::NotOurs { .. })));
+        for letter in [&b"a letter\n"[..], &[0xff]] {
+            fs::write(folder.path().join(MARKER), letter).unwrap();
+            assert!(matches!(Folder::take(folder.path()), Err(Error::NotOurs { .. })));
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_looked_at_is_an_error_with_its_path() {
+        let folder = tempfile::tempdir().unwrap();
+        let marker = folder.path().join(MARKER);
+        fs::create_dir(&marker).unwrap();
+        assert!(matches!(Folder::take(folder.path()), Err(Error::File { path, .. }) if path == marker));
+        let file = folder.path().join("file");
+        fs::write(&file, "").unwrap();
+        assert!(matches!(Folder::take(&file), Err(Error::File { .. })));
+    }
+
+    #[test]
+    fn bodies_without_a_marker_are_somebodys() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("bodies")).unwrap();
+        fs::write(folder.path().join("bodies/letter"), "").unwrap();
+        assert!(
+            matches!(Folder::take(folder.path()), Err(Error::NotOurs { what, .. }) if what == "`bodies`")
+        );
     }
 
     #[test]

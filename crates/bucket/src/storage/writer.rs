@@ -181,13 +181,11 @@ impl Writer {
         };
         let full = full || !open.has_room();
         let mut batch = Batch::of(&transaction).map_err(Failure::Database)?;
-        let mut lazy = true;
         for mut job in jobs {
             if full && job.kind() == Kind::Grows {
                 job.answer(Err(Unavailable::Full));
                 continue;
             }
-            lazy &= job.kind() == Kind::Lazy;
             let done = catch_unwind(AssertUnwindSafe(|| job.run(&mut batch)));
             run.push(job);
             match done {
@@ -206,7 +204,8 @@ impl Writer {
         if changes.is_empty() {
             return transaction.abort().map_err(|error| Failure::Database(error.into()));
         }
-        let written = sync_names(&adopted).and_then(|()| self.journal.append(&changes, !lazy));
+        let is_awaited = is_awaited(run.iter().map(|job| job.kind()));
+        let written = sync_names(&adopted).and_then(|()| self.journal.append(&changes, is_awaited));
         if let Err(failed) = written {
             transaction.abort().map_err(|error| Failure::Database(error.into()))?;
             return Err(Failure::Refused(reason(&failed.into())));
@@ -275,6 +274,11 @@ impl Writer {
     }
 }
 
+/// Whether somebody waits until these changes are on the disk.
+fn is_awaited(mut kinds: impl Iterator<Item = Kind>) -> bool {
+    kinds.any(|kind| kind != Kind::Lazy)
+}
+
 enum Failure {
     /// Nothing was changed.
     Refused(Unavailable),
@@ -309,4 +313,22 @@ fn reason(error: &redb::Error) -> Unavailable {
 
 pub(super) fn read(current: &Current) -> std::sync::RwLockReadGuard<'_, Result<Arc<Open>, Unavailable>> {
     current.read().unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_batch_is_synced_if_anyone_waits_for_it() {
+        use Kind::{Grows, Lazy, Shrinks};
+        for (kinds, awaited) in [
+            (vec![Lazy, Lazy], false),
+            (vec![Lazy, Grows, Lazy], true),
+            (vec![Shrinks], true),
+            (vec![], false),
+        ] {
+            assert_eq!(is_awaited(kinds.iter().copied()), awaited, "{kinds:?}");
+        }
+    }
 }
