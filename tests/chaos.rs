@@ -10,7 +10,8 @@
 //! RAYFOLD_CHAOS_MINUTES=10 cargo test -p rayfold-lambda --test chaos -- --nocapture
 //! ```
 //!
-//! and with `RAYFOLD_CHAOS_REPORT=$PWD/docs/reports/chaos.md` it writes what it saw there.
+//! and with `RAYFOLD_CHAOS_REPORT=$PWD/docs/reports/chaos.md` it writes what it saw there. With `RAYFOLD_CHAOS_STORE=minio` the
+//! store is MinIO, which does not believe in other clocks.
 //!
 //! A full disk is a limit on the size of files (`ulimit -f`), set where the largest one has nearly arrived: no file system of
 //! its own is needed, nor rights to mount one. Clocks step by `libfaketime` where that is installed (Debian's package); where
@@ -65,6 +66,7 @@ async fn animations_end_right_or_named_whatever_happens() {
     if parts::lying_clock().is_none() {
         eprintln!("clocks do not step: libfaketime is not installed");
     }
+    eprintln!("chaos on {}", parts::store_kind());
     let first = number("RAYFOLD_SEED").unwrap_or_else(|| fastrand::u64(..1_000_000));
     let length = Duration::from_secs(60 * number("RAYFOLD_CHAOS_MINUTES").unwrap_or(0));
     let (start, mut rounds) = (Instant::now(), Vec::new());
@@ -78,7 +80,7 @@ async fn animations_end_right_or_named_whatever_happens() {
         }
     }
     if let Ok(path) = std::env::var("RAYFOLD_CHAOS_REPORT") {
-        std::fs::write(path, report::page(&rounds, start.elapsed())).unwrap();
+        std::fs::write(path, report::page(parts::store_kind(), &rounds, start.elapsed())).unwrap();
     }
 }
 

@@ -67,6 +67,23 @@ async fn a_listener_that_refuses_is_not_pressed() {
 }
 
 #[tokio::test]
+async fn a_server_that_is_dropped_tells_nothing_more() {
+    let (webhook, heard) = listener(usize::MAX).await;
+    let stage = stage_with(Some(webhook)).await;
+    stage.notify().await;
+    stage.put("a", "1").await;
+    while heard.refused() == 0 {
+        tokio::time::sleep(Duration::from_millis(1)).await;
+    }
+    drop(stage.server);
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    let asked = heard.refused();
+    // The next pauses would be of 40 to 320 ms.
+    tokio::time::sleep(Duration::from_millis(700)).await;
+    assert_eq!(heard.refused(), asked);
+}
+
+#[tokio::test]
 async fn events_wait_for_a_listener_across_restarts() {
     let stage = stage().await;
     stage.notify().await;

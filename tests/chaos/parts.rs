@@ -17,11 +17,15 @@ use rayfold_local::routes::Routes;
 use rayfold_local::{Functions, S3Server, StoreKind, Webhook, any_port};
 use rayfold_pipeline::store::{Connection, S3Store};
 
+use crate::stage::SMALL_MB;
 use crate::tally::noting;
 
 /// What a process of this program is to be, and in which folder.
 const PART: &str = "RAYFOLD_CHAOS_PART";
 const FOLDER: &str = "RAYFOLD_CHAOS_FOLDER";
+
+/// On which store, as `rayfold dev --store` has it; the processes inherit it.
+const STORE: &str = "RAYFOLD_CHAOS_STORE";
 
 /// What it is told besides, as JSON.
 const TOLD: &str = "RAYFOLD_CHAOS_TOLD";
@@ -33,6 +37,9 @@ const SAYS: &str = "the part says: ";
 const TOKEN: &str = "chaos";
 
 const BUCKET: &str = "rayfold";
+
+/// Free time, in frames, that leaves an assembler time for one.
+const ALL_ITS_TIME: &str = "1000000";
 
 /// How long a part may take to start on a loaded machine. One that starts on a full disk may never come.
 const START: Duration = Duration::from_secs(60);
@@ -46,6 +53,12 @@ const LYING_CLOCKS: [&str; 2] = [
 /// The library that lies about the time, if it is installed.
 pub(crate) fn lying_clock() -> Option<&'static Path> {
     LYING_CLOCKS.map(Path::new).into_iter().find(|path| path.exists())
+}
+
+/// The store that the round is on: the one built in unless the environment names another.
+pub(crate) fn store_kind() -> StoreKind {
+    let Ok(name) = std::env::var(STORE) else { return StoreKind::default() };
+    StoreKind::named(&name).unwrap_or_else(|| panic!("{STORE}={name}: expected built-in or minio"))
 }
 
 /// How a part's process is started.
@@ -65,6 +78,8 @@ pub(crate) struct InvokerTold {
     pub(crate) region: String,
     pub(crate) access_key: String,
     pub(crate) secret_key: String,
+    /// GIFs are built by several assemblers, each of which adds a frame.
+    pub(crate) in_pieces: bool,
     /// Of what goes wrong; nothing does without.
     pub(crate) seed: Option<u64>,
 }
@@ -185,7 +200,7 @@ async fn say_and_stay(what: &str) {
 async fn be_store(folder: &Path, webhook: &str) {
     let hook = Webhook { url: format!("http://{webhook}/events"), token: TOKEN.into() };
     let data = folder.join("data");
-    let server = S3Server::start(StoreKind::BuiltIn, &data, any_port(), Some(hook), &mut |_| {}).await;
+    let server = S3Server::start(store_kind(), &data, any_port(), Some(hook), &mut |_| {}).await;
     let server = server.unwrap();
     let connection = server.connection();
     let store = S3Store::at(&connection, BUCKET);
@@ -202,6 +217,7 @@ async fn be_invoker(folder: &Path, told: &InvokerTold) {
     let functions = Functions::in_folder(functions);
     let mut settings = Settings::new(functions, told.store, any_port(), TOKEN.into());
     settings.concurrency = 4;
+    settings.memory_mb = SMALL_MB;
     settings.timeout = Duration::from_secs(20);
     settings.retry_pauses = vec![Duration::from_millis(50), Duration::from_millis(100)];
     settings.sweep_every = Some(Duration::from_secs(3));
@@ -215,6 +231,9 @@ async fn be_invoker(folder: &Path, told: &InvokerTold) {
         ("RAYFOLD_STUCK_AFTER_MS", "2000"),
     ];
     settings.environment = environment.map(|(name, value)| (name.to_owned(), value.to_owned())).to_vec();
+    if told.in_pieces {
+        settings.environment.push(("RAYFOLD_SPARE_FRAMES".into(), ALL_ITS_TIME.into()));
+    }
     if std::env::var("RAYFOLD_CHAOS_LIES").is_ok_and(|lies| lies == "yes") {
         settings.environment.extend(lies(folder, "invoker"));
     }
@@ -231,12 +250,23 @@ async fn be_invoker(folder: &Path, told: &InvokerTold) {
                 Seen::Finished { outcome: Outcome::TimedOut, .. } => note("functions out of time"),
                 Seen::Finished { outcome: Outcome::Failed(_), .. } => note("invocations failed"),
                 Seen::DeadLetter { .. } => note("dead letters"),
-                Seen::Finished { .. } | Seen::Event { .. } | Seen::Requested { .. } | Seen::Log { .. } => {}
+                Seen::Log { line, .. } => note_of(&line).into_iter().for_each(&note),
+                Seen::Finished { .. } | Seen::Event { .. } | Seen::Requested { .. } => {}
             }
         }
     });
     let invoker = Invoker::start(settings, Some(sender)).await.unwrap();
     say_and_stay(&invoker.webhook().to_string()).await;
+}
+
+/// What a line of a function's log is counted as.
+fn note_of(line: &str) -> Option<&'static str> {
+    let line: serde_json::Value = serde_json::from_str(line).ok()?;
+    let outcome = line["outcome"].as_str().unwrap_or_default();
+    if line.get("left_after").is_some_and(|after| !after.is_null()) {
+        return Some("GIFs left for the next assembler");
+    }
+    outcome.starts_with("cut into").then_some("frames cut into bands")
 }
 
 fn chaos(seed: u64) -> Chaos {

@@ -3,6 +3,8 @@
 use std::fmt::{self, Write as _};
 use std::time::Duration;
 
+use rayfold_local::StoreKind;
+
 use crate::tally::Tally;
 
 /// One round.
@@ -31,25 +33,38 @@ impl fmt::Display for Round {
     }
 }
 
-const HEADER: &str = "# Chaos on the real parts
+/// What comes before the figures.
+fn header(store: StoreKind) -> String {
+    let (title, command, clocks) = match store {
+        StoreKind::BuiltIn => ("Chaos on the real parts", "chaos.md", "clocks step"),
+        StoreKind::Minio => (
+            "Chaos on the real parts, with MinIO",
+            "chaos-minio.md RAYFOLD_CHAOS_STORE=minio",
+            "clocks of all but MinIO step",
+        ),
+    };
+    format!(
+        "# {title}
 
 Written by
 
-    RAYFOLD_CHAOS_MINUTES=11 RAYFOLD_CHAOS_REPORT=$PWD/docs/reports/chaos.md cargo test -p rayfold-lambda --test chaos -- --nocapture
+    RAYFOLD_CHAOS_MINUTES=11 RAYFOLD_CHAOS_REPORT=$PWD/docs/reports/{command} cargo test -p rayfold-lambda --test chaos -- --nocapture
 
-A round has a seed and a bucket of its own. For 20 s the store on board, the invoker and the function processes are killed
+A round has a seed and a bucket of its own. For 20 s {store}, the invoker and the function processes are killed
 (`kill -9`), each by itself; proxies before the store and before the invoker slow connections, cut them in the middle of a
 request or an answer, lose answers, answer 500 to what was done, and send requests twice; files cannot grow (`ulimit -f`),
-clocks step by up to 30 s or an hour (libfaketime), events are lost, doubled and late. A user puts, overwrites, deletes and
-changes back scripts and settings of three animations meanwhile, faulty ones and scripts of three frames among them. Then
-all is calm, and within 240 s every manifest must say what the files say, and every GIF must have the bytes that the same
-files give without a bucket. What a function gave up for what was done to it must say so by name, and comes right when the
-user tries again. `RAYFOLD_SEED` replays a round's acts and dice; which request meets which is up to the machine.
-";
+{clocks} by up to 30 s or an hour (libfaketime), events are lost, doubled and late. A user puts, overwrites, deletes and
+changes back scripts and settings of three animations meanwhile, faulty ones and scripts of three frames among them; one
+animation's frames are drawn in bands, and in half of the rounds each GIF is built by several assemblers. Then all is calm, and
+within 240 s every manifest must say what the files say, and every GIF must have the bytes that the same files give without a
+bucket. What a function gave up for what was done to it must say so by name, and comes right when the user tries again. `RAYFOLD_SEED` replays a round's acts and dice; which request meets which is up to the machine.
+"
+    )
+}
 
 /// The whole report.
-pub(crate) fn page(rounds: &[Round], took: Duration) -> String {
-    let mut page = HEADER.to_owned();
+pub(crate) fn page(store: StoreKind, rounds: &[Round], took: Duration) -> String {
+    let mut page = header(store);
     let all = Tally::default();
     rounds.iter().for_each(|round| all.add_all(&round.tally));
     let write = |page: &mut String, line: fmt::Arguments<'_>| page.write_fmt(line).unwrap();

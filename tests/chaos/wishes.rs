@@ -10,7 +10,7 @@ use rayfold_pipeline::manifest::{Fault, FrameState, Manifest, Reason, Status};
 use rayfold_pipeline::store::{PutOptions, S3Store, Store};
 use rayfold_scene::parse_settings;
 
-use crate::stage::{locally, scene};
+use crate::stage::{big_scene, locally, scene};
 
 /// How often the user asks again.
 const ASKS: usize = 5;
@@ -19,6 +19,10 @@ const ASKS: usize = 5;
 const PATIENCE: Duration = Duration::from_secs(5);
 
 pub(crate) const ANIMATIONS: [&str; 3] = ["one", "two", "deep/three"];
+
+/// The one whose frames are drawn in bands.
+const BIG: &str = "deep/three";
+
 const SCRIPTS: [&str; 4] = ["1.txt", "2.txt", "10.txt", "3.txt"];
 const SETTINGS: &str = "animation.json";
 
@@ -28,9 +32,8 @@ const FAULTY: &str = "Screen 24 18\nSpere 6\nTrace\n";
 /// What cannot be understood.
 const FAULTY_SETTINGS: &str = "{\"fps\": ";
 
-/// Three frames.
-const SEVERAL: &str = "Screen 24 18\nBackground .1 .2 .3\nSphere 6 (1:2 3:8) 9 -9 .2 .2 .2 .7 .6 .5\n\
-                       Ilight 1 1 1 .2 -.3 -1\nFrames 3\nTrace\n";
+/// How a script of several frames says so.
+const THREE: &str = "Frames 3\n";
 
 /// How functions say that they gave up a frame, or a set, for what the world did to them.
 const GIVEN_UP: [&str; 3] = ["in each of", "is no frame, though drawn", "frames were assembled in the"];
@@ -62,10 +65,10 @@ impl Wishes {
         let text = match random.u32(0..12) {
             0..=2 => None,
             3 => Some(if is_settings { FAULTY_SETTINGS.to_owned() } else { FAULTY.to_owned() }),
-            4 if !is_settings => Some(SEVERAL.to_owned()),
+            4 if !is_settings => Some(three_frames(animation)),
             _ if is_settings => Some(format!("{{\"frames\": {}, \"fps\": 5}}", random.u32(1..4))),
             // Few contents, so that changes are often back to what was.
-            _ => Some(scene(f64::from(random.u32(1..4)) * 4.0)),
+            _ => Some(frame(animation, f64::from(random.u32(1..4)) * 4.0)),
         };
         match text {
             Some(text) => drop(self.files.insert(key.clone(), text)),
@@ -113,6 +116,21 @@ impl Wishes {
     }
 }
 
+/// A script of one frame, which differs by `x`. All of an animation have one size.
+fn frame(animation: &str, x: f64) -> String {
+    if animation == BIG { big_scene(10.0 * x) } else { scene(x) }
+}
+
+fn three_frames(animation: &str) -> String {
+    let [from, to] = [2.0, 8.0].map(|x| frame(animation, x));
+    // The number that differs becomes a curve.
+    let moved = from
+        .split(' ')
+        .zip(to.split(' '))
+        .map(|(first, last)| if first == last { first.to_owned() } else { format!("(1:{first} 3:{last})") });
+    moved.collect::<Vec<_>>().join(" ").replace("Trace\n", &format!("{THREE}Trace\n"))
+}
+
 /// How an animation of these files must end.
 fn expected(files: &[(&str, String)]) -> Status {
     let scripts: Vec<&str> =
@@ -120,7 +138,7 @@ fn expected(files: &[(&str, String)]) -> Status {
     let settings = files.iter().find(|(name, _)| *name == SETTINGS);
     let settings = settings.map(|(name, text)| parse_settings(name, text.as_bytes()).settings);
     let awaited = settings.flatten().and_then(|settings| settings.frames()).unwrap_or(0);
-    let frames: u64 = scripts.iter().map(|text| if *text == SEVERAL { 3 } else { 1 }).sum();
+    let frames: u64 = scripts.iter().map(|text| if text.contains(THREE) { 3 } else { 1 }).sum();
     let is_faulty = settings == Some(None) || scripts.contains(&FAULTY);
     match (scripts.is_empty(), frames < awaited, is_faulty) {
         (true, _, _) => Status::Empty,

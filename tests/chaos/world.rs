@@ -50,8 +50,12 @@ impl World {
             region,
             access_key,
             secret_key,
+            in_pieces: dice.bool(),
             seed: Some(dice.u64(..)),
         };
+        if told.in_pieces {
+            tally.add("rounds with GIFs in pieces");
+        }
         let connection = Connection { endpoint, ..connection };
         let mut world = World {
             folder: folder.to_owned(),

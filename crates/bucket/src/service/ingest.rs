@@ -311,6 +311,6 @@ mod tests {
 
     #[test]
     fn a_body_of_5_gib_is_not_too_large() {
-        assert!(!is_too_large(LARGEST_BODY) && is_too_large(LARGEST_BODY + 1));
+        assert!(!is_too_large(5_368_709_120) && is_too_large(5_368_709_121));
     }
 }
