@@ -206,7 +206,7 @@ async fn be_store(folder: &Path, webhook: &str) {
     let store = S3Store::at(&connection, BUCKET);
     store.create_bucket().await.unwrap();
     let notifications = Routes::shared().notifications(server.queue_arn());
-    store.notify(&notifications).await.unwrap();
+    rayfold_local::notify(&store, &notifications).await.unwrap();
     let Connection { endpoint, region, access_key, secret_key, .. } = connection;
     say_and_stay(&format!("{endpoint} {region} {access_key} {secret_key}")).await;
 }

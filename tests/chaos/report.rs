@@ -57,7 +57,8 @@ request or an answer, lose answers, answer 500 to what was done, and send reques
 changes back scripts and settings of three animations meanwhile, faulty ones and scripts of three frames among them; one
 animation's frames are drawn in bands, and in half of the rounds each GIF is built by several assemblers. Then all is calm, and
 within 240 s every manifest must say what the files say, and every GIF must have the bytes that the same files give without a
-bucket. What a function gave up for what was done to it must say so by name, and comes right when the user tries again. `RAYFOLD_SEED` replays a round's acts and dice; which request meets which is up to the machine.
+bucket. What a function gave up for what was done to it must say so by name, and comes right when the user tries again.
+`RAYFOLD_SEED` replays a round's acts and dice; which request meets which is up to the machine.
 "
     )
 }

@@ -23,7 +23,7 @@ pub use credentials::Credentials;
 pub use error::{Error, Result};
 pub use functions::Functions;
 pub use http::any_port;
-pub use platform::{Plan, Platform};
+pub use platform::{Plan, Platform, notify};
 pub use rayfold_bucket::Webhook;
 pub use region::REGION;
 pub use s3_server::{S3Server, StoreKind};

@@ -148,8 +148,12 @@ impl Platform {
     }
 }
 
-/// MinIO says that it is ready some moments before it knows its webhooks, and refuses their queues until then.
-async fn notify(store: &S3Store, notifications: &[Notification]) -> rayfold_pipeline::Result<()> {
+/// Has a bucket's changes told. MinIO says that it is ready some moments before it knows its webhooks, and refuses their queues
+/// until then: that is waited for.
+///
+/// # Errors
+/// The store's.
+pub async fn notify(store: &S3Store, notifications: &[Notification]) -> rayfold_pipeline::Result<()> {
     let start = Instant::now();
     loop {
         match store.notify(notifications).await {
