@@ -308,7 +308,15 @@ async fn complete(
     complete.multipart_upload(parts).send().await.unwrap()
 }
 
-/// The values that an answer has under the five names, in one order.
+const ALGORITHMS: [ChecksumAlgorithm; 5] = [
+    ChecksumAlgorithm::Crc32,
+    ChecksumAlgorithm::Crc32C,
+    ChecksumAlgorithm::Crc64Nvme,
+    ChecksumAlgorithm::Sha1,
+    ChecksumAlgorithm::Sha256,
+];
+
+/// The values that an answer has under their names, in that order.
 macro_rules! sums {
     ($answer:expr) => {{
         let answer = &$answer;
@@ -325,15 +333,8 @@ macro_rules! sums {
 #[tokio::test]
 async fn every_step_of_an_upload_tells_its_checksum_under_its_own_name() {
     let stage = stage().await;
-    let algorithms = [
-        ChecksumAlgorithm::Crc32,
-        ChecksumAlgorithm::Crc32C,
-        ChecksumAlgorithm::Crc64Nvme,
-        ChecksumAlgorithm::Sha1,
-        ChecksumAlgorithm::Sha256,
-    ];
     stage.put("source", "hello").await;
-    for (place, algorithm) in algorithms.into_iter().enumerate() {
+    for (place, algorithm) in ALGORITHMS.into_iter().enumerate() {
         let only = |sums: &[Option<String>; 5], what: &str| {
             let named: Vec<_> = sums.iter().map(Option::is_some).collect();
             let expected: Vec<_> = (0..5).map(|number| number == place).collect();
@@ -465,14 +466,7 @@ async fn an_upload_without_an_algorithm_takes_any() {
 #[tokio::test]
 async fn a_puts_checksum_is_told_under_its_own_name_and_of_its_kind() {
     let stage = stage().await;
-    let algorithms = [
-        ChecksumAlgorithm::Crc32,
-        ChecksumAlgorithm::Crc32C,
-        ChecksumAlgorithm::Crc64Nvme,
-        ChecksumAlgorithm::Sha1,
-        ChecksumAlgorithm::Sha256,
-    ];
-    for (place, algorithm) in algorithms.into_iter().enumerate() {
+    for (place, algorithm) in ALGORITHMS.into_iter().enumerate() {
         let put = stage.client.put_object().bucket(BUCKET).key("a").checksum_algorithm(algorithm);
         let put = put.send().await.unwrap();
         let named: Vec<_> = sums!(put).iter().map(Option::is_some).collect();

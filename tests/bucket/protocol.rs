@@ -59,6 +59,23 @@ async fn unsigned_requests_are_denied() {
     }
 }
 
+/// Found by fuzzing: `s3s` 0.14 subtracts before it has seen that there is a digit. Where such a subtraction is checked it panics.
+#[tokio::test]
+async fn a_credential_of_no_date_is_refused_and_the_store_goes_on() {
+    let stage = stage().await;
+    let request = format!(
+        "GET /films HTTP/1.1\r\nHost: {}\r\nx-amz-content-sha256: UNSIGNED-PAYLOAD\r\nx-amz-date: 20261123T000000Z\r\n\
+         Authorization: AWS4-HMAC-SHA256 Credential=root/20260)01/us-east-1/s3/aws4_request, SignedHeaders=host, \
+         Signature={}\r\nConnection: close\r\n\r\n",
+        host(&stage),
+        "0".repeat(64)
+    );
+    let answer = stage.raw(&request).await;
+    let is_refused = answer.starts_with("HTTP/1.1 4") || answer.starts_with("HTTP/1.1 500");
+    assert!(is_refused && answer.contains("<Error>") && answer.contains("x-amz-request-id"), "{answer}");
+    stage.put("a", "1").await;
+}
+
 #[tokio::test]
 async fn a_bucket_may_stand_in_the_host() {
     let stage = stage().await;

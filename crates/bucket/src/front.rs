@@ -1,14 +1,18 @@
 //! What stands before S3's protocol: each request gets an id and is told where it came from, and every answer names the id.
+//!
+//! A panic is answered, too: bytes from strangers pass through code that is not ours.
 
 use std::net::IpAddr;
+use std::panic::AssertUnwindSafe;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use futures_util::FutureExt;
 use hyper::body::Incoming;
 use hyper::header::{HeaderName, HeaderValue};
 use hyper::service::Service;
 use hyper::{Request, Response};
 use s3s::service::S3Service;
-use s3s::{Body, HttpError};
+use s3s::{Body, HttpError, s3_error};
 
 use crate::identity::{in_sts_shape, is_for_sts};
 
@@ -44,7 +48,14 @@ impl Service<Request<Incoming>> for Front {
         let for_sts = is_for_sts(request.method(), request.uri(), request.headers());
         let service = self.service.clone();
         Box::pin(async move {
-            let mut response = service.call(request.map(Body::from)).await?;
+            let answer = AssertUnwindSafe(service.call(request.map(Body::from))).catch_unwind();
+            let mut response = match answer.await {
+                Ok(response) => response?,
+                Err(_) => {
+                    let error = s3_error!(InternalError, "the store failed; its log says how");
+                    error.to_http_response().map_err(|error| HttpError::new(Box::new(error)))?
+                }
+            };
             if for_sts {
                 response = in_sts_shape(response).await?;
             }
