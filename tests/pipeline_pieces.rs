@@ -18,10 +18,7 @@ use rayfold_local::observation::{Observation, RequestKind};
 use rayfold_local::routes::Function;
 use rayfold_pipeline::store::{ListRequest, Store};
 use stage::stores::on_every_store;
-use stage::{Stage, frames, logged};
-
-/// Any frame takes a thousandth of a second at least.
-const ALL_ITS_TIME: &str = "1000000";
+use stage::{ALL_ITS_TIME, Stage, frames, logged};
 
 async fn stage(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Stage {
     let functions = Path::new(env!("CARGO_BIN_EXE_rayfold-render")).parent().unwrap();

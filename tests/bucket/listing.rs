@@ -1,6 +1,6 @@
 //! Listings against a model: a sorted map, and S3's rules in a few lines.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use aws_sdk_s3::types::EncodingType;
 use fastrand::Rng;
@@ -221,21 +221,21 @@ async fn listings_of_uploads_are_as_the_model_says() {
     println!("RAYFOLD_SEED={seed}");
     let mut random = Rng::with_seed(seed);
     let stage = stage().await;
-    let mut model = BTreeMap::new();
+    let mut model = BTreeSet::new();
     for _ in 0..40 {
         let key = name(&mut random);
         // Some keys have several.
         for _ in 0..random.usize(1..3) {
             let begun = stage.client.create_multipart_upload().bucket(BUCKET).key(&key).send().await.unwrap();
-            model.insert((key.clone(), begun.upload_id.unwrap()), ());
+            model.insert((key.clone(), begun.upload_id.unwrap()));
         }
     }
-    let keys: BTreeMap<_, _> = model.keys().map(|(key, _)| (key.clone(), String::new())).collect();
+    let keys: BTreeMap<_, _> = model.iter().map(|(key, _)| (key.clone(), String::new())).collect();
     for _ in 0..60 {
         let prefix = if random.bool() { String::new() } else { name(&mut random) };
         let delimiter = *random.choice(&["", "/", "//", "a", "-"]).unwrap();
         let most = random.i32(1..10);
-        let (key, id) = random.choice(model.keys()).unwrap();
+        let (key, id) = random.choice(&model).unwrap();
         let after = match random.u8(0..4) {
             0 => (key.as_str(), id.as_str()),
             1 => (key.as_str(), ""),
@@ -243,16 +243,13 @@ async fn listings_of_uploads_are_as_the_model_says() {
             _ => ("", ""),
         };
         let Listing { keys: alone, prefixes } = expected(&keys, &prefix, delimiter, after.0);
-        let is_behind = |(key, id): &(String, String)| {
-            let at_marker = key == after.0 && !after.1.is_empty() && id.as_str() > after.1;
-            let rolled = alone.contains(key);
-            let at_marker = at_marker && key.starts_with(&prefix) && {
-                // A key that stands for a common prefix is told as that.
-                delimiter.is_empty() || !key[prefix.len()..].contains(delimiter)
-            };
-            rolled || at_marker
+        let is_told = |(key, id): &(String, String)| {
+            let is_behind = key == after.0 && !after.1.is_empty() && id.as_str() > after.1;
+            // A key that stands for a common prefix is told as that.
+            let is_alone = |rest: &str| delimiter.is_empty() || !rest.contains(delimiter);
+            alone.contains(key) || (is_behind && key.strip_prefix(&prefix).is_some_and(is_alone))
         };
-        let uploads: Vec<_> = model.keys().filter(|upload| is_behind(upload)).cloned().collect();
+        let uploads: Vec<_> = model.iter().filter(|upload| is_told(upload)).cloned().collect();
         let found = uploads_listed(&stage, &prefix, delimiter, after, most).await;
         let shown = format!("prefix {prefix:?} delimiter {delimiter:?} after {after:?} pages of {most}");
         assert_eq!(found, (uploads, prefixes), "{shown}");

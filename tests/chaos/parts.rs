@@ -17,7 +17,7 @@ use rayfold_local::routes::Routes;
 use rayfold_local::{Functions, S3Server, StoreKind, Webhook, any_port};
 use rayfold_pipeline::store::{Connection, S3Store};
 
-use crate::stage::SMALL_MB;
+use crate::stage::{ALL_ITS_TIME, SMALL_MB};
 use crate::tally::noting;
 
 /// What a process of this program is to be, and in which folder.
@@ -37,9 +37,6 @@ const SAYS: &str = "the part says: ";
 const TOKEN: &str = "chaos";
 
 const BUCKET: &str = "rayfold";
-
-/// Free time, in frames, that leaves an assembler time for one.
-const ALL_ITS_TIME: &str = "1000000";
 
 /// How long a part may take to start on a loaded machine. One that starts on a full disk may never come.
 const START: Duration = Duration::from_secs(60);

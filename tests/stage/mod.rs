@@ -24,6 +24,10 @@ use rayfold_pipeline::store::{ObjectInfo, PutOptions, S3Store, Store};
 use rayfold_scene::{AnimationSettings, Limits, natural_cmp, parse, parse_settings};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 
+/// As `RAYFOLD_SPARE_FRAMES`: time to keep free, in frames, so that an assembler takes one and leaves the rest. Any frame takes a
+/// thousandth of a second at least.
+pub const ALL_ITS_TIME: &str = "1000000";
+
 /// Longer than anything here takes on a loaded machine.
 pub const PATIENCE: Duration = Duration::from_secs(240);
 

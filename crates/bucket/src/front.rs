@@ -52,7 +52,7 @@ impl Service<Request<Incoming>> for Front {
             let mut response = match answer.await {
                 Ok(response) => response?,
                 Err(_) => {
-                    let error = s3_error!(InternalError, "the store failed; its log says how");
+                    let error = s3_error!(InternalError, "the store failed; its standard error says how");
                     error.to_http_response().map_err(|error| HttpError::new(Box::new(error)))?
                 }
             };

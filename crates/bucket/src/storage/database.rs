@@ -34,7 +34,7 @@ impl Open {
     /// Opens or makes the database; gives the number of the journal's last entry that it holds.
     pub(super) fn at(path: &Path) -> Result<(Self, u64), redb::Error> {
         let file = File::options().read(true).write(true).create(true).truncate(false).open(path)?;
-        let disk = Arc::new(Disk { file, dead: AtomicBool::new(false), overlay: Mutex::default() });
+        let disk = Disk::new(file);
         let database =
             Builder::new().set_cache_size(CACHE_BYTES).create_with_backend(Handle(disk.clone()))?;
         let open = Self { database, disk };
@@ -118,6 +118,10 @@ impl Overlay {
 }
 
 impl Disk {
+    fn new(file: File) -> Arc<Self> {
+        Arc::new(Self { file, dead: AtomicBool::new(false), overlay: Mutex::default() })
+    }
+
     fn overlay(&self) -> MutexGuard<'_, Overlay> {
         self.overlay.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -275,7 +279,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         let file = File::options().read(true).write(true).create(true).truncate(false).open(&path).unwrap();
-        let disk = Arc::new(Disk { file, dead: AtomicBool::new(false), overlay: Mutex::default() });
+        let disk = Disk::new(file);
         let handle = Handle(disk.clone());
         handle.set_len(8192).unwrap();
         handle.write(0, &[1; 4096]).unwrap();
@@ -306,9 +310,7 @@ mod tests {
     fn what_was_cut_off_on_a_full_disk_does_not_come_back() {
         let folder = tempfile::tempdir().unwrap();
         let file = File::create_new(folder.path().join("file")).unwrap();
-        drop(file);
-        let file = File::options().read(true).write(true).open(folder.path().join("file")).unwrap();
-        let disk = Arc::new(Disk { file, dead: AtomicBool::new(false), overlay: Mutex::default() });
+        let disk = Disk::new(file);
         disk.overlay().length = Some(0);
         let handle = Handle(disk);
         handle.set_len(3 * PAGE_BYTES).unwrap();
@@ -329,7 +331,7 @@ mod tests {
         let path = folder.path().join("file");
         std::fs::write(&path, [0; 8192]).unwrap();
         let file = File::open(&path).unwrap();
-        let disk = Arc::new(Disk { file, dead: AtomicBool::new(false), overlay: Mutex::default() });
+        let disk = Disk::new(file);
         let handle = Handle(disk.clone());
         assert!(handle.write(0, &[1; 10]).is_err(), "the file is open for reading alone");
         assert!(handle.set_len(10).is_err());
