@@ -32,7 +32,7 @@ pub(crate) use table::{Batch, Row, Snapshot, Table, View};
 pub(crate) use writer::{Kind, Unavailable};
 
 use folder::Folder;
-use writer::{Change, Current, Message, Writer, open, read};
+use writer::{Change, Current, Message, RESERVE, Writer, open, read};
 
 /// The row that counts the starts.
 const RUN: &[u8] = b"run";
@@ -58,6 +58,11 @@ impl Storage {
     /// # Errors
     /// [`Error::DataInUse`], [`Error::NotOurs`], [`Error::Newer`], [`Error::File`], [`Error::Storage`].
     pub(crate) fn open(path: &Path) -> Result<(Self, Writing)> {
+        Self::with_reserve(path, RESERVE)
+    }
+
+    /// The same, leaving so many bytes of the disk free.
+    fn with_reserve(path: &Path, reserve: u64) -> Result<(Self, Writing)> {
         let folder = Folder::take(path)?;
         let failed = |source: redb::Error| Error::Storage { path: path.to_owned(), source: source.into() };
         let (opened, mut journal) = open(&folder).map_err(failed)?;
@@ -72,6 +77,7 @@ impl Storage {
             bodies: bodies.clone(),
             current: current.clone(),
             journal,
+            reserve,
             on_commit: Box::new({
                 let committed = committed.clone();
                 move || committed.notify_one()
@@ -223,6 +229,35 @@ mod tests {
             let length = journal(folder.path());
             assert!(length < 10_000_000, "{length} bytes");
         }
+        writing.end();
+    }
+
+    #[tokio::test]
+    async fn a_disk_that_is_nearly_full_takes_what_makes_room_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let put = async |storage: &Storage, key: &'static str| {
+            storage.change(Kind::Grows, move |batch| set(batch, key, "1")).await
+        };
+        let remove = async |storage: &Storage, key: &'static str| {
+            storage.change(Kind::Shrinks, move |batch| batch.remove(Table::Objects, key.as_bytes())).await
+        };
+        let (storage, writing) = Storage::with_reserve(folder.path(), 0).unwrap();
+        put(&storage, "kept").await.unwrap();
+        put(&storage, "deleted").await.unwrap();
+        writing.end();
+
+        let (storage, writing) = Storage::with_reserve(folder.path(), u64::MAX).unwrap();
+        assert!(matches!(put(&storage, "new").await, Err(Unavailable::Full)));
+        let (deleted, refused) = tokio::join!(remove(&storage, "deleted"), put(&storage, "new"));
+        assert!(deleted.unwrap() && matches!(refused, Err(Unavailable::Full)));
+        let values = ["kept", "deleted", "new"].map(|key| value(&storage, key));
+        assert_eq!(values, [Some("1".to_owned()), None, None]);
+        writing.end();
+
+        let (storage, writing) = Storage::with_reserve(folder.path(), 0).unwrap();
+        put(&storage, "new").await.unwrap();
+        let values = ["kept", "deleted", "new"].map(|key| value(&storage, key));
+        assert_eq!(values, [Some("1".to_owned()), None, Some("1".to_owned())]);
         writing.end();
     }
 

@@ -32,7 +32,7 @@ const IDLE: Duration = Duration::from_millis(500);
 const RECOVERY_PAUSE: Duration = Duration::from_millis(200);
 
 /// Free bytes that are left to changes that make room, and to the journal and the database while they catch up.
-const RESERVE: u64 = 64 * 1024 * 1024;
+pub(super) const RESERVE: u64 = 64 * 1024 * 1024;
 
 /// Why nothing was changed, or why that is not known.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -114,6 +114,8 @@ pub(super) struct Writer {
     pub(super) bodies: Arc<Bodies>,
     pub(super) current: Current,
     pub(super) journal: Journal,
+    /// Bytes that are left free.
+    pub(super) reserve: u64,
     pub(super) on_commit: Box<dyn Fn() + Send>,
 }
 
@@ -269,7 +271,7 @@ impl Writer {
     fn is_nearly_full(&self) -> bool {
         statvfs(self.folder.path()).is_ok_and(|disk| {
             let free = u64::from(disk.blocks_available()).saturating_mul(disk.fragment_size());
-            free < RESERVE
+            free < self.reserve
         })
     }
 }
