@@ -21,6 +21,9 @@ pub struct Args {
     /// States of a world after which its search ends; its line then says so
     #[arg(long, default_value_t = 400_000)]
     most: u64,
+    /// States of a world up to which it is searched once more, with nothing forgotten, to see the same
+    #[arg(long, default_value_t = 1_000_000)]
+    most_remembered: u64,
     /// States of a world after which the search for a broken rule goes on with the next world
     #[arg(long, default_value_t = 20_000)]
     most_of_a_rule: u64,
@@ -48,7 +51,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let threads =
         args.threads.or_else(|| std::thread::available_parallelism().ok().map(usize::from)).unwrap_or(1);
     let all: Vec<World> = worlds().into_iter().filter(|world| world.name.contains(&args.world)).collect();
-    let searched = side_by_side(threads, all.len(), |place| search(&all[place], args.most));
+    let searched = side_by_side(threads, all.len(), |place| search(&all[place], args));
     let rules = side_by_side(threads, Mutation::ALL.len(), |place| hunt(Mutation::ALL[place], &all, args));
     let batches = side_by_side(threads, 10, |batch| {
         let seeds = (0..args.seeds).filter(|seed| seed % 10 == batch as u64);
@@ -60,7 +63,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if let Some(counterexample) = violations.into_iter().next() {
         return Err(counterexample.into());
     }
-    let searched: Vec<(&World, Explored)> = all.iter().zip(searched.into_iter().flatten()).collect();
+    let searched: Vec<(&World, Searched)> = all.iter().zip(searched.into_iter().flatten()).collect();
+    if let Some((world, both)) = searched.iter().find(|(_, searched)| !searched.agrees()) {
+        anyhow::bail!("{}: what is forgotten makes a difference: {both:?}", world.name);
+    }
     if args.world.is_empty() {
         write_report(args, &searched, &rules, found)?;
     }
@@ -70,16 +76,37 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
 }
 
+/// What a search has seen, and another one that forgets nothing, if it came to its end.
+#[derive(Debug)]
+struct Searched {
+    explored: Explored,
+    remembering: Option<Explored>,
+}
+
+impl Searched {
+    /// Whether both have come to the same situations.
+    fn agrees(&self) -> bool {
+        let seen = |explored: &Explored| (explored.situations, explored.all_situations, explored.rests);
+        self.remembering.as_ref().is_none_or(|remembering| seen(remembering) == seen(&self.explored))
+    }
+}
+
 #[expect(clippy::print_stdout, reason = "a measurement tells what it finds")]
-fn search(world: &World, most: u64) -> Result<Explored, Box<Counterexample>> {
+fn search(world: &World, args: &Args) -> Result<Searched, Box<Counterexample>> {
     let start = Instant::now();
-    let explored = explore(world, None, most);
+    let searched = explore(world, None, args.most).and_then(|explored| {
+        let worth_it = explored.complete && explored.states < args.most_remembered;
+        let most = if worth_it { args.most_remembered } else { 0 };
+        let remembering = explore(&world.remembering(), None, most)?;
+        let remembering = Some(remembering).filter(|remembering| remembering.complete);
+        Ok(Searched { explored, remembering })
+    });
     let seconds = start.elapsed().as_secs_f64();
-    match &explored {
-        Ok(explored) => println!("{} {seconds:.0} s", line(world.name, explored)),
+    match &searched {
+        Ok(searched) => println!("{} {seconds:.0} s", line(world.name, searched)),
         Err(counterexample) => println!("{counterexample}"),
     }
-    explored
+    searched
 }
 
 /// How a broken rule is noticed.
@@ -116,17 +143,23 @@ Written by `cargo run --release -p rayfold-bench -- explore`. Small worlds are s
 steps' requests (`crates/pipeline/src/simulation/explore`): one to three frames, the invocations that their events wake, and
 the assemblers; a user who overwrites, changes back and deletes at any moment; an invocation killed before or after any
 request, a write that lands after its sender's death, a lost answer, an event that comes twice or never, as the world's name
-says. States that few preemptions and faults lead to are visited first (*price*: the most of them on the way to a state; a
+says. States that few preemptions and faults lead to are visited first (*price*: the most that they weigh on the way to a state; a
 preemption is that somebody goes on though whoever went on before still could). *Depth* is the most requests and acts on the
-way to a state of rest. Both are of the way on which a state was reached first.
+way to a state of rest. Both are of the way on which a state was reached first. Where the search ended at its limit, all ways
+that weigh less than *price* were gone.
 
-Not searched: listings that mix two moments, and time: clocks move with the user's acts alone, a pause ends at once, the
-deadline does not come. The [seeds](simulation.md) have these.
+The steps say at some places what they go on with (`goes_on_with`), and what has happened to an invocation before is then
+forgotten: it makes no difference to what comes. Worlds that are small enough were searched once more with *nothing forgotten*:
+the figure is how many states that makes. Both searches came to the same *situations* (what the bucket holds and what every
+invocation asks for next).
+
+Not searched: listings that mix two moments, and time: the store's clock moves with the user's acts alone, those of invocations
+stand still, a pause ends at once, the deadline does not come. The [seeds](simulation.md) have these.
 
 No state broke a guarantee.
 
-| world | states | at rest | steps | depth | price | searched |
-| --- | --- | --- | --- | --- | --- | --- |
+| world | states | nothing forgotten | situations | at rest | steps | depth | price | searched |
+| --- | --- | --- | --- | --- | --- | --- | --- | --- |
 ";
 
 const RULES: &str = "
@@ -143,19 +176,30 @@ turns with at most two preemptions; faults are aimed at one write, or strike any
 
 fn write_report(
     args: &Args,
-    searched: &[(&World, Explored)],
+    searched: &[(&World, Searched)],
     rules: &[Noticed],
     found: usize,
 ) -> anyhow::Result<()> {
     let mut page = HEADER.to_owned();
     let mut figures = csv::Writer::from_writer(Vec::new());
-    figures.write_record(["world", "states", "at_rest", "steps", "depth", "price", "complete"])?;
-    for (world, explored) in searched {
-        writeln!(page, "{}", line(world.name, explored))?;
-        let Explored { states, rests, steps, depth, price, complete } = explored;
-        let numbers =
-            [*states, *rests, *steps, *depth as u64, *price as u64].map(|number| number.to_string());
-        let name = std::iter::once(world.name.to_owned());
+    figures.write_record([
+        "world",
+        "states",
+        "states_if_nothing_is_forgotten",
+        "situations",
+        "at_rest",
+        "steps",
+        "depth",
+        "price",
+        "complete",
+    ])?;
+    for (world, searched) in searched {
+        writeln!(page, "{}", line(world.name, searched))?;
+        let Explored { states, rests, situations, steps, depth, price, complete, .. } = &searched.explored;
+        let remembered = searched.remembering.as_ref().map_or_else(String::new, |of| of.states.to_string());
+        let numbers = [*situations, *rests, *steps, *depth as u64, *price as u64];
+        let name = [world.name.to_owned(), states.to_string(), remembered].into_iter();
+        let numbers = numbers.into_iter().map(|number| number.to_string());
         figures.write_record(name.chain(numbers).chain([complete.to_string()]))?;
     }
     page.push_str(RULES);
@@ -177,10 +221,13 @@ fn write_report(
     Ok(())
 }
 
-fn line(name: &str, explored: &Explored) -> String {
-    let Explored { states, rests, steps, depth, price, complete } = explored;
+fn line(name: &str, Searched { explored, remembering }: &Searched) -> String {
+    let Explored { states, rests, situations, steps, depth, price, complete, .. } = explored;
+    let remembered = remembering.as_ref().map_or_else(|| "-".to_owned(), |of| of.states.to_string());
     let searched = if *complete { "all" } else { "to the limit" };
-    format!("| {name} | {states} | {rests} | {steps} | {depth} | {price} | {searched} |")
+    format!(
+        "| {name} | {states} | {remembered} | {situations} | {rests} | {steps} | {depth} | {price} | {searched} |"
+    )
 }
 
 fn rule_line(noticed: &Noticed, of: usize) -> String {

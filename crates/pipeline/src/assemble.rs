@@ -118,7 +118,7 @@ fn last_change(
 }
 
 /// Quiet that has been waited for.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Quiet {
     since: Option<Timestamp>,
     waited: Duration,
@@ -171,10 +171,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let mut tally = Tally::new(self.clock.now());
         loop {
             tally.rounds += 1;
+            self.goes_on_with(&(&tally.quiet, tally.lease));
             let known = self.manifest(animation).await?;
             let gif = self.head(&animation.gif()).await?;
             let observation = self.observe(animation, known.as_ref()).await?;
             let observed = &observation.manifest;
+            self.goes_on_with(&(&tally.quiet, tally.lease, &known, &gif, &observation));
             if known.is_none() && observation.is_of_nothing() {
                 if self.clear(animation, gif.is_some(), &observation, &mut tally).await? {
                     continue;

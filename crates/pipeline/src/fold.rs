@@ -66,8 +66,9 @@ pub(crate) enum Age {
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Sees to it that the manifest shows `fact`.
+    /// Sees to it that the manifest shows `fact`. What an invocation does after it depends on nothing from before it.
     pub(crate) async fn fold(&self, animation: &Animation, fact: &Fact, age: Age) -> Result<Folded> {
+        self.goes_on_with(&(animation, fact, age));
         let glimpse = self.glimpse(animation).await?;
         self.fold_from(animation, fact, age, glimpse).await
     }
@@ -88,6 +89,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
         let mut quiet = 0;
         loop {
+            self.goes_on_with(&(animation, fact, first, quiet, &glimpse));
             let before = glimpse.revision();
             self.pause(glimpse.head()).await;
             glimpse = self.glimpse(animation).await?;
@@ -109,6 +111,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 Glimpse::Unreadable(known) | Glimpse::Whole(known) => Some(known),
                 Glimpse::Start { .. } => self.manifest(animation).await?,
             };
+            self.goes_on_with(&(animation, fact, first, quiet, &known));
             if let Some(folded) = self.commit_until_agreed(animation, &mut known).await? {
                 return Ok(folded);
             }

@@ -97,6 +97,21 @@ pub struct Invocation<'a, S, C> {
     pub(crate) deadline: Option<Timestamp>,
     #[cfg(any(test, feature = "simulation"))]
     mutation: Option<Mutation>,
+    #[cfg(any(test, feature = "simulation"))]
+    carried: Option<&'a Carried>,
+}
+
+/// What an invocation has said last that its doings depend on: see [`Invocation::goes_on_with`].
+#[cfg(any(test, feature = "simulation"))]
+#[derive(Debug, Default)]
+pub struct Carried(std::sync::Mutex<Option<String>>);
+
+#[cfg(any(test, feature = "simulation"))]
+impl Carried {
+    /// What was said since the last call.
+    pub(crate) fn take(&self) -> Option<String> {
+        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take()
+    }
 }
 
 /// A rule of the protocol that the simulation breaks on purpose, to see its predicates catch it.
@@ -226,6 +241,8 @@ impl<'a, S, C> Invocation<'a, S, C> {
             deadline: None,
             #[cfg(any(test, feature = "simulation"))]
             mutation: None,
+            #[cfg(any(test, feature = "simulation"))]
+            carried: None,
         }
     }
 
@@ -244,6 +261,25 @@ impl<'a, S, C> Invocation<'a, S, C> {
     pub fn breaking(self, mutation: Option<Mutation>) -> Self {
         Invocation { mutation, ..self }
     }
+
+    /// The same, leaving there what it goes on with.
+    #[cfg(any(test, feature = "simulation"))]
+    pub(crate) fn leaving(self, carried: &'a Carried) -> Self {
+        Invocation { carried: Some(carried), ..self }
+    }
+
+    /// Says that all that this invocation will do from here on depends on these alone, besides its event and the answers to
+    /// come. The search of small worlds forgets everything else that has happened to it.
+    #[cfg(any(test, feature = "simulation"))]
+    pub(crate) fn goes_on_with(&self, what: &dyn std::fmt::Debug) {
+        if let Some(Carried(carried)) = self.carried {
+            *carried.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(format!("{what:?}"));
+        }
+    }
+
+    #[cfg(not(any(test, feature = "simulation")))]
+    #[expect(clippy::unused_self, reason = "without the search nobody asks")]
+    pub(crate) fn goes_on_with(&self, _: &dyn std::fmt::Debug) {}
 
     /// Whether this rule is to be broken.
     #[cfg(any(test, feature = "simulation"))]

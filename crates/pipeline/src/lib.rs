@@ -34,6 +34,8 @@ pub use clock::{Clock, Randomness, SystemClock, Timestamp};
 pub use error::{Cause, Error, Result, found};
 pub use failure::record_failure;
 pub use fold::fold;
+#[cfg(any(test, feature = "simulation"))]
+pub use invocation::Carried;
 pub use invocation::{Invocation, Mutation, Policy};
 pub use reconcile::reconcile;
 pub use render::{Drawing, Joining, Renderer, render_frame};

@@ -195,6 +195,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         stages: &mut Stages,
     ) -> Result<Came> {
         let Subject { animation, name, part, .. } = subject;
+        self.goes_on_with(&(animation, name, part, &script.version, count));
         let tag = Tag { version: script.version.clone(), pixels: self.policy.pixels };
         let frame = match self.join(renderer, subject, &script, (&tag, count), stages).await? {
             Ok(frame) => frame,

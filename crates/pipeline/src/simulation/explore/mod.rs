@@ -50,12 +50,16 @@ pub struct Explored {
     pub states: u64,
     /// States in which nothing is left to happen.
     pub rests: u64,
+    /// Situations that differ: what the bucket holds, and what every invocation asks for next.
+    pub situations: u64,
+    /// A hash of all these.
+    pub all_situations: u64,
     /// Steps from one state to another.
     pub steps: u64,
     /// The most steps to a state of rest, by the way that it was reached first.
     pub depth: usize,
     /// What preemptions and faults weigh at most on the way to a state, by the way that it was reached first: 1 before a
-    /// write, 2 elsewhere.
+    /// write, 2 elsewhere. If the search ended at its limit, what they weigh on the cheapest way that it did not go.
     pub price: usize,
     /// There was no more to see; else the search ended at its limit.
     pub complete: bool,

@@ -1,11 +1,14 @@
 //! An invocation as a function: from the answers that it has got to the requests that it waits on, or to its end.
 //!
 //! The real steps run against a store that answers nothing by itself. What an invocation asks for next depends on its
-//! event, its request id, and the answers so far with the moments they came at; on nothing else. So what it has come to
-//! is known by a hash of these, is worked out once ([`Memo`]), and states of the world can be copied and compared.
-//! Pauses end at once: whoever pauses is one whose next request takes effect later, and that is searched anyway.
+//! event, its request id, the moment that its clock shows, and the answers so far; on nothing else. So what it has come to
+//! is known by a hash of these, is worked out once ([`Memo`]), and states of the world can be copied and compared. At some
+//! places a step says what it goes on with ([`Invocation::goes_on_with`]): what has happened before is then forgotten, and
+//! two invocations that have come to the same on different ways are one.
+//! Clocks of invocations stand still, and pauses end at once: whoever pauses is one whose next request takes effect later,
+//! and that is searched anyway.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::future::Future;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::num::NonZeroU64;
@@ -29,7 +32,8 @@ use crate::store::{
     ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, UnfinishedUpload, Upload,
 };
 use crate::{
-    Clock, Error, Invocation, Mutation, Policy, Randomness, Result, Timestamp, assemble, render_frame, sweep,
+    Carried, Clock, Error, Invocation, Mutation, Policy, Randomness, Result, Timestamp, assemble,
+    render_frame, sweep,
 };
 
 /// How long an invocation may run.
@@ -78,6 +82,10 @@ pub(super) struct Standing {
     pub(super) requests: Vec<(u32, Request)>,
     /// How it ended; an error is what the platform sees.
     pub(super) end: Option<Result<(), End>>,
+    /// A hash of what it asks for.
+    pub(super) asks: u64,
+    /// A hash of what it goes on with, if the last answer has led to where it says so.
+    carried: Option<u64>,
 }
 
 /// How an invocation ended that did not succeed.
@@ -89,12 +97,11 @@ pub(super) enum End {
     Bug(String),
 }
 
-/// An answer, to which request, and when it came.
+/// An answer, and to which request.
 #[derive(Debug, Clone)]
 pub(super) struct Event {
     slot: u32,
-    answer: Answer,
-    now: Timestamp,
+    answer: Arc<Answer>,
     /// Of all that has happened up to it.
     hash: u64,
 }
@@ -116,14 +123,16 @@ pub(super) struct Process {
     /// Of all that has happened.
     pub(super) hash: u64,
     pub(super) standing: Arc<Standing>,
-    /// When it last listed the scripts.
+    /// When it last listed the scripts, if it is one that writes GIFs.
     pub(super) listed: Timestamp,
 }
 
 /// What is known of invocations by the hash of what has happened to them.
 #[derive(Debug)]
 pub(super) struct Memo {
-    standings: BTreeMap<u64, Arc<Standing>>,
+    standings: HashMap<u64, Arc<Standing>>,
+    /// By the hash of what had happened before, and of an answer.
+    answered: HashMap<u64, Arc<Process>>,
     manner: Manner,
 }
 
@@ -133,47 +142,95 @@ struct Manner {
     mutation: Option<Mutation>,
     /// Whether an assembler has time for one frame and no more.
     is_cut: bool,
+    /// Whether nothing is forgotten.
+    remembers: bool,
+}
+
+pub(super) fn hash_of(what: &impl Hash) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    what.hash(&mut hasher);
+    hasher.finish()
 }
 
 impl Memo {
     pub(super) fn new(world: &World, mutation: Option<Mutation>) -> Self {
-        Memo { standings: BTreeMap::new(), manner: Manner { mutation, is_cut: world.is_cut } }
+        let manner = Manner { mutation, is_cut: world.is_cut, remembers: world.remembers };
+        let (standings, answered) = (HashMap::new(), HashMap::new());
+        Memo { standings, answered, manner }
     }
 
-    /// Begins an invocation.
+    /// Begins an invocation, whose clock will show `start` all the time.
     pub(super) fn begin(
         &mut self,
         work: Work,
         request_id: Arc<str>,
         attempt: u32,
-        now: Timestamp,
-    ) -> Process {
-        let mut hasher = DefaultHasher::new();
-        (&work, &request_id, attempt, now).hash(&mut hasher);
-        let standing = Arc::new(Standing { requests: Vec::new(), end: None });
-        let (history, hash) = (Vec::new(), hasher.finish());
-        let (start, begun, silent, listed) = (now, hash, 0, Timestamp(0));
+        start: Timestamp,
+    ) -> Arc<Process> {
+        let standing = Arc::new(Standing { requests: Vec::new(), end: None, asks: 0, carried: None });
+        let (history, hash) = (Vec::new(), hash_of(&(&work, &request_id, attempt, start)));
+        let (begun, silent, listed) = (hash, 0, Timestamp(0));
         let mut process =
             Process { work, request_id, attempt, start, begun, history, silent, hash, standing, listed };
         process.standing = self.standing(&process);
-        process
+        Arc::new(process)
     }
 
-    /// Gives an invocation the answer to one of its requests. Answers that are waited for together are kept in the order of
-    /// their requests, whichever came first, where that leads to the same: the invocation does not tell.
-    pub(super) fn answer(&mut self, process: &Process, slot: u32, answer: Answer, now: Timestamp) -> Process {
-        let mut next = process.clone();
+    /// Gives an invocation the answer to one of its requests, by the store's clock `now`.
+    pub(super) fn answer(
+        &mut self,
+        process: &Process,
+        slot: u32,
+        answer: Answer,
+        now: Timestamp,
+    ) -> Arc<Process> {
         let asked = process.standing.requests.iter().find(|(of, _)| *of == slot);
-        if let Some((_, Request::List(request))) = asked
-            && request.prefix.starts_with("scripts/")
-        {
-            next.listed = now;
+        let listed = match (&process.work, asked) {
+            (Work::Assemble(_), Some((_, Request::List(request))))
+                if request.prefix.starts_with("scripts/") =>
+            {
+                now
+            }
+            _ => process.listed,
+        };
+        let mut hasher = DefaultHasher::new();
+        (process.hash, slot, listed).hash(&mut hasher);
+        answer.hash_into(&mut hasher);
+        let hash = hasher.finish();
+        if let Some(known) = self.answered.get(&hash) {
+            return known.clone();
         }
-        next.history.push(Event { slot, answer, now, hash: 0 });
+        let mut next = self.work_out(Process { listed, ..process.clone() }, slot, answer);
+        if let Some(carried) = next.standing.carried.filter(|_| !self.manner.remembers) {
+            self.forget(&mut next, carried);
+        }
+        let next = Arc::new(next);
+        self.answered.insert(hash, next.clone());
+        next
+    }
+
+    /// What has happened to it is no longer told apart from anything else that has led to where it goes on with the same.
+    fn forget(&mut self, process: &mut Process, carried: u64) {
+        process.hash = hash_of(&(process.begun, process.listed, carried));
+        process.silent = process.history.len();
+        if let Some(last) = process.history.last_mut() {
+            last.hash = process.hash;
+        }
+        let standing = process.standing.clone();
+        let known = self.standings.entry(process.hash).or_insert(standing);
+        assert_eq!(*known, process.standing, "more than is said makes a difference");
+    }
+
+    /// Answers that are waited for together are kept in the order of their requests, whichever came first, where that leads
+    /// to the same: the invocation does not tell.
+    fn work_out(&mut self, process: Process, slot: u32, answer: Answer) -> Process {
+        let asked = process.standing.requests.len();
+        let mut next = process;
+        next.history.push(Event { slot, answer: Arc::new(answer), hash: 0 });
         let last = next.history.len() - 1;
         next.rehash_from(last);
         next.standing = self.standing(&next);
-        let later = |event: &&Event| event.slot > slot && event.now == now;
+        let later = |event: &&Event| event.slot > slot;
         let passed = next.history[next.silent..last].iter().rev().take_while(later).count();
         if passed > 0 {
             let mut sorted = next.clone();
@@ -184,8 +241,7 @@ impl Memo {
                 next = sorted;
             }
         }
-        let is_silent = next.standing.end.is_none()
-            && next.standing.requests.len() + 1 == process.standing.requests.len();
+        let is_silent = next.standing.end.is_none() && next.standing.requests.len() + 1 == asked;
         if !is_silent {
             next.silent = next.history.len();
         }
@@ -209,7 +265,7 @@ impl Process {
         let mut hash = before.map_or(self.begun, |event| event.hash);
         for event in &mut self.history[place..] {
             let mut hasher = DefaultHasher::new();
-            (hash, event.slot, event.now).hash(&mut hasher);
+            (hash, event.slot).hash(&mut hasher);
             event.answer.hash_into(&mut hasher);
             hash = hasher.finish();
             event.hash = hash;
@@ -253,16 +309,20 @@ impl Answer {
 
 /// Runs the real step again from its beginning, giving it the answers in their order.
 fn relive(process: &Process, manner: Manner) -> Standing {
-    let board = Board(Arc::new(Mutex::new(Slots { now: process.start, ..Slots::default() })));
+    let (start, now) = (process.start, process.start);
+    let slots = Arc::new(Mutex::new(Slots { start, now, ..Slots::default() }));
+    let board = Board { slots, carried: Arc::default() };
     let mut task = step(process.work.clone(), process.request_id.clone(), board.clone(), manner);
     let mut end = poll(&mut task);
-    for Event { slot, answer, now, .. } in &process.history {
-        board.answer(*slot, answer.clone(), *now);
+    for Event { slot, answer, .. } in &process.history {
+        board.answer(*slot, Answer::clone(answer));
         end = poll(&mut task);
     }
-    let requests = std::mem::take(&mut lock(&board.0).waiting);
-    let requests = requests.into_iter().map(|(slot, (request, _))| (slot, request)).collect();
-    Standing { requests, end }
+    let mut slots = lock(&board.slots);
+    let requests = std::mem::take(&mut slots.waiting);
+    let requests: Vec<_> = requests.into_iter().map(|(slot, (request, _))| (slot, request)).collect();
+    let asks = hash_of(&format!("{:?}", requests.iter().map(|(_, request)| request).collect::<Vec<_>>()));
+    Standing { requests, end, asks, carried: slots.carried }
 }
 
 type Task = Pin<Box<dyn Future<Output = Result<(), End>> + Send>>;
@@ -273,11 +333,13 @@ fn step(work: Work, request_id: Arc<str>, board: Board, manner: Manner) -> Task 
         let clock = BoardClock(board.clone());
         let joiner =
             Joiner { board: board.clone(), push: if manner.is_cut { LONG_PUSH } else { Duration::ZERO } };
+        let carried = board.carried.clone();
         let store = BoardStore(board);
         let deadline = clock.now().after(TIMEOUT);
         let invocation = Invocation::new(&store, &clock, &random, &policy, &request_id)
             .until(deadline)
-            .breaking(manner.mutation);
+            .breaking(manner.mutation)
+            .leaving(&carried);
         let result = match &work {
             Work::Render(key) => render_frame(&invocation, &Drawer { bands: BANDS }, key).await.map(drop),
             Work::Assemble(key) => assemble(&invocation, &joiner, key).await.map(drop),
@@ -315,12 +377,17 @@ fn poll(task: &mut Task) -> Option<Result<(), End>> {
 
 /// Where a step leaves its requests and finds the answers.
 #[derive(Clone)]
-struct Board(Arc<Mutex<Slots>>);
+struct Board {
+    slots: Arc<Mutex<Slots>>,
+    carried: Arc<Carried>,
+}
 
 #[derive(Default)]
 struct Slots {
+    start: Timestamp,
     now: Timestamp,
     next: u32,
+    carried: Option<u64>,
     waiting: BTreeMap<u32, (Request, Waker)>,
     answers: BTreeMap<u32, Answer>,
 }
@@ -330,8 +397,14 @@ impl Board {
         let mut slot = None;
         let mut request = Some(request);
         let answer = std::future::poll_fn(|context| {
-            let mut slots = lock(&self.0);
+            let mut slots = lock(&self.slots);
             if let Some(request) = request.take() {
+                if let Some(carried) = self.carried.take() {
+                    // From here on requests are numbered anew: nothing tells how many there were.
+                    assert!(slots.waiting.is_empty(), "what is asked for is forgotten");
+                    slots.next = 0;
+                    slots.carried = Some(hash_of(&carried));
+                }
                 slots.next += 1;
                 let number = slots.next;
                 slot = Some(number);
@@ -351,10 +424,11 @@ impl Board {
         answer.await.outcome(key)
     }
 
-    fn answer(&self, slot: u32, answer: Answer, now: Timestamp) {
+    fn answer(&self, slot: u32, answer: Answer) {
         let waiting = {
-            let mut slots = lock(&self.0);
-            slots.now = now;
+            let mut slots = lock(&self.slots);
+            slots.now = slots.start;
+            slots.carried = None;
             slots.answers.insert(slot, answer);
             slots.waiting.remove(&slot)
         };
@@ -368,7 +442,7 @@ struct BoardClock(Board);
 
 impl Clock for BoardClock {
     fn now(&self) -> Timestamp {
-        lock(&self.0.0).now
+        lock(&self.0.slots).now
     }
 
     async fn sleep(&self, _: Duration) {}
@@ -490,7 +564,7 @@ impl Animator for Joiner {
 
 impl Encoding for Joined {
     async fn push(&mut self, frame: Bytes) -> Result<Bytes, Unfit> {
-        let mut slots = lock(&self.board.0);
+        let mut slots = lock(&self.board.slots);
         slots.now = slots.now.after(self.push);
         self.listed.push(&frame);
         Ok(Bytes::new())

@@ -5,8 +5,12 @@
 //! or two (iterative context bounding; Musuvathi and Qadeer, PLDI 2007), before a write rather than before a read, so it is
 //! found long before the search has come to its end. Each state is visited once, from whichever side it is reached first:
 //! nothing is left out for the order's sake.
+//!
+//! Of a state that has been visited a hash is kept, and the step that led to it. Whole states are kept of those from which
+//! steps are still to be tried; if that becomes too many, the last ones come first, which leaves few behind.
 
-use std::collections::BTreeSet;
+use std::collections::HashSet;
+use std::hash::{BuildHasherDefault, Hasher};
 use std::rc::Rc;
 
 use super::process::Memo;
@@ -17,36 +21,88 @@ use crate::Mutation;
 /// What a preemption or a fault weighs before a write, and elsewhere.
 const PRICES: [usize; 2] = [1, 2];
 
-/// How a state was reached: from which visited one, and by what.
+/// Steps still to be tried, beyond which the last ones come first.
+const MANY: usize = 1_000_000;
+
+/// How a state was reached: from which visited one, and by which of its choices. Small, as there is one for each state.
+#[derive(Clone, Copy)]
 struct Step {
-    from: usize,
-    choice: Choice,
+    from: u32,
+    choice: u16,
+}
+
+/// The way to a state.
+#[derive(Clone, Copy)]
+struct Way {
+    /// The last step of it.
+    step: Step,
+    /// Steps from the beginning.
     depth: usize,
+    /// What its preemptions and faults weigh.
+    price: usize,
+    /// Who goes on after it, if nobody is preempted.
+    current: u64,
 }
 
 /// A step that is still to be tried.
 struct Open {
     state: Rc<State>,
-    step: Step,
-    /// Who goes on after it, if nobody is preempted.
-    current: u64,
+    choice: Choice,
+    way: Way,
 }
 
 /// What is still to be tried, by what its preemptions and faults weigh; the newest first among equals.
 #[derive(Default)]
-struct Frontier(Vec<Vec<Open>>);
+struct Frontier {
+    by_price: Vec<Vec<Open>>,
+    len: usize,
+}
 
 impl Frontier {
-    fn push(&mut self, price: usize, open: Open) {
-        if self.0.len() <= price {
-            self.0.resize_with(price + 1, Vec::new);
+    fn push(&mut self, open: Open) {
+        let price = open.way.price;
+        if self.by_price.len() <= price {
+            self.by_price.resize_with(price + 1, Vec::new);
         }
-        self.0[price].push(open);
+        self.by_price[price].push(open);
+        self.len += 1;
     }
 
-    fn pop(&mut self) -> Option<(usize, Open)> {
-        let price = self.0.iter().position(|of_a_price| !of_a_price.is_empty())?;
-        self.0[price].pop().map(|open| (price, open))
+    /// What the cheapest one weighs.
+    fn cheapest(&self) -> usize {
+        self.by_price.iter().position(|of_a_price| !of_a_price.is_empty()).unwrap_or_default()
+    }
+
+    /// The cheapest one, or the dearest one where there are many.
+    fn pop(&mut self) -> Option<Open> {
+        let is_some = |of_a_price: &Vec<Open>| !of_a_price.is_empty();
+        let price = match self.len {
+            0..MANY => self.by_price.iter().position(is_some)?,
+            _ => self.by_price.iter().rposition(is_some)?,
+        };
+        self.len -= 1;
+        self.by_price[price].pop()
+    }
+}
+
+/// The hashes of what has been seen, which need not be hashed again.
+type Seen = HashSet<u64, BuildHasherDefault<AsItIs>>;
+
+/// A number is its own hash.
+#[derive(Default)]
+struct AsItIs(u64);
+
+impl Hasher for AsItIs {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|byte| self.0 = self.0.rotate_left(8) ^ u64::from(*byte));
+    }
+
+    fn write_u64(&mut self, number: u64) {
+        self.0 = number;
     }
 }
 
@@ -55,9 +111,10 @@ struct Search<'a> {
     world: &'a World,
     memo: Memo,
     mutation: Option<Mutation>,
-    seen: BTreeSet<u64>,
-    /// By the number of the state that they led to; none to the beginning.
-    steps: Vec<Option<Step>>,
+    seen: Seen,
+    situations: Seen,
+    /// By the number of the state that they led to; to the beginning leads none, and something stands for it.
+    steps: Vec<Step>,
     frontier: Frontier,
     explored: Explored,
 }
@@ -76,19 +133,24 @@ pub fn explore(
     let failed =
         |what| Box::new(Counterexample { world: world.name, what, steps: Vec::new(), states: 0, price: 0 });
     let begin = State::begin(world, &mut memo).map_err(failed)?;
-    let (seen, explored) = (BTreeSet::new(), Explored::default());
+    let (seen, situations, explored) = (Seen::default(), Seen::default(), Explored::default());
     let (steps, frontier) = (Vec::new(), Frontier::default());
-    let mut search = Search { world, memo, mutation, seen, steps, frontier, explored };
-    search.visit(begin, None, USER, 0)?;
-    while search.explored.states < most {
-        let Some((price, Open { state, step, current })) = search.frontier.pop() else {
+    let mut search = Search { world, memo, mutation, seen, situations, steps, frontier, explored };
+    let nowhere = Step { from: 0, choice: 0 };
+    search.visit(begin, Way { step: nowhere, depth: 0, price: 0, current: USER })?;
+    loop {
+        if search.explored.states >= most.min(u64::from(u32::MAX)) {
+            search.explored.price = search.frontier.cheapest();
+            break;
+        }
+        let Some(Open { state, choice, way }) = search.frontier.pop() else {
             search.explored.complete = true;
             break;
         };
         search.explored.steps += 1;
-        match state.after(world, &mut search.memo, step.choice) {
-            Ok(next) => search.visit(next, Some(step), current, price)?,
-            Err(what) => return Err(search.counterexample(what, Some(&step), price)),
+        match state.after(world, &mut search.memo, choice) {
+            Ok(next) => search.visit(next, way)?,
+            Err(what) => return Err(search.counterexample(what, way)),
         }
     }
     Ok(search.explored)
@@ -96,17 +158,16 @@ pub fn explore(
 
 impl Search<'_> {
     /// Judges a state in which nothing is left to happen; of another one notes what can happen next.
-    fn visit(
-        &mut self,
-        state: State,
-        step: Option<Step>,
-        current: u64,
-        price: usize,
-    ) -> Result<(), Box<Counterexample>> {
+    fn visit(&mut self, state: State, way: Way) -> Result<(), Box<Counterexample>> {
         if !self.seen.insert(state.hash()) {
             return Ok(());
         }
-        let depth = step.as_ref().map_or(0, |step| step.depth);
+        let Way { step, depth, price, current } = way;
+        let situation = state.hash_of_situation();
+        if self.situations.insert(situation) {
+            self.explored.situations += 1;
+            self.explored.all_situations ^= situation;
+        }
         self.explored.states += 1;
         self.explored.price = self.explored.price.max(price);
         let offer = state.offer(self.world);
@@ -114,47 +175,45 @@ impl Search<'_> {
             self.explored.rests += 1;
             self.explored.depth = self.explored.depth.max(depth);
             if let Err(what) = state.judge(self.world, &mut self.memo) {
-                return Err(self.counterexample(what, step.as_ref(), price));
+                return Err(self.counterexample(what, way));
             }
         }
-        let place = self.steps.len();
+        let from = u32::try_from(self.steps.len()).unwrap_or(u32::MAX);
         self.steps.push(step);
         let state = Rc::new(state);
         let of_current = || offer.choices.iter().filter(|choice| state.actor(**choice) == current);
         let goes_on = of_current().next().is_some();
         let weight = |is_write: bool| if is_write { PRICES[0] } else { PRICES[1] };
         let preemption = weight(of_current().any(|choice| state.is_write(*choice)));
-        for choice in offer.choices.iter().copied().rev() {
+        for (number, choice) in offer.choices.iter().copied().enumerate().rev() {
             let actor = state.actor(choice);
             let is_preempted = !offer.is_alone && goes_on && actor != current && current != USER;
             let preemption = if is_preempted { preemption } else { 0 };
             let fault = if is_plain(choice) { 0 } else { weight(state.is_write(choice)) };
             // What meets nobody is no turn of its own.
             let current = if offer.is_alone { current } else { actor };
-            let step = Step { from: place, choice, depth: depth + 1 };
-            let open = Open { state: state.clone(), step, current };
-            self.frontier.push(price + preemption + fault, open);
+            let step = Step { from, choice: u16::try_from(number).unwrap_or(u16::MAX) };
+            let way = Way { step, depth: depth + 1, price: price + preemption + fault, current };
+            self.frontier.push(Open { state: state.clone(), choice, way });
         }
         Ok(())
     }
 
     /// Lives through the way to a state again, to tell it.
-    fn counterexample(&self, what: String, last: Option<&Step>, price: usize) -> Box<Counterexample> {
-        let mut choices = Vec::new();
-        let mut step = last;
-        while let Some(Step { from, choice, .. }) = step {
-            choices.push(*choice);
-            step = self.steps.get(*from).and_then(Option::as_ref);
-        }
+    fn counterexample(&self, what: String, way: Way) -> Box<Counterexample> {
+        let before = |step: &Step| self.steps.get(step.from as usize).copied();
+        let mut steps: Vec<Step> = std::iter::successors(Some(way.step), before).take(way.depth).collect();
+        steps.reverse();
         let mut memo = Memo::new(self.world, self.mutation);
         let mut told = Vec::new();
         let mut state = State::begin(self.world, &mut memo).ok();
-        for choice in choices.into_iter().rev() {
+        for Step { choice, .. } in steps {
             let Some(before) = state else { break };
+            let choice = before.offer(self.world).choices[usize::from(choice)];
             told.push(before.describe(self.world, choice));
             state = before.after(self.world, &mut memo, choice).ok();
         }
         let (world, states) = (self.world.name, self.explored.states);
-        Box::new(Counterexample { world, what, steps: told, states, price })
+        Box::new(Counterexample { world, what, steps: told, states, price: way.price })
     }
 }

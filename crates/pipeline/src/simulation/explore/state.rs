@@ -8,7 +8,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::process::{Answer, End, Memo, Process, Request, Work};
+use super::process::{Answer, End, Memo, Process, Request, Work, hash_of};
 use super::{Budget, World};
 use crate::keys::{Animation, Key};
 use crate::manifest::Manifest;
@@ -19,7 +19,7 @@ use crate::{Error, Timestamp};
 /// When the story begins.
 const EPOCH: Timestamp = Timestamp(1_000_000_000_000);
 
-/// Between two acts of the user; no clock moves otherwise.
+/// Between two acts of the user; the store's clock moves with them alone.
 const APART: Duration = Duration::from_secs(1);
 
 /// Between two sweeps, once all has come to rest: longer than the sweep's patience with any frame.
@@ -147,8 +147,22 @@ impl State {
         hasher.finish()
     }
 
+    /// Tells apart what can be seen from outside: what the bucket holds, and what every invocation asks for next.
+    pub(super) fn hash_of_situation(&self) -> u64 {
+        let asks =
+            |process: &Arc<Process>| hash_of(&(&process.request_id, process.attempt, process.standing.asks));
+        let asked = self.processes.iter().map(asks).fold(0, u64::wrapping_add);
+        hash_of(&(self.contents.hash, self.acted, self.budget, self.needs_sweep, asked, self.ghosts.len()))
+    }
+
+    /// The store's clock.
     fn now(&self) -> Timestamp {
         EPOCH.after(APART * u32::try_from(self.acted).unwrap_or(u32::MAX) + self.ahead)
+    }
+
+    /// What the clock of an invocation shows, from its beginning to its end: it runs behind the store's.
+    fn start(&self) -> Timestamp {
+        EPOCH.after(self.ahead)
     }
 
     /// All that can happen next; nothing when the world has come to rest. If a request meets no other, now or later, it
@@ -295,18 +309,18 @@ impl State {
                 None
             }
         };
-        let now = self.now();
+        let (now, start) = (self.now(), self.start());
         let (work, id, attempt) = (process.work.clone(), process.request_id.clone(), process.attempt + 1);
         let next = match answer {
             Some(answer) => memo.answer(process, slot, answer, now),
-            None => memo.begin(work.clone(), id.clone(), attempt, now),
+            None => memo.begin(work.clone(), id.clone(), attempt, start),
         };
         match &next.standing.end {
-            None => self.processes[place] = Arc::new(next),
+            None => self.processes[place] = next,
             Some(Ok(())) => _ = self.processes.swap_remove(place),
             Some(Err(End::Bug(what))) => return Err(format!("an invocation failed for good: {what}")),
             Some(Err(End::TryAgain)) if attempt <= ATTEMPTS => {
-                self.processes[place] = Arc::new(memo.begin(work, id, attempt, now));
+                self.processes[place] = memo.begin(work, id, attempt, start);
             }
             Some(Err(End::TryAgain)) => {
                 self.processes.swap_remove(place);
@@ -382,8 +396,8 @@ impl State {
         for _ in 0..copies {
             let number = Arc::make_mut(&mut self.contents).fire(key);
             let id = format!("{key}#{number}").into();
-            let process = memo.begin(work.clone(), id, 1, self.now());
-            self.processes.push(Arc::new(process));
+            let process = memo.begin(work.clone(), id, 1, self.start());
+            self.processes.push(process);
         }
         Ok(())
     }
@@ -434,8 +448,8 @@ impl State {
             state.ahead += SWEEPS_APART;
             let number = Arc::make_mut(&mut state.contents).fire("sweep");
             let id = format!("sweep#{number}").into();
-            let sweep = memo.begin(Work::Sweep, id, 1, state.now());
-            state.processes.push(Arc::new(sweep));
+            let sweep = memo.begin(Work::Sweep, id, 1, state.start());
+            state.processes.push(sweep);
             state = state.at_rest(world, memo)?;
         }
         check(&state).map_err(|what| format!("after {SWEEPS} sweeps: {what}"))

@@ -17,6 +17,15 @@ pub struct World {
     pub(super) is_cut: bool,
     /// What may go wrong.
     pub budget: Budget,
+    /// Whether invocations are told apart by all that has happened to them, not only by what they go on with.
+    pub(super) remembers: bool,
+}
+
+impl World {
+    /// The same one, in which nothing is forgotten: its search comes to the same, and takes longer.
+    pub fn remembering(&self) -> Self {
+        World { remembers: true, ..self.clone() }
+    }
 }
 
 /// Nothing goes wrong but the order.
@@ -35,7 +44,7 @@ const GONE: Option<&str> = None;
 
 fn world(name: &'static str, past: usize, budget: Budget, acts: &[(&str, Option<&'static str>)]) -> World {
     let acts = acts.iter().map(|(file, text)| (format!("scripts/a/{file}"), *text)).collect();
-    World { name, acts, past, is_claimed_again: false, is_cut: false, budget }
+    World { name, acts, past, is_claimed_again: false, is_cut: false, budget, remembers: false }
 }
 
 /// Between the past and what follows an assembler is woken that has nothing to do: events may come late, and again.
