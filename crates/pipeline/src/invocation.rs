@@ -104,7 +104,7 @@ pub struct Invocation<'a, S, C> {
 /// What an invocation has said last that its doings depend on: see [`Invocation::goes_on_with`].
 #[cfg(any(test, feature = "simulation"))]
 #[derive(Debug, Default)]
-pub struct Carried(std::sync::Mutex<Option<String>>);
+pub(crate) struct Carried(std::sync::Mutex<Option<String>>);
 
 #[cfg(any(test, feature = "simulation"))]
 impl Carried {

@@ -35,7 +35,7 @@ pub use error::{Cause, Error, Result, found};
 pub use failure::record_failure;
 pub use fold::fold;
 #[cfg(any(test, feature = "simulation"))]
-pub use invocation::Carried;
+pub(crate) use invocation::Carried;
 pub use invocation::{Invocation, Mutation, Policy};
 pub use reconcile::reconcile;
 pub use render::{Drawing, Joining, Renderer, render_frame};

@@ -8,7 +8,7 @@
 //! Clocks of invocations stand still, and pauses end at once: whoever pauses is one whose next request takes effect later,
 //! and that is searched anyway.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::future::Future;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::num::NonZeroU64;
@@ -130,9 +130,9 @@ pub(super) struct Process {
 /// What is known of invocations by the hash of what has happened to them.
 #[derive(Debug)]
 pub(super) struct Memo {
-    standings: HashMap<u64, Arc<Standing>>,
+    standings: BTreeMap<u64, Arc<Standing>>,
     /// By the hash of what had happened before, and of an answer.
-    answered: HashMap<u64, Arc<Process>>,
+    answered: BTreeMap<u64, Arc<Process>>,
     manner: Manner,
 }
 
@@ -155,7 +155,7 @@ pub(super) fn hash_of(what: &impl Hash) -> u64 {
 impl Memo {
     pub(super) fn new(world: &World, mutation: Option<Mutation>) -> Self {
         let manner = Manner { mutation, is_cut: world.is_cut, remembers: world.remembers };
-        let (standings, answered) = (HashMap::new(), HashMap::new());
+        let (standings, answered) = (BTreeMap::new(), BTreeMap::new());
         Memo { standings, answered, manner }
     }
 

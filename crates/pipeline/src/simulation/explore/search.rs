@@ -9,7 +9,6 @@
 //! Of a state that has been visited a hash is kept, and the step that led to it. Whole states are kept of those from which
 //! steps are still to be tried; if that becomes too many, the last ones come first, which leaves few behind.
 
-use std::collections::HashSet;
 use std::hash::{BuildHasherDefault, Hasher};
 use std::rc::Rc;
 
@@ -86,7 +85,8 @@ impl Frontier {
 }
 
 /// The hashes of what has been seen, which need not be hashed again.
-type Seen = HashSet<u64, BuildHasherDefault<AsItIs>>;
+#[expect(clippy::disallowed_types, reason = "nothing is drawn by lot here, and there are many millions")]
+type Seen = std::collections::HashSet<u64, BuildHasherDefault<AsItIs>>;
 
 /// A number is its own hash.
 #[derive(Default)]
