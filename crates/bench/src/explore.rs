@@ -19,7 +19,7 @@ use rayfold_pipeline::simulation::explore::{
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// States of a world after which its search ends; its line then says so
-    #[arg(long, default_value_t = 400_000)]
+    #[arg(long, default_value_t = 7_000_000)]
     most: u64,
     /// States of a world up to which it is searched once more, with nothing forgotten, to see the same
     #[arg(long, default_value_t = 1_000_000)]
@@ -86,8 +86,7 @@ struct Searched {
 impl Searched {
     /// Whether both have come to the same situations.
     fn agrees(&self) -> bool {
-        let seen = |explored: &Explored| (explored.situations, explored.all_situations, explored.rests);
-        self.remembering.as_ref().is_none_or(|remembering| seen(remembering) == seen(&self.explored))
+        self.remembering.as_ref().is_none_or(|remembering| remembering.saw_the_same_as(&self.explored))
     }
 }
 

@@ -10,7 +10,7 @@
 //! way to one from an older listing, and at rest manifest and GIF are what the scripts say, after sweeps where something
 //! happened that only they heal.
 //!
-//! Not searched: listings that mix two moments, time (clocks move with the user's acts alone), the deadline. The seeds of
+//! Not searched: listings that mix two moments, time (the store's clock moves with the user's acts alone, others stand still), the deadline. The seeds of
 //! [`super::run`] have these.
 
 mod order;
@@ -63,6 +63,14 @@ pub struct Explored {
     pub price: usize,
     /// There was no more to see; else the search ended at its limit.
     pub complete: bool,
+}
+
+impl Explored {
+    /// Whether both searches have come to the same situations, and to as many states of rest.
+    pub fn saw_the_same_as(&self, other: &Explored) -> bool {
+        let seen = |of: &Explored| (of.situations, of.all_situations, of.rests);
+        seen(self) == seen(other)
+    }
 }
 
 /// A guarantee that does not hold, and how it came to that.

@@ -4,7 +4,6 @@
 //! write lands later; its answer may get lost. Reads that are lost are sent again and are no other than late ones.
 
 use std::collections::BTreeMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -136,15 +135,12 @@ impl State {
 
     /// Tells states apart.
     pub(super) fn hash(&self) -> u64 {
-        let mut hasher = DefaultHasher::new();
-        (self.contents.hash, self.acted, self.ahead, self.budget, self.needs_sweep, self.gif_of)
-            .hash(&mut hasher);
         let spread = |hash: u64| hash.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31);
         let listed = |process: &Arc<Process>| process.hash ^ process.listed.0;
         let processes = self.processes.iter().map(listed).map(spread).fold(0, u64::wrapping_add);
         let ghosts = self.ghosts.iter().map(|ghost| ghost.hash).map(spread).fold(1, u64::wrapping_add);
-        (processes, ghosts).hash(&mut hasher);
-        hasher.finish()
+        let State { acted, ahead, budget, needs_sweep, gif_of, .. } = self;
+        hash_of(&(self.contents.hash, acted, ahead, budget, needs_sweep, gif_of, processes, ghosts))
     }
 
     /// Tells apart what can be seen from outside: what the bucket holds, and what every invocation asks for next.
@@ -474,10 +470,8 @@ impl State {
             Choice::User(_) => USER,
             Choice::Ghost(place) => self.ghosts[place].hash,
             Choice::Request { process, .. } => {
-                let mut hasher = DefaultHasher::new();
                 let process = &self.processes[process];
-                (&process.request_id, process.attempt).hash(&mut hasher);
-                hasher.finish()
+                hash_of(&(&process.request_id, process.attempt))
             }
         }
     }
@@ -531,17 +525,13 @@ impl Contents {
         let count = self.fired.entry(key.to_owned()).or_default();
         *count += 1;
         let count = *count;
-        let mut hasher = DefaultHasher::new();
-        ("fired", key, count).hash(&mut hasher);
-        self.hash ^= hasher.finish();
+        self.hash ^= hash_of(&("fired", key, count));
         count
     }
 
     fn hash_of(&self, key: &str) -> u64 {
         let Ok(info) = self.bucket.head(key) else { return 0 };
-        let mut hasher = DefaultHasher::new();
-        (key, info.etag.as_str(), info.modified, &info.metadata).hash(&mut hasher);
-        hasher.finish()
+        hash_of(&(key, info.etag.as_str(), info.modified, &info.metadata))
     }
 }
 
