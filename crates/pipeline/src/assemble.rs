@@ -174,6 +174,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             self.goes_on_with(&(&tally.quiet, tally.lease));
             let known = self.manifest(animation).await?;
             let gif = self.head(&animation.gif()).await?;
+            let seen = gif.as_ref().map(|gif| gif.etag.clone());
             let observation = self.observe(animation, known.as_ref()).await?;
             let observed = &observation.manifest;
             self.goes_on_with(&(&tally.quiet, tally.lease, &known, &gif, &observation));
@@ -218,10 +219,14 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 Next::End => {
                     let Some(mut held) = tally.lease.take() else { return Ok(tally.of(&observed.head)) };
                     self.give_up_lease(&observed.head, &mut held).await?;
-                    // Whoever found the lease taken was woken for a manifest that was written before.
-                    let now = self.head(&animation.manifest()).await?;
-                    let is_blind = self.breaks(Mutation::AssemblerDoesNotLookAgain);
-                    if is_blind || now.is_some_and(|now| now.etag == known.etag) {
+                    if self.breaks(Mutation::AssemblerDoesNotLookAgain) {
+                        return Ok(tally.of(&observed.head));
+                    }
+                    // Whoever found the lease taken was woken for a manifest that was written before, and may have deleted
+                    // the GIF before, which was there when this round looked.
+                    let etag = |info: Option<ObjectInfo>| info.map(|info| info.etag);
+                    let manifest = etag(self.head(&animation.manifest()).await?);
+                    if manifest == Some(known.etag) && etag(self.head(&animation.gif()).await?) == seen {
                         return Ok(tally.of(&observed.head));
                     }
                 }

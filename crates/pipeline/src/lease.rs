@@ -1,9 +1,10 @@
 //! At most one assembler an animation waits or builds at a time: an object that says which, and until when.
 //!
-//! The holder deletes it when there is nothing left to do, and then looks at the manifest once more: whoever has found the
-//! lease taken, and left, was woken for a manifest that was written before. A holder that dies leaves it to the platform's
-//! next attempt at its event, which has the same request id, or for anyone to take over once its time is up. A holder whose
-//! GIF is not finished in its time leaves it to whoever comes next, and says so in it.
+//! The holder deletes it when there is nothing left to do, and then looks at the manifest and the GIF once more: whoever has
+//! found the lease taken, and left, was woken for a manifest that was written before, and may have deleted the GIF before. A
+//! holder that dies leaves it to the platform's next attempt at its event, which has the same request id, or for anyone to
+//! take over once its time is up. A holder whose GIF is not finished in its time leaves it to whoever comes next, and says so
+//! in it.
 
 use std::time::Duration;
 

@@ -312,6 +312,24 @@ async fn an_assembler_looks_once_more_after_it_has_given_the_lease_back() {
     assert!(world.gif().unwrap().contains("frame 2"));
 }
 
+/// Another assembler looked when a frame could not be drawn. It has taken away the GIF of the set that came next, found the
+/// lease taken, and left.
+#[tokio::test]
+async fn a_gif_that_goes_while_its_assembler_gives_the_lease_back_is_built_again() {
+    let world = World::new();
+    let claim = world.announced(2).await;
+    let mut done = false;
+    world.meddle(move |request, bucket, _| {
+        if request == "delete frames/film/@assembler.json" && !std::mem::replace(&mut done, true) {
+            assert!(bucket.delete(GIF));
+        }
+    });
+    let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!(assembled.built, 2);
+    assert_eq!(world.gif(), Some(world.film_of(2)));
+    assert!(world.is_at_rest());
+}
+
 /// The manifest says so, however it was before; only where there is no manifest either nothing is written.
 #[tokio::test]
 async fn a_set_whose_scripts_are_gone_is_empty_and_one_without_a_manifest_gets_one() {

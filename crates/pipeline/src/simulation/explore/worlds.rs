@@ -88,6 +88,8 @@ pub fn worlds() -> Vec<World> {
     let big = [("1.txt", BIG)];
     let big_overwrite = [("1.txt", BIG), ("1.txt", A)];
     let big_revert = [("1.txt", BIG), ("1.txt", A), ("1.txt", BIG)];
+    let mended = [("1.txt", A), ("1.txt", Some("bad 0")), ("1.txt", B)];
+    let refilled = [("1.txt", A), ("1.txt", GONE), ("1.txt", B)];
     let joined = [("1.txt", A), ("2.txt", A), ("1.txt", B)];
     let announced = [("animation.json", Some("{\"frames\": 2}")), ("1.txt", A), ("2.txt", A)];
     vec![
@@ -124,6 +126,8 @@ pub fn worlds() -> Vec<World> {
         )),
         world("one of two frames, changed and changed back", 2, CALM, &waiting),
         world("the second of two frames comes, goes and comes back", 2, CALM, &returning),
+        world("one frame, broken and mended when done", 1, CALM, &mended),
+        world("one frame, deleted and uploaded again when done", 1, CALM, &refilled),
         world("three frames, the last one new", 2, kill, &three),
         world("three frames", 1, CALM, &three),
         world("a frame in bands", 0, CALM, &big),
