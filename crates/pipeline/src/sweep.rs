@@ -300,12 +300,14 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let gone = receipts().filter(superseded).filter(|found| old(found.modified));
         let used_up: BTreeSet<_> = receipts().filter(is_used_up).filter_map(banded_frame).collect();
         for found in gone.chain(receipts().filter(is_used_up)) {
-            split_before |= matches!(found.receipt, Receipt::Split { .. } | Receipt::Cut { .. });
-            doomed.push(Key::Receipt { animation: animation.clone(), receipt: found.receipt.clone() });
+            let key = Key::Receipt { animation: animation.clone(), receipt: found.receipt.clone() };
+            split_before |= tells_of_parts(&key);
+            doomed.push(key);
         }
         if split_before {
             let parts = self.list_ranges(ListRequest::all(animation.parts()), Vec::new()).await?;
             let frames = self.list_ranges(ListRequest::all(animation.frames()), Vec::new()).await?;
+            let mut young = BTreeSet::new();
             for listed in parts.into_iter().chain(frames) {
                 let Ok(key) = listed.key.parse::<Key>() else { continue };
                 if key.animation() != animation {
@@ -315,17 +317,31 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                     part_of(&key).is_some_and(|(name, version)| current.get(name) != Some(&version));
                 let has_woken = matches!(&key, Key::Band { name, tag, part, .. }
                     if used_up.contains(&(name, &tag.version, *part)));
-                if is_superseded && old(listed.modified) || has_woken {
+                if is_superseded && !old(listed.modified) {
+                    young.extend(version_of(&key).map(|(name, version)| (name.clone(), version.clone())));
+                } else if is_superseded || has_woken {
                     doomed.push(key);
                 }
             }
+            // The frames of a split script come after it was split: without what says that it is, nobody would look for them.
+            doomed.retain(|key| {
+                version_of(key)
+                    .is_none_or(|(name, version)| !young.contains(&(name.clone(), version.clone())))
+            });
             doomed.sort();
             doomed.dedup();
         }
         visit.deleted += doomed.len() as u64;
-        let deletions: Vec<_> =
-            doomed.iter().map(|key| async { self.delete(&key.to_string()).await }).collect();
-        stream::iter(deletions).buffer_unordered(self.policy.concurrency).try_collect::<Vec<()>>().await?;
+        // For the same reason that goes last, when the rest has gone.
+        let (last, first): (Vec<&Key>, Vec<&Key>) = doomed.iter().partition(|key| tells_of_parts(key));
+        for keys in [first, last] {
+            let deletions: Vec<_> =
+                keys.into_iter().map(|key| async { self.delete(&key.to_string()).await }).collect();
+            stream::iter(deletions)
+                .buffer_unordered(self.policy.concurrency)
+                .try_collect::<Vec<()>>()
+                .await?;
+        }
         self.wake_returned(animation, &current, &doomed, visit).await
     }
 
@@ -395,6 +411,29 @@ fn part_of(key: &Key) -> Option<(&ScriptName, &ETag)> {
         } => Some((name, &tag.version)),
         _ => None,
     }
+}
+
+/// The script and version that a key is about which the sweep may delete.
+fn version_of(key: &Key) -> Option<(&ScriptName, &ETag)> {
+    match key {
+        Key::Receipt {
+            receipt:
+                Receipt::Frame { name, tag, part: None }
+                | Receipt::Fault { name, tag, part: None }
+                | Receipt::Begun { name, tag, part: None, .. }
+                | Receipt::Cut { name, tag, part: None, .. }
+                | Receipt::Band { name, tag, part: None, .. }
+                | Receipt::Split { name, tag, .. },
+            ..
+        } => Some((name, &tag.version)),
+        key => part_of(key),
+    }
+}
+
+/// Whether it says that there is something below a script's version, or below `parts/`, that a listing of the results does
+/// not show.
+fn tells_of_parts(key: &Key) -> bool {
+    matches!(key, Key::Receipt { receipt: Receipt::Split { .. } | Receipt::Cut { .. }, .. })
 }
 
 /// The frame that a cut or a band belongs to.

@@ -264,19 +264,73 @@ async fn what_came_of_older_versions_goes_after_a_week_and_all_else_stays() {
     // Of an animation below this one.
     world.put("parts/film/sub/1@0-p1/1.json", "{}");
     world.later(6 * DAY).await;
-    let there = world.left(&["frames/", "parts/"]);
     assert_eq!(world.visit().await.deleted, 0);
     // Its event may still be to come.
     let new_part = format!("parts/film/1@{before}-p1/2.json");
     world.put(&new_part, "{}");
-    world.later(2 * DAY).await;
-    let visit = world.visit().await;
-    let is_kept = |key: &String| {
-        key.contains("/2@") || key.contains("film/sub/") || key.contains(now.as_str()) || *key == new_part
+    let is_kept =
+        |key: &String| key.contains("/2@") || key.contains("film/sub/") || key.contains(now.as_str());
+    let check = async |of_version: &ETag, deleted: u64| {
+        let there = world.left(&["frames/", "parts/"]);
+        let kept: Vec<_> = there
+            .into_iter()
+            .filter(|key| is_kept(key) || *of_version != before && key.contains(before.as_str()))
+            .collect();
+        assert_eq!(world.visit().await.deleted, deleted);
+        assert_eq!(world.left(&["frames/", "parts/"]), kept);
     };
-    let kept: Vec<_> = there.iter().filter(|key| is_kept(key)).cloned().collect();
-    assert_eq!(world.left(&["frames/", "parts/"]), kept);
-    // The split, its two frames, what says that one has begun, one part; the error and what says that it has begun.
-    assert_eq!(visit.deleted, 7);
-    assert_eq!(there.len() - kept.len(), 7);
+    // The error, and what says that it has begun.
+    world.later(2 * DAY).await;
+    check(&ETag::new("0"), 2).await;
+    // The split, its two frames, what says that one has begun, and both parts.
+    world.until(&new_part, 7 * DAY).await;
+    check(&before, 6).await;
+}
+
+/// The frames of a script are drawn after it was split, some of them days after.
+#[tokio::test]
+async fn what_came_late_of_an_older_version_goes_too() {
+    let world = World::new();
+    let before = world.put(SCRIPT, "split 2 1");
+    world.render(SCRIPT).await;
+    for key in world.keys("parts/") {
+        world.later(DAY).await;
+        world.render(&key).await;
+    }
+    world.put(SCRIPT, "frame 1");
+    world.render(SCRIPT).await;
+    let split = format!("frames/film/1@{before}-p1.split-2");
+    let last = world.keys(&format!("frames/film/1@{before}-p1/")).pop().unwrap();
+    for (key, expected) in [(&split, 0), (&last, 5)] {
+        world.until(key, 7 * DAY - MOMENT).await;
+        assert_eq!(world.visit().await.deleted, 0, "{key}");
+        world.later(MOMENT).await;
+        assert_eq!(world.visit().await.deleted, expected, "{key}");
+    }
+    let left = world.left(&["frames/", "parts/"]);
+    assert!(!left.iter().any(|key| key.contains(before.as_str())), "{left:?}");
+}
+
+/// What says that there are parts goes last: a sweep that has found it gone does not look for them.
+#[tokio::test]
+async fn what_a_sweep_could_not_delete_the_next_one_does() {
+    let world = World::new();
+    let before = world.put(SCRIPT, "split 2 1");
+    world.render(SCRIPT).await;
+    for key in world.keys("parts/") {
+        world.render(&key).await;
+    }
+    world.put(SCRIPT, "frame 1");
+    world.render(SCRIPT).await;
+    world.later(7 * DAY).await;
+    world.refuse(|request| {
+        let is_it = request.starts_with("delete ") && request.ends_with("/2.png");
+        is_it.then(|| Error::Refused { key: "k".into(), source: "no".into() })
+    });
+    let visited = world.with(async |invocation| visit(invocation, &World::film()).await).await;
+    assert!(matches!(visited, Err(Error::Refused { .. })), "{visited:?}");
+    world.refuse(|_| None);
+    world.visit().await;
+    let left = world.left(&["frames/", "parts/"]);
+    assert!(!left.iter().any(|key| key.contains(before.as_str())), "{left:?}");
 }
