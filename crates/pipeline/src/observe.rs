@@ -156,14 +156,19 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     async fn add_parts(&self, animation: &Animation, scripts: &Scripts, results: &mut Results) -> Result<()> {
         let current: BTreeMap<&ScriptName, &ETag> =
             scripts.found.iter().map(|script| (&script.name, &script.version)).collect();
-        let splits = results.receipts.iter().filter_map(|found| match &found.receipt {
-            Receipt::Split { name, tag, count } if current.get(name) == Some(&&tag.version) => {
-                Some((name, tag, count.get()))
-            }
-            _ => None,
-        });
+        // Renderers of different pixels may both have split a script: what came of it is listed once.
+        let splits: BTreeMap<&ScriptName, (&Tag, u64)> = results
+            .receipts
+            .iter()
+            .filter_map(|found| match &found.receipt {
+                Receipt::Split { name, tag, count } if current.get(name) == Some(&&tag.version) => {
+                    Some((name, (tag, count.get())))
+                }
+                _ => None,
+            })
+            .collect();
         let frames = animation.frames();
-        let listings = splits.map(|(name, tag, count)| {
+        let listings = splits.into_iter().map(|(name, (tag, count))| {
             let below = format!("{frames}{name}@{tag}/");
             let prefix = format!("{frames}{}", Tag::receipts_of(name, &tag.version));
             let bounds = if count > MARK_EVERY as u64 {

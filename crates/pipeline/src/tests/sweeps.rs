@@ -334,3 +334,19 @@ async fn what_a_sweep_could_not_delete_the_next_one_does() {
     let left = world.left(&["frames/", "parts/"]);
     assert!(!left.iter().any(|key| key.contains(before.as_str())), "{left:?}");
 }
+
+/// Two renderers of different pixels have split the script at once.
+#[tokio::test]
+async fn an_attempt_counts_once_however_often_its_script_was_split() {
+    let world = World::new();
+    let version = world.put(SCRIPT, "split 2 1");
+    for pixels in [1, 2] {
+        world.put(&format!("frames/film/1@{version}-p{pixels}.split-2"), "");
+    }
+    world.with(async |invocation| crate::fold::fold(invocation, &World::film()).await.unwrap()).await;
+    for attempt in 1..=2 {
+        world.put(&format!("frames/film/1@{version}-p1/1.begun-{attempt}"), "");
+    }
+    world.later(15 * MINUTE).await;
+    assert_eq!(world.visit().await, woken(2));
+}
