@@ -224,7 +224,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         };
         let known = self.manifest(&animation).await?;
         let gif = self.head(&animation.gif()).await?;
-        let manifest = self.observe(&animation, known.as_ref()).await?.manifest;
+        let mut manifest = self.observe(&animation, known.as_ref()).await?.manifest;
+        // No listing shows which GIF was built.
+        manifest.head.gif = known.and_then(|known| known.manifest.head.gif);
         let head = &manifest.head;
         let current = head.status == Status::Done && head.generation == claimed;
         if !current || is_current(head, gif.as_ref()) {

@@ -187,3 +187,15 @@ async fn a_failed_assembly_is_left_to_the_sweep_when_another_may_do() {
     assert_eq!(world.record(&claim, None, End::TimedOut).await, Recorded::LeftToSweep);
     assert_eq!(world.manifest().head.status, Status::Failed);
 }
+
+/// Somebody has put half of it in its place, with what it says of itself.
+#[tokio::test]
+async fn a_set_is_refused_though_there_is_what_looks_like_its_gif() {
+    let world = World::new();
+    let claim = world.claimed().await;
+    world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!(world.record(&claim, None, End::TimedOut).await, Recorded::LeftToSweep);
+    world.put_gif(world.manifest().head.generation.as_str());
+    let recorded = world.record(&claim, None, End::TimedOut).await;
+    assert!(matches!(recorded, Recorded::Refused(_)), "{recorded:?}");
+}
