@@ -6,6 +6,8 @@ mod builds;
 mod failures;
 mod folds;
 mod observations;
+mod orders;
+mod pages;
 mod refusals;
 mod renders;
 mod sweeps;
