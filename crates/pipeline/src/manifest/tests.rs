@@ -54,6 +54,8 @@ fn changes() -> Vec<(&'static str, bool, Manifest)> {
     change("generation", true, &|m| m.head.generation = Generation::new(&"0b".repeat(16)).unwrap());
     change("settings", true, &|m| m.head.settings.version = Some(ETag::new("s")));
     change("rejected", true, &|m| m.head.rejected.clear());
+    change("a rejected file", true, &|m| m.head.rejected[0].key.push('x'));
+    change("what is wrong with it", true, &|m| m.head.rejected[0].problem.push('x'));
     change("excess", true, &|m| m.head.excess = None);
     change("refusal", true, &|m| m.head.refusal = None);
     change("refusal's receipt", true, &|m| m.head.refusal = Some(fault("other", None)));

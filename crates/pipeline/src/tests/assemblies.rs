@@ -240,9 +240,14 @@ async fn an_assembler_leaves_the_gif_to_whoever_holds_the_lease() {
     let until = world.store.clock.now().after(seconds(600)).0;
     let lease = format!(r#"{{"assembler":"another","until":{until}}}"#);
     world.put(LEASE, &lease);
+    let claims = world.keys("assemblies/");
+    let put_at: Vec<_> = claims.iter().map(|claim| world.modified(claim)).collect();
+    world.later(seconds(1)).await;
     let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
     assert_eq!((assembled.rounds, assembled.built), (1, 0));
     assert_eq!(world.store.bucket.lock().unwrap().get(LEASE).unwrap().body, lease);
+    let is_old = |(claim, put_at): (&String, Timestamp)| world.modified(claim) == put_at;
+    assert!(world.keys("assemblies/") == claims && claims.iter().zip(put_at).all(is_old), "nobody is woken");
     // Nor does it give it back when there is nothing to build.
     world.put_gif(world.manifest().head.generation.as_str());
     world.assemble(&world.joiner(), &claim).await.unwrap();
@@ -382,4 +387,71 @@ async fn a_lease_that_the_listing_does_not_show_is_not_asked_for() {
     let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
     assert_eq!((assembled.rounds, world.gif()), (2, None));
     assert_eq!(asked.load(Ordering::Relaxed), 0);
+}
+
+/// Somebody has put half of it in its place, and then the set was another one for a moment.
+#[tokio::test]
+async fn the_gif_of_a_set_is_remembered_while_the_set_changes_and_changes_back() {
+    let world = World::new();
+    let claim = world.announced(2).await;
+    world.assemble(&world.joiner(), &claim).await.unwrap();
+    world.put_gif(world.manifest().head.generation.as_str());
+    world.upload("1.txt", "frame 7").await;
+    world.upload("1.txt", "frame 1").await;
+    assert_eq!(world.assemble(&world.joiner(), &claim).await.unwrap().built, 1);
+    assert_eq!(world.gif(), Some(world.film_of(2)));
+}
+
+/// Of a GIF that is put, and of one that is found.
+#[tokio::test]
+async fn a_gif_is_named_in_no_manifest_but_the_one_that_was_read() {
+    for is_found in [false, true] {
+        let world = World::new();
+        let claim = world.announced(2).await;
+        if is_found {
+            world.put_gif(world.manifest().head.generation.as_str());
+        }
+        let revision = world.manifest().head.revision;
+        let mut done = false;
+        world.meddle(move |request, bucket, now| {
+            if request == "put manifests/film.json" && !std::mem::replace(&mut done, true) {
+                super::folds::write_next(bucket, now);
+            }
+        });
+        world.assemble(&world.joiner(), &claim).await.unwrap();
+        assert_eq!(world.manifest().head.revision, revision + 1, "{is_found}");
+        assert!(world.gif().is_some() && world.is_at_rest(), "{is_found}");
+    }
+}
+
+/// The one that cannot be read goes, though this renderer would draw another one.
+#[tokio::test]
+async fn a_frame_of_older_pixels_that_is_none_is_drawn_again() {
+    let mut world = World::new();
+    let claim = world.announced(1).await;
+    let frame = world.keys("frames/film/1@").pop().unwrap();
+    world.put(&frame, "garbled");
+    world.policy = Policy::new(2);
+    let mut asked = 0;
+    let before = frame.clone();
+    world.meddle(move |request, _, _| {
+        asked += u32::from(request == format!("get {before}"));
+        assert!(asked < 9, "read again and again");
+    });
+    assert_eq!(world.assemble(&world.joiner(), &claim).await.unwrap().status, Status::Rendering);
+    assert!(!world.keys("frames/").contains(&frame));
+}
+
+/// The last script by name was uploaded first.
+#[tokio::test]
+async fn a_set_is_quiet_when_its_newest_script_is() {
+    let world = World::new();
+    world.upload("2.txt", "frame 2").await;
+    world.later(seconds(60)).await;
+    world.upload("1.txt", "frame 1").await;
+    let claim = world.keys("assemblies/").pop().unwrap();
+    let quiet = world.modified("scripts/film/1.txt").after(world.policy.quiet);
+    let left = quiet.since(world.store.clock.now());
+    assert!(left > Duration::ZERO);
+    assert_eq!(world.assemble(&world.joiner(), &claim).await.unwrap().waited, left);
 }

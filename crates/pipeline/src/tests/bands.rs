@@ -375,3 +375,40 @@ async fn of_two_cuts_each_is_whole_by_itself() {
     assert_eq!(world.render(&woken(&version, "1-of-3", 0)).await, Outcome::Present);
     let Frame { state: FrameState::Done { .. }, .. } = world.manifest().frames[0] else { panic!() };
 }
+
+/// The tenth is not the second.
+#[tokio::test]
+async fn many_bands_are_put_together_from_the_top() {
+    let world = World::new();
+    let key = format!("scripts/film/{NAME}.txt");
+    let version = world.put(&key, "big frame 1");
+    let drawer = Drawer { bands: NonZeroU64::new(12).unwrap() };
+    let render = async |key: &str| {
+        world.with(async |invocation| render_frame(invocation, &drawer, key).await.unwrap().outcome).await
+    };
+    render(&key).await;
+    let bands = world.keys("parts/");
+    assert_eq!(bands.len(), 12);
+    for band in &bands {
+        render(band).await;
+    }
+    assert_eq!(world.frame(&version).unwrap(), picture(&name(), b"big frame 1", None));
+}
+
+/// Each had listed before the other one put its band.
+#[tokio::test]
+async fn of_those_who_put_the_last_bands_at_once_one_finds_all() {
+    let world = World::new();
+    let version = world.upload_big("big frame 1").await;
+    world.draw_bands(&[woken(&version, "1-of-3", 0)]).await;
+    let other = banded(&version, "3-of-3");
+    let image = format!("3-of-3 of {}", picture(&name(), b"big frame 1", None));
+    let own = format!("put {}", banded(&version, "2-of-3"));
+    world.meddle(move |request, bucket, now| {
+        if request == own {
+            bucket.put(now, &other, image.clone().into(), PutOptions::always()).unwrap();
+        }
+    });
+    assert_eq!(world.render(&woken(&version, "2-of-3", 0)).await, Outcome::Drawn);
+    assert_eq!(world.frame(&version).unwrap(), picture(&name(), b"big frame 1", None));
+}

@@ -188,6 +188,16 @@ async fn a_failed_assembly_is_left_to_the_sweep_when_another_may_do() {
     assert_eq!(world.manifest().head.status, Status::Failed);
 }
 
+/// So that the user sees that it is there, and to come.
+#[tokio::test]
+async fn the_manifest_shows_a_frame_that_is_left_to_the_sweep() {
+    let world = World::new();
+    let version = world.pending();
+    world.tried(&format!("1@{version}-p1"), 3, 2);
+    assert_eq!(world.record(SCRIPT, None, busy()).await, Recorded::LeftToSweep);
+    assert_eq!(world.manifest().frames[0].state, FrameState::Pending);
+}
+
 /// Somebody has put half of it in its place, with what it says of itself.
 #[tokio::test]
 async fn a_set_is_refused_though_there_is_what_looks_like_its_gif() {
@@ -198,4 +208,14 @@ async fn a_set_is_refused_though_there_is_what_looks_like_its_gif() {
     world.put_gif(world.manifest().head.generation.as_str());
     let recorded = world.record(&claim, None, End::TimedOut).await;
     assert!(matches!(recorded, Recorded::Refused(_)), "{recorded:?}");
+}
+
+/// No manifest shows yet that there is another script.
+#[tokio::test]
+async fn no_set_is_refused_that_is_another_one_by_now() {
+    let world = World::new();
+    let claim = world.claimed().await;
+    world.put("scripts/film/3.txt", "frame 3");
+    assert_eq!(world.record(&claim, None, End::TimedOut).await, Recorded::LeftToSweep);
+    assert!(!world.keys("frames/").iter().any(|key| key.ends_with(".error.json")));
 }

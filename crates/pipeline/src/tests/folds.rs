@@ -29,7 +29,7 @@ fn name() -> ScriptName {
 }
 
 /// Someone else writes the next revision, which says the same.
-fn write_next(bucket: &mut Bucket, now: Timestamp) {
+pub(super) fn write_next(bucket: &mut Bucket, now: Timestamp) {
     let mut manifest = Manifest::decode(&World::film(), &bucket.get(MANIFEST).unwrap().body).unwrap();
     manifest.head.revision += 1;
     manifest.head.writer = "someone".to_owned();
@@ -169,6 +169,35 @@ async fn what_is_uploaded_while_the_manifest_is_written_is_listed_again_for() {
     assert_eq!(world.fold(&Fact::Fold, Age::Old).await, Folded::Committed);
     let head = world.manifest().head;
     assert_eq!((head.total, head.revision), (2, 2));
+}
+
+/// After 16 commits it is others' turn for a while, and then this one's again.
+#[tokio::test]
+async fn a_fold_goes_on_for_as_long_as_scripts_come() {
+    let world = World::new();
+    world.put(SCRIPT, "hang 1");
+    let mut number = 1;
+    world.meddle(move |request, bucket, now| {
+        if request == "put manifests/film.json" && number < 40 {
+            number += 1;
+            let key = format!("scripts/film/{number}.txt");
+            bucket.put(now, &key, "hang 2".into(), PutOptions::always()).unwrap();
+        }
+    });
+    assert_eq!(world.fold(&Fact::Fold, Age::Old).await, Folded::Committed);
+    assert_eq!(world.manifest().head.total, 40);
+}
+
+#[tokio::test]
+async fn a_claim_is_named_by_the_revision_and_the_set_that_it_is_put_for() {
+    let world = World::new();
+    for text in ["frame 1", "frame 2", "bad 3"] {
+        world.upload("1.txt", text).await;
+        let head = world.manifest().head;
+        let claim = format!("assemblies/film/{}-{}.json", head.revision, head.generation.as_str());
+        assert!(world.keys("assemblies/").contains(&claim), "{:?}", world.keys("assemblies/"));
+    }
+    assert_eq!(world.keys("assemblies/").len(), 3);
 }
 
 #[tokio::test]

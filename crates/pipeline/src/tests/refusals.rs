@@ -112,3 +112,22 @@ async fn a_manifest_that_may_not_be_put_is_said_at_once() {
     assert!(matches!(rendering, Err(Error::Refused { .. })), "{rendering:?}");
     assert_eq!(world.keys("assemblies/"), [""; 0]);
 }
+
+/// The platform's next attempt at an event runs until later: nobody is to take the lease over from it before.
+#[tokio::test]
+async fn a_lease_is_ones_own_for_as_long_as_one_may_run() {
+    for there in
+        [None, Some(r#"{"assembler":"request-0","until":1000}"#), Some(r#"{"assembler":"a","until":1000}"#)]
+    {
+        let mut world = World::new();
+        let deadline = world.store.clock.now().after(Duration::from_secs(900));
+        world.deadline = Some(deadline);
+        if let Some(there) = there {
+            world.put(LEASE, there);
+        }
+        let taken = world.with(async |invocation| invocation.take_lease(&World::film()).await).await;
+        assert!(taken.unwrap().is_some(), "{there:?}");
+        let body = world.store.bucket.lock().unwrap().get(LEASE).unwrap().body;
+        assert_eq!(body, format!(r#"{{"assembler":"request-0","until":{}}}"#, deadline.0), "{there:?}");
+    }
+}

@@ -305,3 +305,85 @@ async fn a_retry_folds_only_what_it_has_changed() {
     assert_eq!(retried, Retried { deleted: 0, woken: 1, reassembled: false });
     assert_eq!(world.keys("manifests/"), [""; 0]);
 }
+
+/// It was drawn by somebody else meanwhile.
+#[tokio::test]
+async fn a_frame_is_put_only_where_there_is_none() {
+    let world = World::new();
+    let version = world.put(SCRIPT, "frame 1");
+    let frame = format!("frames/film/1@{version}-p1.png");
+    let key = frame.clone();
+    world.meddle(move |request, bucket, now| {
+        if request == format!("put {key}") && bucket.head(&key).is_err() {
+            bucket.put(now, &key, "another's".into(), PutOptions::always()).unwrap();
+        }
+    });
+    world.render(SCRIPT).await;
+    assert_eq!(world.store.bucket.lock().unwrap().get(&frame).unwrap().body, "another's");
+}
+
+/// Else a frame that ends whoever draws it would be woken for ever.
+#[tokio::test]
+async fn an_attempt_counts_when_it_has_begun_however_it_ends() {
+    let mut world = World::new();
+    let version = world.put(SCRIPT, "frame 1");
+    world.deadline = Some(world.store.clock.now().after(ms(10_000)));
+    let painter = Painter::new(&world, None);
+    let error = world.paint(&painter, &format!("retries/film/1@{version}-p1/2")).await.unwrap_err();
+    assert!(error.is_out_of_time(), "{error:?}");
+    assert_eq!(world.keys("frames/"), [format!("frames/film/1@{version}-p1.begun-2")]);
+}
+
+#[tokio::test]
+async fn of_an_animation_with_too_many_frames_no_parts_are_drawn_either() {
+    let mut world = World::new();
+    world.policy.most_frames = Some(2);
+    world.upload("1.txt", "split 2 1").await;
+    world.upload("2.txt", "frame 2").await;
+    assert_eq!(world.manifest().head.total, 3);
+    for part in world.keys("parts/") {
+        assert_eq!(world.render(&part).await, Outcome::TooMany);
+    }
+}
+
+/// There is an error of it.
+#[tokio::test]
+async fn parts_that_cannot_be_drawn_are_not_woken_anew() {
+    let world = World::new();
+    world.upload("1.txt", "split 2 1").await;
+    let parts = world.keys("parts/");
+    let error = parts[1].replacen("parts/", "frames/", 1).replacen("/2.json", "/2.error.json", 1);
+    world.put(&error, r#"{"message":"why"}"#);
+    world.later(ms(9_000)).await;
+    world.put(SCRIPT, "split 2 1");
+    world.later(ms(9_000)).await;
+    let before: Vec<_> = parts.iter().map(|key| world.modified(key)).collect();
+    world.render(SCRIPT).await;
+    let is_new: Vec<_> = parts.iter().zip(before).map(|(key, before)| world.modified(key) > before).collect();
+    assert_eq!(is_new, [true, false]);
+}
+
+#[tokio::test]
+async fn all_is_drawn_again_whatever_pixels_there_are() {
+    let mut world = World::new();
+    let version = world.put(SCRIPT, "frame 1");
+    world.render(SCRIPT).await;
+    world.policy = Policy::new(2);
+    world.put(&format!("frames/film/1@{version}-p2.png"), "frame");
+    let retried = world.again(Scope::All).await;
+    assert_eq!(retried, Retried { deleted: 2, woken: 1, reassembled: false });
+    assert_eq!(world.render(&world.keys("retries/")[0]).await, Outcome::Drawn);
+}
+
+#[tokio::test]
+async fn the_attempts_at_other_parts_are_still_counted_when_one_is_drawn_again() {
+    let world = World::new();
+    world.upload("1.txt", "split 2 1").await;
+    let version = world.store.bucket.lock().unwrap().head(SCRIPT).unwrap().etag;
+    let begun = |number: u64| format!("frames/film/1@{version}-p1/{number}.begun-1");
+    world.put(&begun(1), "");
+    world.put(&begun(2), "");
+    let name = ScriptName::new("1").unwrap();
+    world.again(Scope::Frame(&name, NonZeroU64::new(1))).await;
+    assert_eq!(world.keys(&format!("frames/film/1@{version}-p1/")), [begun(2)]);
+}

@@ -350,3 +350,139 @@ async fn an_attempt_counts_once_however_often_its_script_was_split() {
     world.later(15 * MINUTE).await;
     assert_eq!(world.visit().await, woken(2));
 }
+
+/// Scripts that were uploaded at once are drawn one after the other: what is not drawn yet is not stuck.
+#[tokio::test]
+async fn as_long_as_frames_are_drawn_nothing_is_stuck() {
+    let world = World::new();
+    stuck(&world).await;
+    world.put("scripts/film/3.txt", "frame 3");
+    world.later(10 * MINUTE).await;
+    world.render("scripts/film/3.txt").await;
+    let frame = world.keys("frames/film/3@").pop().unwrap();
+    world.until(&frame, 15 * MINUTE - MOMENT).await;
+    assert_eq!(world.visit().await.woken, 0);
+    world.later(MOMENT).await;
+    assert_eq!(world.visit().await.woken, 2);
+}
+
+/// Whoever has begun last may still be at it, or wait to be tried again.
+#[tokio::test]
+async fn a_frame_is_not_given_up_before_the_next_attempt_would_be_due() {
+    let world = World::new();
+    let version = world.put(SCRIPT, "hang 1");
+    world.with(async |invocation| crate::fold::fold(invocation, &World::film()).await.unwrap()).await;
+    let retry = |attempt: u64| format!("retries/film/1@{version}-p1/{attempt}");
+    for attempt in 1..=3 {
+        world.put(&retry(attempt), "");
+        world.put(&format!("frames/film/1@{version}-p1.begun-{attempt}"), "");
+    }
+    world.until(&retry(3), 60 * MINUTE - MOMENT).await;
+    assert_eq!(world.visit().await, Visit::default());
+    world.later(MOMENT).await;
+    assert_eq!(world.visit().await.given_up, 1);
+}
+
+#[tokio::test]
+async fn retries_of_an_animation_below_do_not_count() {
+    let world = World::new();
+    let [version, _] = stuck(&world).await;
+    world.until(SCRIPT, 15 * MINUTE).await;
+    world.put(&format!("retries/film/sub/1@{version}-p1/5"), "");
+    assert_eq!(world.visit().await, woken(2));
+    assert!(world.keys("retries/").contains(&format!("retries/film/1@{version}-p1/1")));
+}
+
+#[tokio::test]
+async fn attempts_at_a_part_that_is_drawn_are_not_forgotten() {
+    let mut world = World::new();
+    let version = world.put(SCRIPT, "split 2 1");
+    world.render(SCRIPT).await;
+    world.render(&format!("parts/film/1@{version}-p1/1.json")).await;
+    let begun = |number: u64| format!("frames/film/1@{version}-p1/{number}.begun-1");
+    world.put(&begun(1), "");
+    world.put(&begun(2), "");
+    world.policy.attempts_count = false;
+    world.later(15 * MINUTE).await;
+    assert_eq!(world.visit().await.woken, 1);
+    let left = world.keys("frames/");
+    assert!(left.contains(&begun(1)) && !left.contains(&begun(2)), "{left:?}");
+}
+
+/// Another renderer's error of the same frame can be read.
+#[tokio::test]
+async fn of_two_error_receipts_only_that_goes_which_cannot_be_read() {
+    let world = World::new();
+    let version = world.put(SCRIPT, "bad 1");
+    let key = |pixels: u32| format!("frames/film/1@{version}-p{pixels}.error.json");
+    world.put(&key(1), r#"{"message":"why"}"#);
+    world.put(&key(2), "garbage");
+    world.with(async |invocation| crate::fold::fold(invocation, &World::film()).await.unwrap()).await;
+    assert_eq!(world.visit().await.deleted, 1);
+    assert_eq!(world.keys("frames/"), [key(1)]);
+}
+
+/// Whoever fails at it in each attempt refuses the set that the claim names.
+#[tokio::test]
+async fn a_claim_of_the_sweeps_names_the_set_that_is_there_now() {
+    let world = World::new();
+    world.upload("1.txt", "hang 1").await;
+    let revision = world.manifest().head.revision;
+    world.put("scripts/film/2.txt", "hang 2");
+    assert!(world.visit().await.claimed);
+    let claims = world.keys("assemblies/");
+    world.with(async |invocation| crate::fold::fold(invocation, &World::film()).await.unwrap()).await;
+    let generation = world.manifest().head.generation;
+    let claim = format!("assemblies/film/{revision}-{}.json", generation.as_str());
+    assert!(claims.contains(&claim), "{claims:?}");
+}
+
+/// Whatever came of it: an error, frames of its own, or a cut.
+#[tokio::test]
+async fn whatever_goes_of_a_script_that_comes_back_the_script_is_woken() {
+    for text in ["bad 1", "split 2 1", "big frame 1"] {
+        let world = World::new();
+        let before = world.put(SCRIPT, text);
+        world.render(SCRIPT).await;
+        world.upload("1.txt", "frame 2").await;
+        world.later(8 * DAY).await;
+        world.meddle(move |request, bucket, now| {
+            if request.starts_with("delete ") && bucket.head(SCRIPT).unwrap().etag != before {
+                bucket.put(now, SCRIPT, text.into(), PutOptions::always()).unwrap();
+            }
+        });
+        assert_eq!(world.visit().await.woken, 1, "{text}");
+    }
+}
+
+/// Its scripts were uploaded before the others.
+#[tokio::test]
+async fn frames_are_woken_while_more_are_to_be_uploaded() {
+    let world = World::new();
+    world.put("scripts/film/animation.json", r#"{"frames": 3}"#);
+    stuck(&world).await;
+    assert_eq!(world.manifest().head.status, Status::Waiting);
+    world.later(15 * MINUTE).await;
+    assert_eq!(world.visit().await, woken(2));
+}
+
+/// Somebody has put half of it in its place, with what it says of itself.
+#[tokio::test]
+async fn a_claim_is_put_where_the_gif_is_not_the_one_that_was_built() {
+    let world = World::new();
+    let claim = world.announced(1).await;
+    world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!(world.visit().await, Visit::default());
+    world.put_gif(world.manifest().head.generation.as_str());
+    assert!(world.visit().await.claimed);
+}
+
+/// A refusal does not change the set.
+#[tokio::test]
+async fn a_claim_is_put_where_the_manifest_does_not_show_that_the_set_is_refused() {
+    let world = World::new();
+    let claim = world.announced(1).await;
+    world.assemble(&world.joiner(), &claim).await.unwrap();
+    refusals(&world, r#"{"message":"why"}"#);
+    assert!(world.visit().await.claimed);
+}
