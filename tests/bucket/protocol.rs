@@ -44,6 +44,37 @@ async fn presigned_urls_work_until_they_expire() {
     assert!(answer.starts_with("HTTP/1.1 403") && answer.contains("AccessDenied"), "{answer}");
 }
 
+/// Whoever is given a URL could else read by it what its signer may read.
+#[tokio::test]
+async fn a_presigned_url_takes_no_header_that_was_not_signed() {
+    let stage = stage().await;
+    stage.put("secret", "told to nobody").await;
+    let upload = stage.client.create_multipart_upload().bucket(BUCKET).key("a").send().await.unwrap();
+    let put = stage.client.put_object().bucket(BUCKET).key("a").presigned(stage.presigning()).await.unwrap();
+    let part = stage.client.upload_part().bucket(BUCKET).key("a").part_number(1);
+    let part = part.upload_id(upload.upload_id().unwrap()).presigned(stage.presigning()).await.unwrap();
+    let send = async |url: &str, header: &str| {
+        let line = format!("PUT {} HTTP/1.1\r\nHost: {}\r\n", path(url), host(&stage));
+        stage.raw(&format!("{line}{header}\r\nContent-Length: 0\r\nConnection: close\r\n\r\n")).await
+    };
+    for url in [put.uri(), part.uri()] {
+        for header in ["x-amz-copy-source: /films/secret", "X-Amz-Meta-Kind: other"] {
+            let answer = send(url, header).await;
+            assert!(answer.starts_with("HTTP/1.1 403") && answer.contains("were not signed"), "{answer}");
+        }
+        let answer = send(url, "Content-Type: text/plain").await;
+        assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+    }
+    assert_eq!(stage.get("a").await, b"");
+    // What the signer has signed is to be sent.
+    let named = stage.client.put_object().bucket(BUCKET).key("named").metadata("kind", "film");
+    let named = named.presigned(stage.presigning()).await.unwrap();
+    let headers: Vec<String> = named.headers().map(|(name, value)| format!("{name}: {value}")).collect();
+    assert!(headers.contains(&"x-amz-meta-kind: film".to_owned()), "{headers:?}");
+    let answer = send(named.uri(), &headers.join("\r\n")).await;
+    assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+}
+
 #[tokio::test]
 async fn unsigned_requests_are_denied() {
     let stage = stage().await;

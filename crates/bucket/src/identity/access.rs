@@ -14,6 +14,7 @@ use s3s::{S3Error, S3ErrorCode, S3Request, S3Result, s3_error};
 
 use super::caller::{Caller, Identities};
 use super::session::Session;
+use super::signed;
 use crate::policy::{self, Scope, Verdict, needed};
 
 /// Where a session's token is, unless it is in the URL.
@@ -51,6 +52,9 @@ impl S3Access for Access {
         let query = cx.uri().query().unwrap_or_default();
         let query: Vec<(String, String)> =
             serde_urlencoded::from_str(query).map_err(|e| s3_error!(e, InvalidURI))?;
+        if cx.s3_op().name() != "PostObject" {
+            signed::check(cx.headers(), &query)?;
+        }
         let token = match cx.headers().get(TOKEN) {
             Some(token) => Some(token.to_str().map_err(|e| s3_error!(e, InvalidToken))?),
             None => parameter(&query, "X-Amz-Security-Token")?,
@@ -161,7 +165,7 @@ fn arn(bucket: &str, key: Option<&str>) -> String {
 }
 
 /// A parameter that may stand there once: with two, one would be judged and the other be used.
-fn parameter<'a>(query: &'a [(String, String)], name: &str) -> S3Result<Option<&'a str>> {
+pub(super) fn parameter<'a>(query: &'a [(String, String)], name: &str) -> S3Result<Option<&'a str>> {
     let mut found = query.iter().filter(|(other, _)| other == name).map(|(_, value)| value.as_str());
     let first = found.next();
     if found.next().is_some() {
