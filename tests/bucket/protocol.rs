@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use aws_sdk_s3::presigning::PresigningConfig;
+use aws_sdk_s3::primitives::{DateTime, DateTimeFormat};
 use aws_sdk_s3::types::ObjectCannedAcl;
 use rayfold_bucket::{Error, Server};
 
@@ -73,6 +74,19 @@ async fn a_presigned_url_takes_no_header_that_was_not_signed() {
     assert!(headers.contains(&"x-amz-meta-kind: film".to_owned()), "{headers:?}");
     let answer = send(named.uri(), &headers.join("\r\n")).await;
     assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+}
+
+#[tokio::test]
+async fn every_answer_has_the_time_in_it() {
+    let stage = stage().await;
+    let request = format!("GET / HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", host(&stage));
+    let before = std::time::SystemTime::now();
+    let answer = stage.raw(&request).await;
+    let dates: Vec<&str> = answer.lines().filter_map(|line| line.strip_prefix("date: ")).collect();
+    let [date] = dates[..] else { panic!("{answer}") };
+    let date = DateTime::from_str(date, DateTimeFormat::HttpDate);
+    let lag = date.unwrap().secs() - DateTime::from(before).secs();
+    assert!((0..=5).contains(&lag), "{lag} s: {answer}");
 }
 
 #[tokio::test]

@@ -1,16 +1,19 @@
-//! What stands before S3's protocol: each request gets an id and is told where it came from, and every answer names the id.
+//! What stands before S3's protocol: each request gets an id and is told where it came from, and every answer names the id
+//! and the time.
 //!
 //! A panic is answered, too: bytes from strangers pass through code that is not ours.
 
 use std::net::IpAddr;
 use std::panic::AssertUnwindSafe;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::SystemTime;
 
 use futures_util::FutureExt;
 use hyper::body::Incoming;
-use hyper::header::{HeaderName, HeaderValue};
+use hyper::header::{DATE, HeaderName, HeaderValue};
 use hyper::service::Service;
 use hyper::{Request, Response};
+use s3s::dto::{Timestamp, TimestampFormat};
 use s3s::service::S3Service;
 use s3s::{Body, HttpError, s3_error};
 
@@ -62,7 +65,33 @@ impl Service<Request<Incoming>> for Front {
             if let Ok(header) = header {
                 response.headers_mut().insert(REQUEST_ID, header);
             }
+            // Hyper's own stands still when the clock is set back, and clients set theirs by it to sign.
+            if let Some(now) = date(SystemTime::now()) {
+                response.headers_mut().insert(DATE, now);
+            }
             Ok(response)
         })
+    }
+}
+
+/// As a header has it.
+fn date(time: SystemTime) -> Option<HeaderValue> {
+    let mut text = Vec::new();
+    Timestamp::from(time).format(TimestampFormat::HttpDate, &mut text).ok()?;
+    HeaderValue::from_bytes(&text).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn the_date_goes_back_with_the_clock() {
+        let at = |seconds| date(SystemTime::UNIX_EPOCH + Duration::from_secs(seconds)).unwrap();
+        assert_eq!(at(1_795_494_907), "Tue, 24 Nov 2026 04:35:07 GMT");
+        assert_eq!(at(1_795_494_906), "Tue, 24 Nov 2026 04:35:06 GMT");
+        assert_eq!(at(784_887_151), "Tue, 15 Nov 1994 08:12:31 GMT");
     }
 }
