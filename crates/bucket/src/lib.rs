@@ -31,6 +31,7 @@ mod host;
 mod identity;
 mod options;
 pub mod policy;
+pub mod private;
 mod records;
 mod server;
 mod service;

@@ -12,7 +12,7 @@ use std::fs::{self, File};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
-use rayfold_bucket::{Options, Webhook};
+use rayfold_bucket::{Options, Webhook, private};
 use rayfold_pipeline::store::Connection;
 
 use crate::credentials::Credentials;
@@ -22,6 +22,9 @@ use crate::region::REGION;
 
 /// What MinIO keeps at the top of its data.
 const MINIO_MARK: &str = ".minio.sys";
+
+/// What lies in a data folder.
+const OURS: [&str; 5] = ["lock", "credentials.json", "minio.log", "bucket", "objects"];
 
 /// Which S3 server.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -100,10 +103,18 @@ impl S3Server {
             return Err(Error::MinioFolder(data.to_owned()));
         }
         let objects = kind.objects(data);
-        fs::create_dir_all(&objects).map_err(Error::file(&objects))?;
+        private::make(data).map_err(Error::file(data))?;
+        private::make(&objects).map_err(Error::file(&objects))?;
         let lock_path = data.join("lock");
         let lock = File::create(&lock_path).map_err(Error::file(&lock_path))?;
         lock.try_lock().map_err(|_| Error::DataInUse(data.to_owned()))?;
+        if holds_nothing_else(data).map_err(Error::file(data))? {
+            private::close(data);
+        }
+        // The store built in looks after its own.
+        if objects.join(MINIO_MARK).exists() {
+            private::close(&objects);
+        }
         let credentials = Credentials::kept(data)?;
         let running = match kind {
             StoreKind::BuiltIn => {
@@ -204,8 +215,20 @@ impl S3Server {
     }
 }
 
+/// Whether all in the folder is ours. A folder of the user's that we were only put into stays open to whom it was.
+fn holds_nothing_else(data: &Path) -> std::io::Result<bool> {
+    for entry in fs::read_dir(data)? {
+        if !OURS.iter().any(|ours| entry.as_ref().is_ok_and(|entry| entry.file_name() == *ours)) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
 #[cfg(test)]
 mod tests {
+    use std::os::unix::fs::PermissionsExt;
+
     use super::*;
     use crate::http::any_port;
 
@@ -227,6 +250,30 @@ mod tests {
         server.stop().await;
         assert!(!answers(address).await);
         assert_eq!(*started(data.path()).await.unwrap().credentials(), credentials);
+    }
+
+    #[tokio::test]
+    async fn other_users_read_neither_scripts_nor_keys() {
+        let mode = |path: &Path| path.metadata().unwrap().permissions().mode() & 0o777;
+        let folder = tempfile::tempdir().unwrap();
+        let data = folder.path().join("data");
+        started(&data).await.unwrap().stop().await;
+        let inner = StoreKind::BuiltIn.objects(&data);
+        assert_eq!((mode(&data), mode(&inner)), (0o700, 0o700));
+        for file in ["bucket/database", "bucket/journal", "credentials.json"] {
+            assert_eq!(mode(&data.join(file)), 0o600, "{file}");
+        }
+        // As an earlier version made them.
+        for folder in [&data, &inner] {
+            fs::set_permissions(folder, fs::Permissions::from_mode(0o755)).unwrap();
+        }
+        started(&data).await.unwrap().stop().await;
+        assert_eq!((mode(&data), mode(&inner)), (0o700, 0o700));
+        // A folder with something else in it is not ours alone.
+        fs::set_permissions(&data, fs::Permissions::from_mode(0o755)).unwrap();
+        fs::write(data.join("scene.txt"), "").unwrap();
+        started(&data).await.unwrap().stop().await;
+        assert_eq!((mode(&data), mode(&inner)), (0o755, 0o700));
     }
 
     #[tokio::test]

@@ -7,11 +7,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::{self, Write};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::{Deserialize, Serialize};
+
+use crate::private;
 
 /// Ids of one run: its number above, a counter below.
 const COUNTER_BITS: u32 = 40;
@@ -85,7 +88,7 @@ impl Bodies {
     pub(crate) fn create(&self) -> io::Result<NewBody> {
         let id = self.id();
         let path = self.path(id);
-        let create = || File::options().write(true).create_new(true).open(&path);
+        let create = || File::options().write(true).create_new(true).mode(private::FILE).open(&path);
         let file = match create() {
             Err(missing) if missing.kind() == io::ErrorKind::NotFound => {
                 match fs::create_dir(parent(&path)) {

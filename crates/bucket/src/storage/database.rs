@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io;
 use std::ops::Range;
-use std::os::unix::fs::FileExt;
+use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -17,6 +17,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use redb::{Builder, Database, Durability, StorageBackend};
 
 use super::table::{Batch, Snapshot, Table, View};
+use crate::private;
 
 /// Pages kept in memory. Most of a store of a hundred thousand objects.
 const CACHE_BYTES: usize = 64 * 1024 * 1024;
@@ -33,8 +34,9 @@ pub(super) struct Open {
 impl Open {
     /// Opens or makes the database; gives the number of the journal's last entry that it holds.
     pub(super) fn at(path: &Path) -> Result<(Self, u64), redb::Error> {
-        let file = File::options().read(true).write(true).create(true).truncate(false).open(path)?;
-        let disk = Disk::new(file);
+        let mut options = File::options();
+        options.read(true).write(true).create(true).truncate(false).mode(private::FILE);
+        let disk = Disk::new(options.open(path)?);
         let database =
             Builder::new().set_cache_size(CACHE_BYTES).create_with_backend(Handle(disk.clone()))?;
         let open = Self { database, disk };

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::bodies::sync_folder;
-use crate::{Error, Result};
+use crate::{Error, Result, private};
 
 /// The newest format that is read and written here.
 const FORMAT: u32 = 1;
@@ -29,13 +29,13 @@ pub(super) struct Folder {
 }
 
 impl Folder {
-    /// Takes the folder; makes it when missing.
+    /// Takes the folder; makes it when missing. Then it is closed to other users.
     ///
     /// # Errors
     /// [`Error::DataInUse`], [`Error::NotOurs`], [`Error::Newer`], [`Error::File`].
     pub(super) fn take(path: &Path) -> Result<Self> {
         let found = recognise(path)?;
-        fs::create_dir_all(path).map_err(Error::file(path))?;
+        private::make(path).map_err(Error::file(path))?;
         let lock_path = path.join(LOCK);
         let lock = File::options()
             .write(true)
@@ -48,6 +48,7 @@ impl Folder {
             Err(TryLockError::WouldBlock) => return Err(Error::DataInUse(path.to_owned())),
             Err(TryLockError::Error(source)) => return Err(Error::File { path: lock_path, source }),
         }
+        private::close(path);
         let folder = Self { path: path.to_owned(), _lock: lock };
         let bodies = folder.bodies();
         fs::create_dir_all(&bodies).map_err(Error::file(&bodies))?;
@@ -139,6 +140,25 @@ mod tests {
         assert!(matches!(Folder::take(&data), Err(Error::DataInUse(path)) if path == data));
         drop(taken);
         Folder::take(&data).unwrap();
+    }
+
+    #[test]
+    fn other_users_do_not_look_into_a_folder_that_is_taken() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let mode = |path: &Path| path.metadata().unwrap().permissions().mode() & 0o777;
+        let set = |path: &Path| fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
+        let data = folder.path().join("new");
+        drop(Folder::take(&data).unwrap());
+        assert_eq!(mode(&data), 0o700);
+        // As an earlier version made it.
+        set(&data);
+        drop(Folder::take(&data).unwrap());
+        assert_eq!(mode(&data), 0o700);
+
+        set(folder.path());
+        assert!(matches!(Folder::take(folder.path()), Err(Error::NotOurs { .. })));
+        assert_eq!(mode(folder.path()), 0o755);
     }
 
     #[test]

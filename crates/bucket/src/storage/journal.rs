@@ -9,9 +9,12 @@
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
 use s3s::crypto::{Checksum, Crc64Nvme};
+
+use crate::private;
 
 const HEADER: usize = 24;
 
@@ -37,6 +40,7 @@ impl Journal {
             .write(true)
             .create(true)
             .truncate(false)
+            .mode(private::FILE)
             .open(path)
             .map_err(OpenError::File)?;
         let mut bytes = Vec::new();
