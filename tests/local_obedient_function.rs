@@ -34,10 +34,12 @@ fn main() {
 }
 
 fn call(api: &str, method: &str, path: &str, body: &str) -> Option<(String, String)> {
-    let mut stream = TcpStream::connect(api).ok()?;
+    let (host, base) = api.strip_prefix("http://")?.split_once('/')?;
+    let mut stream = TcpStream::connect(host).ok()?;
     let length = body.len();
-    let head =
-        format!("{method} /2018-06-01/runtime/{path} HTTP/1.1\r\nHost: {api}\r\nConnection: close\r\n");
+    let head = format!(
+        "{method} /{base}/2018-06-01/runtime/{path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n"
+    );
     write!(stream, "{head}Content-Length: {length}\r\n\r\n{body}").ok()?;
     let mut text = String::new();
     stream.read_to_string(&mut text).ok()?;

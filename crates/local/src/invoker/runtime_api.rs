@@ -2,6 +2,9 @@
 //!
 //! `GET …/invocation/next` waits for an invocation; `POST …/invocation/{id}/response` and `…/error` end it; `POST
 //! …/init/error` says that there will be none. A process handles one invocation at a time.
+//!
+//! Lambda's own is seen by its process alone. A port of this machine is seen by all of its users and by the pages of their
+//! browsers, so that here each path begins with a token that the process alone is told, and nothing from a page is heard.
 
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,13 +13,16 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use bytes::Bytes;
 use http_body_util::BodyExt;
 use hyper::body::Incoming;
+use hyper::header::{HOST, ORIGIN};
 use hyper::{Method, Request, Response, StatusCode};
 use serde_json::json;
 use tokio::sync::mpsc;
 
+use crate::credentials::token;
 use crate::error::Result;
 use crate::http::{Body, Server, any_port, full, json, listen};
 
+/// After the token.
 const BASE: &str = "/2018-06-01/runtime/";
 
 /// What `next` hands out.
@@ -45,12 +51,17 @@ pub(crate) enum Call {
 #[derive(Debug)]
 pub(crate) struct RuntimeApi {
     pub(crate) address: SocketAddr,
+    token: String,
     handouts: mpsc::UnboundedSender<Handout>,
     calls: mpsc::UnboundedReceiver<Call>,
     _server: Server,
 }
 
 struct Shared {
+    /// Its own address, as a request names it.
+    host: String,
+    /// What the path of each request begins with.
+    base: String,
     handouts: tokio::sync::Mutex<mpsc::UnboundedReceiver<Handout>>,
     calls: mpsc::UnboundedSender<Call>,
     in_hand: Mutex<Option<String>>,
@@ -61,7 +72,10 @@ impl RuntimeApi {
         let (listener, address) = listen(any_port()).await?;
         let (handouts, to_hand_out) = mpsc::unbounded_channel();
         let (to_caller, calls) = mpsc::unbounded_channel();
+        let token = token(20)?;
         let shared = Arc::new(Shared {
+            host: address.to_string(),
+            base: format!("/{token}{BASE}"),
             handouts: tokio::sync::Mutex::new(to_hand_out),
             calls: to_caller,
             in_hand: Mutex::default(),
@@ -70,7 +84,12 @@ impl RuntimeApi {
             let shared = shared.clone();
             async move { Some(shared.answer(request).await) }
         });
-        Ok(Self { address, handouts, calls, _server: server })
+        Ok(Self { address, token, handouts, calls, _server: server })
+    }
+
+    /// What the process is told; anybody else is not.
+    pub(crate) fn endpoint(&self) -> String {
+        format!("http://{}/{}", self.address, self.token)
     }
 
     pub(crate) fn hand_out(&self, handout: Handout) {
@@ -90,7 +109,12 @@ impl RuntimeApi {
 impl Shared {
     async fn answer(&self, request: Request<Incoming>) -> Response<Body> {
         let path = request.uri().path().to_owned();
-        let Some(rest) = path.strip_prefix(BASE) else { return not_found() };
+        let Some(rest) = path.strip_prefix(&self.base).filter(|_| !self.is_strange(&request)) else {
+            return json(
+                StatusCode::FORBIDDEN,
+                &json!({ "errorType": "Forbidden", "errorMessage": "not yours" }),
+            );
+        };
         let segments: Vec<&str> = rest.split('/').collect();
         match (request.method(), segments.as_slice()) {
             (&Method::GET, ["invocation", "next"]) => self.next().await,
@@ -108,6 +132,13 @@ impl Shared {
             },
             _ => not_found(),
         }
+    }
+
+    /// Whether a browser sends it, for a page or on behalf of one that claims our address for a name of its own.
+    fn is_strange(&self, request: &Request<Incoming>) -> bool {
+        let headers = request.headers();
+        headers.get(HOST).is_none_or(|host| host.as_bytes() != self.host.as_bytes())
+            || headers.keys().any(|name| *name == ORIGIN || name.as_str().starts_with("sec-fetch-"))
     }
 
     async fn next(&self) -> Response<Body> {
@@ -160,10 +191,16 @@ mod tests {
 
     use super::*;
 
-    async fn send(address: SocketAddr, head: &str, body: &str) -> String {
+    async fn send(api: &RuntimeApi, head: &str, body: &str) -> String {
+        let (method, path) = head.split_once(' ').unwrap();
+        let line = format!("{method} /{}/2018-06-01/{path}", api.token);
+        raw(api.address, &line, &format!("Host: {}\r\n", api.address), body).await
+    }
+
+    async fn raw(address: SocketAddr, line: &str, headers: &str, body: &str) -> String {
         let mut stream = tokio::net::TcpStream::connect(address).await.unwrap();
         let request = format!(
-            "{head} HTTP/1.1\r\nHost: runtime\r\nConnection: close\r\nContent-Length: {}\r\n\r\n{body}",
+            "{line} HTTP/1.1\r\n{headers}Connection: close\r\nContent-Length: {}\r\n\r\n{body}",
             body.len()
         );
         stream.write_all(request.as_bytes()).await.unwrap();
@@ -172,30 +209,34 @@ mod tests {
         answer
     }
 
-    #[tokio::test]
-    async fn an_invocation_is_handed_out_once_and_ended_by_its_own_id() {
-        let mut api = RuntimeApi::start().await.unwrap();
-        api.hand_out(Handout {
+    fn handout() -> Handout {
+        Handout {
             request_id: "id-1".into(),
             payload: Bytes::from_static(b"{\"a\":1}"),
             timeout: Duration::from_secs(3),
             function_arn: "arn:aws:lambda:us-east-1:000000000000:function:f".into(),
             trace_id: "Root=1-2-3".into(),
-        });
-        let next = send(api.address, "GET /2018-06-01/runtime/invocation/next", "").await;
+        }
+    }
+
+    #[tokio::test]
+    async fn an_invocation_is_handed_out_once_and_ended_by_its_own_id() {
+        let mut api = RuntimeApi::start().await.unwrap();
+        api.hand_out(handout());
+        let next = send(&api, "GET runtime/invocation/next", "").await;
         assert!(next.starts_with("HTTP/1.1 200"), "{next}");
         assert!(next.to_lowercase().contains("lambda-runtime-aws-request-id: id-1"), "{next}");
         for header in ["deadline-ms: 1", "invoked-function-arn: arn:aws", "trace-id: root="] {
             assert!(next.to_lowercase().contains(&format!("lambda-runtime-{header}")), "{header} in {next}");
         }
         assert!(next.ends_with("{\"a\":1}"));
-        let wrong = send(api.address, "POST /2018-06-01/runtime/invocation/id-2/response", "1").await;
+        let wrong = send(&api, "POST runtime/invocation/id-2/response", "1").await;
         assert!(wrong.starts_with("HTTP/1.1 400"), "{wrong}");
-        let right = send(api.address, "POST /2018-06-01/runtime/invocation/id-1/response", "1").await;
+        let right = send(&api, "POST runtime/invocation/id-1/response", "1").await;
         assert!(right.starts_with("HTTP/1.1 202"), "{right}");
-        let again = send(api.address, "POST /2018-06-01/runtime/invocation/id-1/error", "1").await;
+        let again = send(&api, "POST runtime/invocation/id-1/error", "1").await;
         assert!(again.starts_with("HTTP/1.1 400"), "{again}");
-        let elsewhere = send(api.address, "GET /2018-06-01/elsewhere", "").await;
+        let elsewhere = send(&api, "GET runtime/elsewhere", "").await;
         assert!(elsewhere.starts_with("HTTP/1.1 404"), "{elsewhere}");
         for call in [Call::Next, Call::Taken, Call::Response("1".into())] {
             assert_eq!(api.call().await, call);
@@ -205,8 +246,46 @@ mod tests {
     #[tokio::test]
     async fn a_process_that_cannot_start_says_so() {
         let mut api = RuntimeApi::start().await.unwrap();
-        let answer = send(api.address, "POST /2018-06-01/runtime/init/error", "{}").await;
+        let answer = send(&api, "POST runtime/init/error", "{}").await;
         assert!(answer.starts_with("HTTP/1.1 202"), "{answer}");
         assert_eq!(api.call().await, Call::InitError("{}".into()));
+    }
+
+    #[tokio::test]
+    async fn nobody_but_the_process_takes_an_invocation() {
+        let mut api = RuntimeApi::start().await.unwrap();
+        api.hand_out(handout());
+        let host = format!("Host: {}\r\n", api.address);
+        let (next, error) = ("2018-06-01/runtime/invocation/next", "2018-06-01/runtime/init/error");
+        let guess = "0".repeat(api.token.len());
+        // Without the token: another user of the machine.
+        for line in [
+            format!("GET /{next}"),
+            format!("GET /{guess}/{next}"),
+            format!("GET //{next}"),
+            format!("POST /{error}"),
+            format!("GET /{}", api.token),
+        ] {
+            let answer = raw(api.address, &line, &host, "").await;
+            assert!(answer.starts_with("HTTP/1.1 403"), "{line}: {answer}");
+        }
+        // With it: a page that has found it out, also one of a name that leads here.
+        let port = api.address.port();
+        for headers in [
+            format!("{host}Origin: http://{}\r\n", api.address),
+            format!("{host}Origin: null\r\n"),
+            format!("{host}Sec-Fetch-Mode: no-cors\r\n"),
+            format!("Host: page.example:{port}\r\n"),
+            format!("Host: localhost:{port}\r\n"),
+            "Host: 127.0.0.1\r\n".to_owned(),
+            String::new(),
+        ] {
+            let answer = raw(api.address, &format!("GET /{}/{next}", api.token), &headers, "").await;
+            assert!(answer.starts_with("HTTP/1.1 403"), "{headers}: {answer}");
+        }
+        assert!(api.calls.try_recv().is_err(), "one of them was heard");
+        let answer = send(&api, "GET runtime/invocation/next", "").await;
+        assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+        assert_eq!([api.call().await, api.call().await], [Call::Next, Call::Taken]);
     }
 }

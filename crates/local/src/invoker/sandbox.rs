@@ -52,7 +52,7 @@ impl Sandbox {
             .envs(settings.environment.iter().cloned())
             .envs(settings.environment_of.get(&function).into_iter().flatten().cloned())
             .env("AWS_ENDPOINT_URL", meter.endpoint())
-            .env("AWS_LAMBDA_RUNTIME_API", api.address.to_string())
+            .env("AWS_LAMBDA_RUNTIME_API", api.endpoint())
             .env("AWS_LAMBDA_FUNCTION_NAME", &name)
             .env("AWS_LAMBDA_FUNCTION_MEMORY_SIZE", settings.memory_mb.to_string())
             .env("AWS_LAMBDA_FUNCTION_VERSION", "$LATEST")
