@@ -82,16 +82,11 @@ impl<'a> News<'a> {
                 line["building_ms"],
                 self.store.bucket(),
             )),
-            _ if matches!(text("level"), "ERROR" | "WARN") => {
-                let about = [text("animation"), text("key")].join("");
-                self.console.note(format_args!(
-                    "{} {about}: {} {}",
-                    text("level").to_lowercase(),
-                    text("message"),
-                    text("error")
-                ));
+            _ => {
+                if let Some(trouble) = trouble(line) {
+                    self.console.note(trouble);
+                }
             }
-            _ => {}
         }
     }
 
@@ -109,6 +104,19 @@ impl<'a> News<'a> {
         }
         self.next = Instant::now() + APART;
     }
+}
+
+/// A warning or an error in a function's log, with what it is about and why.
+fn trouble(line: &Value) -> Option<String> {
+    let text = |field: &str| line[field].as_str().unwrap_or_default();
+    let (level, message) = (text("level"), text("message"));
+    // The runtime says in Rust's words what the function has said in its own.
+    if !matches!(level, "ERROR" | "WARN") || message.starts_with("Failed([") {
+        return None;
+    }
+    let about = format!("{} {}{}", level.to_lowercase(), text("animation"), text("key"));
+    let parts = [about.trim_end(), message, text("problem"), text("error")];
+    Some(parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(": "))
 }
 
 fn state(manifest: &Manifest) -> String {
@@ -136,5 +144,29 @@ fn state(manifest: &Manifest) -> String {
             }
             text
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn what_is_wrong_is_told_once_and_in_words() {
+        let rejected = json!({
+            "level": "WARN", "message": "no script", "key": "scripts/../0.txt", "problem": "`..` is no name",
+        });
+        assert_eq!(trouble(&rejected).unwrap(), "warn scripts/../0.txt: no script: `..` is no name");
+        let failed = json!({
+            "level": "ERROR", "message": "failed", "key": "scripts/a/0.txt", "error": "timed out: reset",
+        });
+        assert_eq!(trouble(&failed).unwrap(), "error scripts/a/0.txt: failed: timed out: reset");
+        let sweep = json!({ "level": "ERROR", "message": "sweep failed", "error": "timed out" });
+        assert_eq!(trouble(&sweep).unwrap(), "error: sweep failed: timed out");
+        let again = "Failed([(\"scripts/a/0.txt\", Ambiguous { key: \"k\", source: \"reset\" })])";
+        assert_eq!(trouble(&json!({ "level": "ERROR", "message": again })), None);
+        assert_eq!(trouble(&json!({ "level": "INFO", "message": "drawn" })), None);
     }
 }
