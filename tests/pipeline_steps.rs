@@ -592,7 +592,7 @@ async fn settings_that_could_not_be_read_are_read_again() {
 async fn restarts_are_no_attempts_at_a_frame() {
     let world = World::new();
     world.put("scripts/a/1.txt", script(1, 1)).await;
-    let catch_up = Policy { stuck_after: Duration::ZERO, attempts_count: false, ..world.policy.clone() };
+    let catch_up = Policy { stuck_after: Duration::ZERO, is_fresh_start: true, ..world.policy.clone() };
     let begun_attempts = async |world: &World| {
         let receipts = world.store.list(ListRequest::all("frames/a/")).await.unwrap().objects;
         receipts.iter().filter(|listed| listed.key.contains(".begun-")).count()
@@ -609,7 +609,8 @@ async fn restarts_are_no_attempts_at_a_frame() {
         world.put(&begun(&retries.last().unwrap().key), "").await;
     }
     let key = "scripts/a/1.txt".to_owned();
-    let failure = |end: End| Failure { key: key.clone(), version: None, attempts: 3, end };
+    let failure =
+        |end: End| Failure { key: key.clone(), version: None, attempts: 3, end, request_id: "r".to_owned() };
     for _ in 0..5 {
         let invocation = Invocation::new(&world.store, &world.clock, &world.random, &world.policy, "record");
         let recorded = record_failure(&invocation, &failure(End::Error("busy".into()))).await.unwrap();

@@ -94,7 +94,7 @@ async fn an_animation_of_many_parts_is_assembled_by_several_invocations() {
             let (store, id) = (store(), format!("invocation {}", left.len()));
             let deadline = SystemClock.now().after(Duration::from_secs(900));
             let invocation = Invocation::new(&store, &SystemClock, &random, &policy, &id).until(deadline);
-            match assemble(&invocation, &Joiner, &claim).await.unwrap().left_after {
+            match assemble(&invocation, &Joiner, &claim).await.unwrap().unwrap().left_after {
                 Some(frames) => left.push(frames),
                 None => break,
             }

@@ -40,6 +40,10 @@ pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value)
 /// Works on one claim.
 async fn record<S: Store>(context: &Context<S>, call: &Call, key: String) -> Result<String, Error> {
     let assembled = assemble(&context.invocation(&context.policy, call), &context.animator, &key).await?;
+    let Some(assembled) = assembled else {
+        tracing::info!(request_id = %call.request_id, key, "another assembler is at it");
+        return Ok("left to another".to_owned());
+    };
     log(call, &assembled);
     Ok(format!("{:?}", assembled.status).to_lowercase())
 }
@@ -118,7 +122,7 @@ async fn clean<S: Store>(context: &Context<S>, call: &Call, how: Sweep) -> Resul
     let policy = match how {
         Sweep::Patient => context.policy.clone(),
         Sweep::CatchUp => {
-            Policy { stuck_after: std::time::Duration::ZERO, attempts_count: false, ..context.policy.clone() }
+            Policy { stuck_after: std::time::Duration::ZERO, is_fresh_start: true, ..context.policy.clone() }
         }
     };
     let swept = match sweep(&context.invocation(&policy, call)).await {

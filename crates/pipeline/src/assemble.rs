@@ -4,7 +4,7 @@
 //! commits the manifest where it differs (without a claim: the assembler is here already), builds the GIF of a set
 //! that is done and settled, removes the GIF of a set that can have none. It ends only on a round that wrote nothing,
 //! so that no GIF from an older listing stays, and no set that became whole while it worked is left. Whoever waits or builds
-//! holds the animation's lease; another assembler that finds it taken leaves the GIF to its holder.
+//! holds the animation's lease; another assembler that finds it taken leaves all to its holder.
 //!
 //! A GIF that does not fit the time of one invocation is left to the next one where it stands (`build`).
 
@@ -48,7 +48,7 @@ pub struct Assembled {
     pub building: Duration,
 }
 
-/// Works on one claim, given its key.
+/// Works on one claim, given its key; `None` if another assembler is at the animation, who will look at it once more.
 ///
 /// # Errors
 ///
@@ -58,7 +58,7 @@ pub async fn assemble<S: Store, C: Clock, A: Animator>(
     invocation: &Invocation<'_, S, C>,
     animator: &A,
     key: &str,
-) -> Result<Assembled> {
+) -> Result<Option<Assembled>> {
     match key.parse()? {
         Key::Claim { animation, .. } => invocation.assemble(animator, &animation).await,
         _ => Err(Error::key(key, "this key is no claim")),
@@ -167,7 +167,14 @@ impl Tally {
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    async fn assemble<A: Animator>(&self, animator: &A, animation: &Animation) -> Result<Assembled> {
+    async fn assemble<A: Animator>(&self, animator: &A, animation: &Animation) -> Result<Option<Assembled>> {
+        if self.is_held_by_another(animation).await? {
+            return Ok(None);
+        }
+        self.assemble_all(animator, animation).await.map(Some)
+    }
+
+    async fn assemble_all<A: Animator>(&self, animator: &A, animation: &Animation) -> Result<Assembled> {
         let mut tally = Tally::new(self.clock.now());
         loop {
             tally.rounds += 1;

@@ -28,6 +28,8 @@ pub struct Failure {
     pub attempts: u64,
     /// What ended the last attempt.
     pub end: End,
+    /// The event's, in all attempts.
+    pub request_id: String,
 }
 
 /// What ended an invocation.
@@ -74,7 +76,7 @@ pub fn parse_record(record: &[u8]) -> Result<Vec<Failure>> {
         source: source.into(),
     })?;
     let end = record.end();
-    let attempts = record.request_context.approximate_invoke_count;
+    let RequestContext { approximate_invoke_count: attempts, request_id, .. } = record.request_context;
     let payload: Payload = serde_json::from_value(record.request_payload).unwrap_or_default();
     payload
         .records
@@ -82,7 +84,7 @@ pub fn parse_record(record: &[u8]) -> Result<Vec<Failure>> {
         .map(|event| {
             let key = decode_event_key(&event.s3.object.key)?;
             let version = event.s3.object.etag.filter(|etag| !etag.is_empty()).map(|etag| ETag::new(&etag));
-            Ok(Failure { key, version, attempts, end: end.clone() })
+            Ok(Failure { key, version, attempts, end: end.clone(), request_id: request_id.clone() })
         })
         .collect()
 }
@@ -217,6 +219,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         animation: Animation,
         claimed: Generation,
     ) -> Result<Recorded> {
+        self.free_lease_of(&animation, &failure.request_id).await?;
         let what = match failure.end {
             End::TimedOut => "timed out",
             End::Died => "died, most likely for lack of memory,",
@@ -260,6 +263,8 @@ struct RequestContext {
     condition: String,
     #[serde(default)]
     approximate_invoke_count: u64,
+    #[serde(default)]
+    request_id: String,
 }
 
 #[derive(Deserialize, Default)]
@@ -332,6 +337,7 @@ mod tests {
             version: Some(ETag::new("abc")),
             attempts: 3,
             end: expected,
+            request_id: "r".to_owned(),
         };
         assert_eq!(failures, [failure]);
     }

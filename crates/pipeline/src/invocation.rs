@@ -38,9 +38,9 @@ pub struct Policy {
     pub stuck_after: Duration,
     /// After how many wakings a pending frame is given up.
     pub attempts: u64,
-    /// Whether attempts that have begun and gave no result count. Not when the functions themselves have just been
-    /// started anew: what was cut off with them was not tried.
-    pub attempts_count: bool,
+    /// Whether the functions themselves have just been started anew: what was cut off with them was not tried, and a lease
+    /// of before has no holder.
+    pub is_fresh_start: bool,
     /// How old a superseded frame must be before the sweep deletes it. A week: a script that is changed back finds
     /// its old frame.
     pub superseded_after: Duration,
@@ -73,7 +73,7 @@ impl Policy {
             most_frames: None,
             stuck_after: Duration::from_secs(15 * 60),
             attempts: 3,
-            attempts_count: true,
+            is_fresh_start: false,
             superseded_after: Duration::from_secs(7 * 24 * 3600),
             request_attempts: 5,
             request_pause: Duration::from_millis(50),

@@ -106,6 +106,38 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         holder.is_some_and(|holder| holder.assembler == self.request_id())
     }
 
+    /// Whether another invocation holds the lease. It looks at the manifest once more when it has given it back, so whoever
+    /// is woken for a manifest that was written before need not look.
+    pub(crate) async fn is_held_by_another(&self, animation: &Animation) -> Result<bool> {
+        let there = self.get(&Key::Lease { animation: animation.clone() }.to_string()).await?;
+        let holder = there.and_then(|there| holder(&there.body));
+        Ok(holder.is_some_and(|holder| !self.is_held(Some(&holder)) && holder.stands(self.clock.now())))
+    }
+
+    /// Frees the lease of an event that the platform has given up.
+    pub(crate) async fn free_lease_of(&self, animation: &Animation, request_id: &str) -> Result<()> {
+        self.free_lease(animation, |holder| holder.assembler == request_id).await
+    }
+
+    /// Frees the lease of whoever began before this invocation, to which the platform gives as much time.
+    pub(crate) async fn free_lease_from_before(&self, animation: &Animation) -> Result<()> {
+        let own = self.own_lease(Held::default());
+        self.free_lease(animation, |holder| holder.until < own.until).await
+    }
+
+    /// Leaves the lease of a dead holder to whoever comes next, with what it has written down.
+    async fn free_lease(&self, animation: &Animation, is_dead: impl Fn(&Lease) -> bool) -> Result<()> {
+        let key = Key::Lease { animation: animation.clone() }.to_string();
+        let Some(there) = self.get(&key).await? else { return Ok(()) };
+        let Some(holder) = holder(&there.body) else { return Ok(()) };
+        if holder.assembler != NOBODY && is_dead(&holder) {
+            let free = Lease { checkpoint: holder.checkpoint, ..Lease::of_nobody() };
+            // If that fails, the lease is another's by now, or stands until its time is up.
+            self.replace_lease(&key, &free, there.info.etag).await?;
+        }
+        Ok(())
+    }
+
     async fn replace_lease(&self, key: &str, lease: &Lease, etag: ETag) -> Result<bool> {
         let options = PutOptions::if_match(etag).content_type("application/json");
         match self.store.put(key, encode(key, lease)?, options).await {

@@ -17,6 +17,9 @@ use crate::{Clock, Error, Result, Timestamp};
 /// How often an animation is listed whose receipts are replaced between the listing and their reading.
 const LOOKS: u32 = 8;
 
+/// How many rejected keys a manifest names: whoever may upload could else make it as large as they like.
+const MOST_REJECTED: usize = 100;
+
 /// A listing of an animation and what it amounts to.
 #[derive(Debug)]
 pub(crate) struct Observation {
@@ -73,7 +76,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         marks: &[ScriptName],
     ) -> Result<(Scripts, Option<ETag>)> {
         let bounds = marks.iter().map(|name| animation.script(name)).collect();
-        let mut scripts = Scripts::default();
+        let (mut scripts, mut rejected) = (Scripts::default(), Vec::new());
         let mut settings = None;
         for listed in self.list_level(animation.scripts(), bounds).await? {
             match listed.key.parse() {
@@ -82,11 +85,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 }
                 Ok(Key::Settings { .. }) => settings = Some(listed.etag),
                 Err(Error::Key { key, problem }) if key.ends_with(".txt") => {
-                    scripts.rejected.push(Rejected { key, problem: problem.to_owned() });
+                    rejected.push(Rejected { key, problem: problem.to_owned() });
                 }
                 _ => {}
             }
         }
+        scripts.rejected = bounded(rejected, animation.scripts());
         Ok((scripts, settings))
     }
 
@@ -271,6 +275,18 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
 }
 
 /// What an object in a listing of the animation's frames is a receipt of.
+/// The first ones, and of the others how many there are.
+fn bounded(mut rejected: Vec<Rejected>, folder: String) -> Vec<Rejected> {
+    let more = rejected.len().saturating_sub(MOST_REJECTED);
+    rejected.truncate(MOST_REJECTED);
+    if more > 0 {
+        let keys = if more == 1 { "key" } else { "keys" };
+        rejected
+            .push(Rejected { key: folder, problem: format!("{more} more {keys} that no script can have") });
+    }
+    rejected
+}
+
 fn receipt(animation: &Animation, listed: Listed) -> Option<ReceiptFound> {
     match listed.key.parse() {
         Ok(Key::Receipt { animation: of, receipt }) if of == *animation => {

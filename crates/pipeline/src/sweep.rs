@@ -125,6 +125,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let gif = self.head(&animation.gif()).await?;
         let observation = self.observe(animation, known.as_ref()).await?;
         let mut visit = Visit::default();
+        if self.policy.is_fresh_start && observation.has_lease {
+            self.free_lease_from_before(animation).await?;
+        }
         self.wake(animation, &observation, &mut visit).await?;
         let is_healed = self.heal_receipts(animation, &observation, &mut visit).await?;
         let head = &observation.manifest.head;
@@ -149,7 +152,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         if pending.is_empty() || is_hopeless || now.since(last) < self.policy.stuck_after {
             return Ok(());
         }
-        if !self.policy.attempts_count {
+        if self.policy.is_fresh_start {
             self.forget_attempts(animation, observation, &pending).await?;
         }
         let wakings = self.wakings(animation, observation).await?;
@@ -204,7 +207,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             return Ok(Step::Patient);
         }
         let tag = Tag { version: frame.version.clone(), pixels: self.policy.pixels };
-        if begun >= self.policy.attempts && self.policy.attempts_count {
+        if begun >= self.policy.attempts && !self.policy.is_fresh_start {
             let reason = Reason::new(format!("no result in each of {begun} attempts"));
             self.put_fault(animation, &frame.script, &tag, frame.part, &reason).await?;
             return Ok(Step::GivenUp);

@@ -334,6 +334,12 @@ impl World {
     }
 
     async fn assemble(&self, joiner: &Joiner, claim: &str) -> Result<Assembled> {
+        let assembled = self.try_assemble(joiner, claim).await?;
+        Ok(assembled.expect("nobody else is at it"))
+    }
+
+    /// `None` if another assembler is at it.
+    async fn try_assemble(&self, joiner: &Joiner, claim: &str) -> Result<Option<Assembled>> {
         self.with(async |invocation| assemble(invocation, joiner, claim).await).await
     }
 
@@ -348,7 +354,8 @@ impl World {
     }
 
     async fn record(&self, key: &str, version: Option<ETag>, end: End) -> Recorded {
-        let failure = Failure { key: key.to_owned(), version, attempts: 3, end };
+        let request_id = "given-up".to_owned();
+        let failure = Failure { key: key.to_owned(), version, attempts: 3, end, request_id };
         self.with(async |invocation| record_failure(invocation, &failure).await.unwrap()).await
     }
 

@@ -317,7 +317,8 @@ impl Platform {
                 let start_us = grounds.engine.now_us();
                 lock(&self.diary).assembler_begins();
                 let assembled = assemble(&invocation, &lister, key).await?;
-                lock(&self.diary).left += u64::from(assembled.left_after.is_some());
+                lock(&self.diary).left +=
+                    u64::from(assembled.is_some_and(|assembled| assembled.left_after.is_some()));
                 lock(&self.diary).assembler_ends(grounds.engine.now_us() - start_us);
             }
             Work::Sweep => {
@@ -389,7 +390,8 @@ impl Platform {
         };
         lock(&self.diary).given_up += 1;
         self.only_the_sweep_heals("an event was given up");
-        let failure = Failure { key, version, attempts: job.attempt, end };
+        let failure =
+            Failure { key, version, attempts: job.attempt, end, request_id: job.request_id.clone() };
         self.submit(Work::Record(failure), Duration::from_millis(100));
     }
 

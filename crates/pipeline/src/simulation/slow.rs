@@ -49,6 +49,8 @@ pub struct SlowReport {
     pub at_once: u64,
     /// Requests of the assemble function.
     pub requests: u64,
+    /// Requests of the render function.
+    pub rendering: u64,
     /// From the first change to rest.
     pub whole: Duration,
 }
@@ -89,7 +91,7 @@ pub fn slowly(slow: Slow) -> Result<SlowReport, String> {
     let start_us = if slow.removed > 0 {
         *lock(&counted) = SlowReport::default();
         *lock(&platform.diary) = Default::default();
-        grounds.requests[Actor::Assemble as usize].store(0, Ordering::Relaxed);
+        grounds.requests.iter().for_each(|requests| requests.store(0, Ordering::Relaxed));
         for number in 0..slow.removed {
             change(&grounds, key(number), None, after(number));
         }
@@ -108,11 +110,13 @@ pub fn slowly(slow: Slow) -> Result<SlowReport, String> {
     if bucket.keys().any(|key| matches!(key.parse(), Ok(Key::Lease { .. }))) {
         return Err("a lease is left".to_owned());
     }
+    let requests = |of: Actor| grounds.requests[of as usize].load(Ordering::Relaxed);
     let (counted, diary) = (lock(&counted), lock(&platform.diary));
     Ok(SlowReport {
         assembling: diary.assembling,
         at_once: diary.assemblers_at_once,
-        requests: grounds.requests[Actor::Assemble as usize].load(Ordering::Relaxed),
+        requests: requests(Actor::Assemble),
+        rendering: requests(Actor::Render),
         whole: Duration::from_micros(diary.last_end_us.saturating_sub(start_us)),
         ..*counted
     })

@@ -243,15 +243,78 @@ async fn an_assembler_leaves_the_gif_to_whoever_holds_the_lease() {
     let claims = world.keys("assemblies/");
     let put_at: Vec<_> = claims.iter().map(|claim| world.modified(claim)).collect();
     world.later(seconds(1)).await;
-    let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
-    assert_eq!((assembled.rounds, assembled.built), (1, 0));
+    let requests = Arc::new(AtomicU64::new(0));
+    let counted = requests.clone();
+    world.meddle(move |_, _, _| _ = counted.fetch_add(1, Ordering::Relaxed));
+    assert_eq!(world.try_assemble(&world.joiner(), &claim).await.unwrap(), None);
+    assert_eq!(requests.load(Ordering::Relaxed), 1, "it looks at the lease and at nothing else");
     assert_eq!(world.store.bucket.lock().unwrap().get(LEASE).unwrap().body, lease);
     let is_old = |(claim, put_at): (&String, Timestamp)| world.modified(claim) == put_at;
     assert!(world.keys("assemblies/") == claims && claims.iter().zip(put_at).all(is_old), "nobody is woken");
     // Nor does it give it back when there is nothing to build.
     world.put_gif(world.manifest().head.generation.as_str());
-    world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!(world.try_assemble(&world.joiner(), &claim).await.unwrap(), None);
     assert_eq!(world.store.bucket.lock().unwrap().get(LEASE).unwrap().body, lease);
+}
+
+/// It began after the first look at the lease, which was free then.
+#[tokio::test]
+async fn an_assembler_leaves_the_gif_to_whoever_has_just_taken_the_lease() {
+    let world = World::new();
+    let claim = world.announced(2).await;
+    let until = world.store.clock.now().after(seconds(600)).0;
+    let lease = format!(r#"{{"assembler":"another","until":{until}}}"#);
+    let taken = lease.clone();
+    world.meddle(move |request, bucket, now| {
+        if request == "get manifests/film.json" {
+            bucket.put(now, LEASE, taken.clone().into(), PutOptions::always()).unwrap();
+        }
+    });
+    let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!((assembled.rounds, assembled.built), (1, 0));
+    assert_eq!(world.store.bucket.lock().unwrap().get(LEASE).unwrap().body, lease);
+}
+
+/// `rayfold dev` was stopped while an assembler waited, and started again: no assembler of before is alive.
+#[tokio::test]
+async fn whoever_begins_anew_waits_for_no_assembler_of_before() {
+    for (until, is_freed) in [(599, true), (600, false), (700, false)] {
+        let mut world = World::new();
+        world.announced(2).await;
+        let now = world.store.clock.now();
+        let lease =
+            format!(r#"{{"assembler":"before","until":{},"checkpoint":true}}"#, now.after(seconds(until)).0);
+        world.put(LEASE, &lease);
+        assert!(world.visit().await.claimed);
+        assert_eq!(
+            world.store.bucket.lock().unwrap().get(LEASE).unwrap().body,
+            lease,
+            "a sweep like any other"
+        );
+        world.policy.is_fresh_start = true;
+        world.deadline = Some(now.after(seconds(600)));
+        assert!(world.visit().await.claimed);
+        let expected = if is_freed { r#"{"assembler":"","until":0,"checkpoint":true}"# } else { &lease };
+        assert_eq!(world.store.bucket.lock().unwrap().get(LEASE).unwrap().body, expected, "{until}");
+    }
+}
+
+/// Else the retry that a user asks for waits until its time is up.
+#[tokio::test]
+async fn an_assembler_that_the_platform_has_given_up_holds_nobody_off() {
+    for (assembler, is_freed) in [("given-up", true), ("another", false), ("", false)] {
+        for end in [End::Died, End::TimedOut, End::Error("busy".into())] {
+            let world = World::new();
+            let claim = world.announced(2).await;
+            let until = world.store.clock.now().after(seconds(600)).0;
+            let lease = format!(r#"{{"assembler":"{assembler}","until":{until}}}"#);
+            world.put(LEASE, &lease);
+            world.record(&claim, None, end).await;
+            let there = world.store.bucket.lock().unwrap().get(LEASE).unwrap().body;
+            assert_eq!(there == r#"{"assembler":"","until":0}"#, is_freed, "{assembler}: {there:?}");
+            assert!(is_freed || there == lease, "{assembler}: {there:?}");
+        }
+    }
 }
 
 /// It died when the GIF was put.
@@ -386,7 +449,7 @@ async fn a_lease_that_the_listing_does_not_show_is_not_asked_for() {
     let claim = format!("assemblies/film/1-{}.json", "0a".repeat(16));
     let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
     assert_eq!((assembled.rounds, world.gif()), (2, None));
-    assert_eq!(asked.load(Ordering::Relaxed), 0);
+    assert_eq!(asked.load(Ordering::Relaxed), 1, "the look with which every assembler begins");
 }
 
 /// Somebody has put half of it in its place, and then the set was another one for a moment.

@@ -79,7 +79,7 @@ async fn other_failed_events_are_about_what_is_there_now() {
     assert!(matches!(settings, Recorded::Resolved(_)), "{settings:?}");
     assert_eq!(world.manifest().head.status, Status::Waiting, "the settings are in the manifest");
     let key = "frames/film/1@v-p1.png".to_owned();
-    let failure = Failure { key, version: None, attempts: 3, end: End::TimedOut };
+    let failure = Failure { key, version: None, attempts: 3, end: End::TimedOut, request_id: "r".into() };
     let recorded = world.with(async |invocation| record_failure(invocation, &failure).await).await;
     assert!(matches!(recorded, Err(Error::Key { .. })), "{recorded:?}");
 }

@@ -29,6 +29,22 @@ impl World {
 }
 
 #[tokio::test]
+async fn of_many_keys_that_no_script_can_have_the_first_are_named_and_the_others_counted() {
+    for (keys, last) in [(100, None), (101, Some("1 more key")), (2_500, Some("2400 more keys"))] {
+        let world = World::new();
+        let name = "x".repeat(900);
+        for number in 0..keys {
+            world.put(&format!("scripts/film/{name}{number}.txt"), "");
+        }
+        world.upload("1.txt", "frame 1").await;
+        let head = world.manifest().head;
+        assert_eq!((head.rejected.len(), head.status), (100 + usize::from(last.is_some()), Status::Failed));
+        let told = last.map(|more| ("scripts/film/".to_owned(), format!("{more} that no script can have")));
+        assert_eq!(head.rejected.get(100).map(|more| (more.key.clone(), more.problem.clone())), told);
+    }
+}
+
+#[tokio::test]
 async fn files_that_are_meant_as_scripts_are_named_and_others_are_not() {
     let world = World::new();
     world.put("scripts/film/notes.md", "");

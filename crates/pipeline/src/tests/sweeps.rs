@@ -139,7 +139,7 @@ async fn frames_that_were_begun_in_vain_are_given_up_and_the_claim_says_so() {
 async fn where_attempts_do_not_count_those_at_pending_frames_are_forgotten() {
     let mut world = World::new();
     let [version, _] = stuck(&world).await;
-    world.policy.attempts_count = false;
+    world.policy.is_fresh_start = true;
     let other = "frames/film/1@0-p1.begun-1".to_owned();
     world.put(&other, "");
     for attempt in 1..=3 {
@@ -402,7 +402,7 @@ async fn attempts_at_a_part_that_is_drawn_are_not_forgotten() {
     let begun = |number: u64| format!("frames/film/1@{version}-p1/{number}.begun-1");
     world.put(&begun(1), "");
     world.put(&begun(2), "");
-    world.policy.attempts_count = false;
+    world.policy.is_fresh_start = true;
     world.later(15 * MINUTE).await;
     assert_eq!(world.visit().await.woken, 1);
     let left = world.keys("frames/");
