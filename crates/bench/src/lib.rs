@@ -14,6 +14,8 @@ pub mod cpu_time;
 #[cfg(feature = "bucket")]
 pub mod explore;
 pub mod fingerprints;
+#[cfg(feature = "bucket")]
+pub mod footprint;
 pub mod gif;
 pub mod hard_cases;
 pub mod measure;

@@ -5,7 +5,7 @@ use rayfold_bench::{
     accuracy, fingerprints, gif, measure, metamorphic, needs, parsing, sampling, speed, studio,
 };
 #[cfg(feature = "bucket")]
-use rayfold_bench::{cold_start, explore, pipeline, scale, simulate};
+use rayfold_bench::{cold_start, explore, footprint, pipeline, scale, simulate};
 
 #[derive(Debug, Parser)]
 #[command(name = "rayfold-bench", about = "Measures rayfold and writes the reports in docs/reports")]
@@ -34,6 +34,9 @@ enum Measurement {
     Explore(explore::Args),
     /// Time, memory, size and quality of GIFs, beside those of other encoders
     Gif(gif::Args),
+    /// Memory and processor time of the functions that ship, by the size of an animation
+    #[cfg(feature = "bucket")]
+    Footprint(footprint::Args),
     /// A line for each of many pictures, by which the program before a change is compared with the one after
     Fingerprints(fingerprints::Args),
     /// Run a program and print what it took
@@ -68,6 +71,8 @@ fn main() -> anyhow::Result<()> {
         Measurement::Simulate(args) => simulate::run(&args),
         #[cfg(feature = "bucket")]
         Measurement::Explore(args) => explore::run(&args),
+        #[cfg(feature = "bucket")]
+        Measurement::Footprint(args) => footprint::run(&args),
         Measurement::Gif(args) => gif::run(&args),
         Measurement::Fingerprints(args) => fingerprints::run(&args),
         Measurement::Measure(args) => measure::run(&args),
