@@ -14,7 +14,7 @@ use s3s::{S3Error, S3ErrorCode, S3Request, S3Result, s3_error};
 
 use super::caller::{Caller, Identities};
 use super::session::Session;
-use super::signed;
+use super::signed::{self, parameter};
 use crate::policy::{self, Scope, Verdict, needed};
 
 /// Where a session's token is, unless it is in the URL.
@@ -162,14 +162,4 @@ fn arn(bucket: &str, key: Option<&str>) -> String {
         Some(key) => format!("arn:aws:s3:::{bucket}/{key}"),
         None => format!("arn:aws:s3:::{bucket}"),
     }
-}
-
-/// A parameter that may stand there once: with two, one would be judged and the other be used.
-pub(super) fn parameter<'a>(query: &'a [(String, String)], name: &str) -> S3Result<Option<&'a str>> {
-    let mut found = query.iter().filter(|(other, _)| other == name).map(|(_, value)| value.as_str());
-    let first = found.next();
-    if found.next().is_some() {
-        return Err(s3_error!(InvalidArgument, "{name} stands there twice"));
-    }
-    Ok(first)
 }

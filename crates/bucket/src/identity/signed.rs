@@ -7,8 +7,6 @@ use hyper::HeaderMap;
 use hyper::header::{AUTHORIZATION, HeaderName};
 use s3s::{S3Error, S3ErrorCode, S3Result, s3_error};
 
-use super::access::parameter;
-
 /// Seconds that a presigned URL may be valid, as with AWS.
 const LONGEST_EXPIRY: u64 = 604_800;
 
@@ -91,6 +89,16 @@ pub(super) fn check(headers: &HeaderMap, query: &[(String, String)]) -> S3Result
             "There were headers present in the request which were not signed: {name}"
         )),
     }
+}
+
+/// A parameter that may stand there once: with two, one would be judged and the other be used.
+pub(super) fn parameter<'a>(query: &'a [(String, String)], name: &str) -> S3Result<Option<&'a str>> {
+    let mut found = query.iter().filter(|(other, _)| other == name).map(|(_, value)| value.as_str());
+    let first = found.next();
+    if found.next().is_some() {
+        return Err(s3_error!(InvalidArgument, "{name} stands there twice"));
+    }
+    Ok(first)
 }
 
 #[cfg(test)]
