@@ -140,8 +140,9 @@ real steps work in a bucket that bears 3,500 writes and 5,500 reads a second, al
 503, which S3's client meets by sending three times; GET takes 10-25 ms, PUT 25-60 ms, LIST 20-40 ms for each 1,000 names, bodies come and go at 80 MB/s (assumed). Lambda has
 1,000 places for both functions, the account's default. Scripts come at 1,000 a second, with `frames` set; a frame is drawn in
 800 to 1,200 ms and encoded in 6 ms (512 x 512) or 30 ms (1920 x 1080). An invocation has 15 minutes; a GIF that takes more is
-built by several, one after the other. Not modelled: processor time and memory of the folds, the encoder's state on its way from one
-assembler to the next (some 5 MB at 1080p), events that come late.
+built by several, one after the other. Not modelled: processor time of the folds, and the encoder's state on its way from one
+assembler to the next (some 5 MB at 1080p); events that come late. Memory and processor time of the functions are
+[measured apart](footprint.md).
 
 *Requests* are those of the render function, 503s included. *Beyond* is the mean time of its invocations that was not drawing:
 Lambda bills it. *Tail*: from the last frame's put to the render function's last claim. *Waited*: for a free place, on the average and at most.
