@@ -140,7 +140,7 @@ fn text_of([width, height]: [u32; 2]) -> String {
          Background 0.09 0.1 0.16\n\
          Sphere 1.15  0 1.15 0  0.1 0.04 0.03  0.88 0.36 0.22  0.22 0.22 0.24\n\
          Box -2.6 -0.35 -2.6  2.6 0 2.6  0.14 0.13 0.12  0.86 0.82 0.74\n\
-         Light 0.5 -1 -0.4  1 1 1\n\
+         Ilight 0.95 0.9 0.8  -1 -0.85 0\n\
          Trace\n"
     )
 }
@@ -194,8 +194,11 @@ impl Working {
 
     /// Has a function work on an object, as if an event had told of it.
     async fn wake(&mut self, function: Function, key: &str) -> Result<Cost> {
-        let record = json!({ "eventSource": "aws:s3", "eventName": "ObjectCreated:Put",
-            "s3": { "bucket": { "name": BUCKET }, "object": { "key": key } } });
+        let record = json!({
+            "eventSource": "aws:s3", "eventName": "ObjectCreated:Put", "eventTime": "2026-01-01T00:00:00.000Z",
+            "userIdentity": {}, "requestParameters": {}, "responseElements": {},
+            "s3": { "bucket": { "name": BUCKET }, "object": { "key": key } },
+        });
         self.invoker.invoke(function, json!({ "Records": [record] }).to_string()).await;
         self.cost()
     }

@@ -170,8 +170,11 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let animation = &manifest.head.animation;
         let keys = manifest.frames.iter().filter_map(|frame| Some((frame, frame_key(animation, frame)?)));
         let keys = keys.skip(usize::try_from(*before).unwrap_or(usize::MAX));
-        let fetches: Vec<_> =
-            keys.map(|(frame, key)| async move { Ok::<_, Error>((frame, self.get(&key).await?)) }).collect();
+        // A request of the SDK takes 10 KB from the moment it is made: those that have not begun are small ones.
+        let fetch = |(frame, key): (&'m Frame, String)| async move {
+            Ok::<_, Error>((frame, Box::pin(self.get(&key)).await?))
+        };
+        let fetches: Vec<_> = keys.map(fetch).collect();
         let to_come = fetches.len() as u64;
         let mut images = stream::iter(fetches).buffered(self.policy.prefetch);
         let start = self.clock.now();
