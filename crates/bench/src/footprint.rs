@@ -7,7 +7,6 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 use bytes::Bytes;
@@ -17,11 +16,13 @@ use rayfold_local::observation::{Observation, Requests, Seen};
 use rayfold_local::routes::Function;
 use rayfold_local::{Functions, S3Server, StoreKind, any_port};
 use rayfold_pipeline::keys::Animation;
-use rayfold_pipeline::store::{ListRequest, PutOptions, S3Store, Store};
+use rayfold_pipeline::store::{ListRequest, S3Store, Store};
 use serde_json::json;
 use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 
+use crate::pipeline::put;
 use crate::plot::{Labels, Series, log_log};
+use crate::scale::{ASSEMBLE_MB, LONGEST, RENDER_MB};
 
 /// Frames of an animation, and the size of its pictures.
 const SIZES: [(u64, [u32; 2]); 7] = [
@@ -37,15 +38,8 @@ const SIZES: [(u64, [u32; 2]); 7] = [
 /// Where pictures are to weigh nothing.
 const SMALL: [u32; 2] = [64, 48];
 
-/// Memory of the functions in MiB, as the stack gives it unless told otherwise.
-const RENDER_MB: f64 = 1_769.0;
-const ASSEMBLE_MB: f64 = 3_008.0;
-
 /// Puts side by side.
 const PUTS: usize = 64;
-
-/// How long an invocation may run: as long as Lambda lets one.
-const TIMEOUT: Duration = Duration::from_secs(900);
 
 /// In how many units a second Linux tells processor time.
 const TICKS: f64 = 100.0;
@@ -164,10 +158,6 @@ async fn fill(store: &S3Store, animation: &Animation, frames: u64, text: &Bytes)
     stream::iter(puts).map(Ok).try_for_each_concurrent(PUTS, |put| put).await
 }
 
-async fn put(store: &S3Store, key: String, body: Bytes) -> Result<()> {
-    Ok(store.put(&key, body, PutOptions::always()).await.map(drop)?)
-}
-
 /// An invoker of the functions, and what it tells.
 struct Working {
     invoker: Invoker,
@@ -183,7 +173,7 @@ impl Working {
         let mut settings = Settings::new(functions.clone(), server.address(), any_port(), token);
         settings.environment = server.environment();
         settings.environment.push(("RAYFOLD_BUCKET".into(), BUCKET.into()));
-        (settings.sweep_every, settings.timeout) = (None, TIMEOUT);
+        (settings.sweep_every, settings.timeout) = (None, LONGEST);
         let (sender, seen) = unbounded_channel();
         let invoker = Invoker::start(settings, Some(sender)).await?;
         invoker.idle().await;

@@ -14,9 +14,9 @@ use serde::Deserialize;
 
 use crate::plot::{Labels, Series, log_log};
 
-/// Memory of the functions in GB, as the stack gives it unless told otherwise.
-const RENDER_GB: f64 = 1_769.0 / 1_024.0;
-const ASSEMBLE_GB: f64 = 3_008.0 / 1_024.0;
+/// Memory of the functions in MiB, as the stack gives it unless told otherwise.
+pub(crate) const RENDER_MB: f64 = 1_769.0;
+pub(crate) const ASSEMBLE_MB: f64 = 3_008.0;
 
 /// What the assembler takes for a frame of 512 x 512 (`docs/decisions/gif-in-one-piece.md`).
 const PUSH: Duration = Duration::from_millis(6);
@@ -24,8 +24,8 @@ const PUSH: Duration = Duration::from_millis(6);
 /// The same for 1920 x 1080.
 const PUSH_LARGE: Duration = Duration::from_millis(30);
 
-/// How long an assembler may run.
-const ASSEMBLER_TIME: Duration = Duration::from_secs(900);
+/// How long an invocation may run: as long as Lambda lets one.
+pub(crate) const LONGEST: Duration = Duration::from_secs(900);
 
 /// Scripts that an upload brings in a second: some 40 connections at 40 ms a put. As many frames end in a second on 1,000
 /// places.
@@ -126,8 +126,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 fn dollars(report: &ScaleReport, frames: u64, prices: &Prices) -> f64 {
     let [get, put, _, list] = report.kinds_a_frame;
     let [render, assemble] = report.invocations.map(|count| count as f64);
-    let rendering = (report.drawing + report.beyond_drawing).as_secs_f64() * render * RENDER_GB;
-    let assembling = report.assembling_time.as_secs_f64() * ASSEMBLE_GB;
+    let rendering = (report.drawing + report.beyond_drawing).as_secs_f64() * render * RENDER_MB / 1_024.0;
+    let assembling = report.assembling_time.as_secs_f64() * ASSEMBLE_MB / 1_024.0;
     let lambda = (render + assemble) * prices.lambda.request
         + (rendering + assembling) * prices.lambda.gb_second_x86_64;
     (put + list) * prices.s3.put_copy_post_list + get * prices.s3.get_and_other + lambda / frames as f64
@@ -199,7 +199,7 @@ fn conclusions(rows: &[Row]) -> String {
     ) else {
         return String::new();
     };
-    let fit = |push: Duration| ASSEMBLER_TIME.as_millis() / push.as_millis();
+    let fit = |push: Duration| LONGEST.as_millis() / push.as_millis();
     let Row { frames, report, .. } = largest;
     let most_refused = rows.iter().max_by(|a, b| a.report.throttled.total_cmp(&b.report.throttled));
     let most_refused = most_refused.unwrap_or(dearest);

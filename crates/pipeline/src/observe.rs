@@ -274,7 +274,6 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 }
 
-/// What an object in a listing of the animation's frames is a receipt of.
 /// The first ones, and of the others how many there are.
 fn bounded(mut rejected: Vec<Rejected>, folder: String) -> Vec<Rejected> {
     let more = rejected.len().saturating_sub(MOST_REJECTED);
@@ -287,6 +286,7 @@ fn bounded(mut rejected: Vec<Rejected>, folder: String) -> Vec<Rejected> {
     rejected
 }
 
+/// What an object in a listing of the animation's frames is a receipt of.
 fn receipt(animation: &Animation, listed: Listed) -> Option<ReceiptFound> {
     match listed.key.parse() {
         Ok(Key::Receipt { animation: of, receipt }) if of == *animation => {

@@ -357,18 +357,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         deleted: &[Key],
         visit: &mut Visit,
     ) -> Result<()> {
-        let gone = deleted.iter().filter_map(|key| match key {
-            Key::Receipt {
-                receipt:
-                    Receipt::Frame { name, tag, part: None }
-                    | Receipt::Fault { name, tag, part: None }
-                    | Receipt::Cut { name, tag, part: None, .. }
-                    | Receipt::Band { name, tag, part: None, .. }
-                    | Receipt::Split { name, tag, .. },
-                ..
-            } => Some((name, &tag.version)),
-            key => part_of(key),
-        });
+        let gone = deleted.iter().filter_map(version_of);
         let gone: BTreeSet<_> = gone.filter(|(name, version)| before.get(name) != Some(version)).collect();
         if gone.is_empty() {
             return Ok(());

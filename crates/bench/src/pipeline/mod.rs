@@ -17,6 +17,7 @@ use rayfold_local::{Functions, Plan, Platform, StoreKind};
 use rayfold_scene::{Limits, parse};
 use rayfold_tracer::{RenderOptions, render};
 
+pub(crate) use run::put;
 use run::{Compiled, Folder, Run};
 
 /// What to measure.

@@ -151,7 +151,7 @@ pub(crate) async fn run(
     Ok(run)
 }
 
-async fn put(store: &S3Store, key: String, body: Bytes) -> Result<()> {
+pub(crate) async fn put(store: &S3Store, key: String, body: Bytes) -> Result<()> {
     Ok(store.put(&key, body, PutOptions::always()).await.map(drop)?)
 }
 
