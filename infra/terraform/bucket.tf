@@ -1,15 +1,28 @@
 # One bucket holds everything: what is uploaded, what is made of it, and all state in between.
 
+locals {
+  # 1 where the stack makes the bucket, 0 where it is given one (`existing_bucket`). The settings of a bucket that is given are
+  # its owner's: the stack sets its notifications and nothing else.
+  made_here = var.existing_bucket == null ? 1 : 0
+
+  bucket     = one(concat(aws_s3_bucket.this[*].bucket, var.existing_bucket[*]))
+  bucket_arn = one(concat(aws_s3_bucket.this[*].arn, [for name in var.existing_bucket[*] : "arn:${local.partition}:s3:::${name}"]))
+}
+
 resource "aws_s3_bucket" "this" {
+  count = local.made_here
+
   #checkov:skip=CKV_AWS_144:Frames and GIFs can be made again from the scripts, and their owner has those
   #checkov:skip=CKV_AWS_145:The key is optional (kms_key_arn): with it the same bytes render again
-  bucket        = local.bucket_name
+  bucket        = coalesce(var.bucket_name, "${var.name}-${local.account_id}-${local.region}")
   force_destroy = var.force_destroy
   tags          = local.tags
 }
 
 resource "aws_s3_bucket_ownership_controls" "this" {
-  bucket = aws_s3_bucket.this.bucket
+  count = local.made_here
+
+  bucket = aws_s3_bucket.this[0].bucket
 
   rule {
     object_ownership = "BucketOwnerEnforced"
@@ -17,7 +30,9 @@ resource "aws_s3_bucket_ownership_controls" "this" {
 }
 
 resource "aws_s3_bucket_public_access_block" "this" {
-  bucket                  = aws_s3_bucket.this.bucket
+  count = local.made_here
+
+  bucket                  = aws_s3_bucket.this[0].bucket
   block_public_acls       = true
   block_public_policy     = true
   ignore_public_acls      = true
@@ -25,7 +40,9 @@ resource "aws_s3_bucket_public_access_block" "this" {
 }
 
 resource "aws_s3_bucket_policy" "this" {
-  bucket = aws_s3_bucket.this.bucket
+  count = local.made_here
+
+  bucket = aws_s3_bucket.this[0].bucket
 
   policy = jsonencode({
     Version = "2012-10-17"
@@ -35,7 +52,7 @@ resource "aws_s3_bucket_policy" "this" {
         Effect    = "Deny"
         Principal = "*"
         Action    = "s3:*"
-        Resource  = [aws_s3_bucket.this.arn, "${aws_s3_bucket.this.arn}/*"]
+        Resource  = [aws_s3_bucket.this[0].arn, "${aws_s3_bucket.this[0].arn}/*"]
         Condition = { Bool = { "aws:SecureTransport" = "false" } }
       },
       {
@@ -43,7 +60,7 @@ resource "aws_s3_bucket_policy" "this" {
         Effect    = "Deny"
         Principal = "*"
         Action    = "s3:*"
-        Resource  = [aws_s3_bucket.this.arn, "${aws_s3_bucket.this.arn}/*"]
+        Resource  = [aws_s3_bucket.this[0].arn, "${aws_s3_bucket.this[0].arn}/*"]
         Condition = { NumericLessThan = { "s3:TlsVersion" = "1.2" } }
       },
     ], var.bucket_policy_statements)
@@ -54,7 +71,9 @@ resource "aws_s3_bucket_policy" "this" {
 }
 
 resource "aws_s3_bucket_server_side_encryption_configuration" "this" {
-  bucket = aws_s3_bucket.this.bucket
+  count = local.made_here
+
+  bucket = aws_s3_bucket.this[0].bucket
 
   rule {
     bucket_key_enabled = var.kms_key_arn != null
@@ -67,7 +86,9 @@ resource "aws_s3_bucket_server_side_encryption_configuration" "this" {
 }
 
 resource "aws_s3_bucket_versioning" "this" {
-  bucket = aws_s3_bucket.this.bucket
+  count = local.made_here
+
+  bucket = aws_s3_bucket.this[0].bucket
 
   versioning_configuration {
     status = "Enabled"
@@ -98,7 +119,9 @@ locals {
 }
 
 resource "aws_s3_bucket_lifecycle_configuration" "this" {
-  bucket = aws_s3_bucket.this.bucket
+  count = local.made_here
+
+  bucket = aws_s3_bucket.this[0].bucket
 
   rule {
     id     = "unfinished-uploads-and-lone-delete-markers"
@@ -154,9 +177,9 @@ resource "aws_s3_bucket_lifecycle_configuration" "this" {
 }
 
 resource "aws_s3_bucket_logging" "this" {
-  count = var.access_log_bucket == null ? 0 : 1
+  count = var.access_log_bucket == null ? 0 : local.made_here
 
-  bucket        = aws_s3_bucket.this.bucket
+  bucket        = aws_s3_bucket.this[0].bucket
   target_bucket = var.access_log_bucket
   target_prefix = var.access_log_prefix
 }

@@ -17,6 +17,12 @@ resource "aws_budgets_budget" "this" {
     values = [format("user:Application$%s", local.tags.Application)]
   }
 
+  # Another region may have a stack of the same name, with a budget of its own.
+  cost_filter {
+    name   = "Region"
+    values = [local.region]
+  }
+
   dynamic "notification" {
     for_each = { ACTUAL = 80, FORECASTED = 100 }
 

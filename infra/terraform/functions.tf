@@ -80,7 +80,7 @@ resource "aws_lambda_function" "this" {
   environment {
     variables = merge(
       # Events name their bucket; the sweep and the failure queue's records are told which one to look at.
-      { RAYFOLD_BUCKET = aws_s3_bucket.this.bucket },
+      { RAYFOLD_BUCKET = local.bucket },
       local.limits_of_animations,
       each.value.program == "render" ? local.limits_of_scripts : {},
     )
@@ -148,12 +148,13 @@ resource "aws_lambda_permission" "bucket" {
   action         = "lambda:InvokeFunction"
   function_name  = aws_lambda_function.this[each.key].function_name
   principal      = "s3.amazonaws.com"
-  source_arn     = aws_s3_bucket.this.arn
+  source_arn     = local.bucket_arn
   source_account = local.account_id
 }
 
 resource "aws_s3_bucket_notification" "this" {
-  bucket      = aws_s3_bucket.this.bucket
+  # Not local.bucket, which checkov does not follow.
+  bucket      = one(concat(aws_s3_bucket.this[*].bucket, var.existing_bucket[*]))
   eventbridge = var.eventbridge_enabled
 
   dynamic "lambda_function" {

@@ -29,7 +29,7 @@ resource "aws_iam_role_policy" "objects" {
 
   # Through jsondecode, so that a template that is no JSON fails the plan.
   policy = jsonencode(jsondecode(templatefile("${path.module}/policies/${each.value.program}.json.tftpl", {
-    bucket_arn = aws_s3_bucket.this.arn
+    bucket_arn = local.bucket_arn
   })))
 }
 
@@ -79,7 +79,7 @@ locals {
     Action    = ["kms:Decrypt", "kms:GenerateDataKey"]
     Resource  = arn
     Condition = { StringEquals = { "kms:ViaService" = [local.kms_s3, local.kms_sqs] } }
-  }], local.former_key_statements)
+  }], local.former_key_statements.functions)
 
   # What Lambda needs to put a function into a VPC, which knows no resources; the function's own code may not use it.
   vpc_actions = [
@@ -195,7 +195,7 @@ locals {
       Version = "2012-10-17"
       Statement = concat(
         jsondecode(templatefile("${path.module}/policies/${user}.json.tftpl", {
-          bucket_arn = aws_s3_bucket.this.arn
+          bucket_arn = local.bucket_arn
         })).Statement,
         [for arn in var.kms_key_arn[*] : {
           Sid       = "UseTheKeyThroughTheBucket"
@@ -204,7 +204,7 @@ locals {
           Resource  = arn
           Condition = { StringEquals = { "kms:ViaService" = [local.kms_s3] } }
         }],
-        local.former_key_statements,
+        local.former_key_statements.people,
       )
     })
   }

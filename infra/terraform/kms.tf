@@ -6,14 +6,18 @@ locals {
   kms_s3  = "s3.${local.region}.${local.dns_suffix}"
   kms_sqs = "sqs.${local.region}.${local.dns_suffix}"
 
-  # Objects that were encrypted with a key that the bucket no longer uses can still be read.
-  former_key_statements = [for arn in var.former_kms_key_arns : {
-    Sid       = "ReadWhatItEncrypted${index(var.former_kms_key_arns, arn)}"
-    Effect    = "Allow"
-    Action    = ["kms:Decrypt"]
-    Resource  = arn
-    Condition = { StringEquals = { "kms:ViaService" = [local.kms_s3] } }
-  }]
+  # What a former key encrypted can still be read: objects of the bucket, and for the functions messages of the queues,
+  # which wait for up to two weeks.
+  former_key_statements = {
+    for reader, services in { functions = [local.kms_s3, local.kms_sqs], people = [local.kms_s3] } :
+    reader => [for arn in var.former_kms_key_arns : {
+      Sid       = "ReadWhatItEncrypted${index(var.former_kms_key_arns, arn)}"
+      Effect    = "Allow"
+      Action    = ["kms:Decrypt"]
+      Resource  = arn
+      Condition = { StringEquals = { "kms:ViaService" = services } }
+    }]
+  }
 }
 
 # Up to version 0.1.0 the stack made the key itself. An upgrade forgets that key instead of destroying it: hand it back as

@@ -1,6 +1,6 @@
-# What the other files share. The stack: bucket.tf (objects and their lifecycle), functions.tf (the two functions and
+# What the other files share. The stack: bucket.tf (objects and their lifecycle), functions.tf (the functions and
 # what wakes them), failures.tf (where failed events go), sweep.tf (the schedule), iam.tf (who may do what), kms.tf,
-# alarms.tf, budget.tf, dashboard.tf.
+# alarms.tf, budget.tf, dashboard.tf, destroy.tf (a check before destruction).
 
 data "aws_caller_identity" "current" {}
 
@@ -13,8 +13,6 @@ locals {
   partition  = data.aws_partition.current.partition
   region     = data.aws_region.current.region
   dns_suffix = data.aws_partition.current.dns_suffix
-
-  bucket_name = coalesce(var.bucket_name, "${var.name}-${local.account_id}-${local.region}")
 
   # Shared with the local invoker, so that an event takes the same way on a laptop.
   routes = jsondecode(file("${path.module}/routes.json")).routes

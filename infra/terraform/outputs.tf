@@ -1,21 +1,21 @@
 output "bucket" {
   description = "Name of the bucket"
-  value       = aws_s3_bucket.this.bucket
+  value       = local.bucket
 }
 
 output "bucket_arn" {
   description = "ARN of the bucket"
-  value       = aws_s3_bucket.this.arn
+  value       = local.bucket_arn
 }
 
 output "sync_command" {
   description = "Uploads the folder FOLDER as the animation FOLDER; the GIF appears as animations/FOLDER.gif"
-  value       = "aws s3 sync FOLDER s3://${aws_s3_bucket.this.bucket}/scripts/FOLDER/ --region ${local.region}"
+  value       = "aws s3 sync FOLDER s3://${local.bucket}/scripts/FOLDER/ --region ${local.region}"
 }
 
 output "submit_command" {
   description = "Checks the folder FOLDER, uploads what changed, waits, and downloads the GIF"
-  value       = "AWS_REGION=${local.region} rayfold submit FOLDER --bucket ${aws_s3_bucket.this.bucket}"
+  value       = "AWS_REGION=${local.region} rayfold submit FOLDER --bucket ${local.bucket}"
 }
 
 output "function_names" {

@@ -29,6 +29,17 @@ variable "bucket_name" {
   }
 }
 
+variable "existing_bucket" {
+  description = "Name of a bucket of yours, in the region of the stack, to use in place of a new one; null makes one. Of yours only the notifications are set, all of them: what else you had there is removed"
+  type        = string
+  default     = null
+
+  validation {
+    condition     = var.existing_bucket == null || (var.bucket_name == null && !var.force_destroy && var.access_log_bucket == null && length(var.bucket_policy_statements) == 0)
+    error_message = "With existing_bucket leave out bucket_name, force_destroy, access_log_bucket and bucket_policy_statements: the settings of a bucket that you give stay yours."
+  }
+}
+
 variable "force_destroy" {
   description = "Whether `terraform destroy` may delete a bucket that still holds objects, all their versions included"
   type        = bool

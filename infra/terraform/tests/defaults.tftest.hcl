@@ -14,36 +14,36 @@ variables {
 
 run "bucket" {
   assert {
-    condition     = aws_s3_bucket.this.bucket == "demo-123456789012-eu-central-1"
+    condition     = aws_s3_bucket.this[0].bucket == "demo-123456789012-eu-central-1"
     error_message = "the bucket's name must hold account and region, which makes it unique"
   }
   assert {
-    condition     = aws_s3_bucket.this.force_destroy == false
+    condition     = aws_s3_bucket.this[0].force_destroy == false
     error_message = "destroying the stack must not take the objects with it"
   }
   assert {
     condition = alltrue([
-      aws_s3_bucket_public_access_block.this.block_public_acls,
-      aws_s3_bucket_public_access_block.this.block_public_policy,
-      aws_s3_bucket_public_access_block.this.ignore_public_acls,
-      aws_s3_bucket_public_access_block.this.restrict_public_buckets,
+      aws_s3_bucket_public_access_block.this[0].block_public_acls,
+      aws_s3_bucket_public_access_block.this[0].block_public_policy,
+      aws_s3_bucket_public_access_block.this[0].ignore_public_acls,
+      aws_s3_bucket_public_access_block.this[0].restrict_public_buckets,
     ])
     error_message = "nothing may be public"
   }
   assert {
-    condition     = aws_s3_bucket_ownership_controls.this.rule[0].object_ownership == "BucketOwnerEnforced"
+    condition     = aws_s3_bucket_ownership_controls.this[0].rule[0].object_ownership == "BucketOwnerEnforced"
     error_message = "the account must own every object, and access lists must be off"
   }
   assert {
-    condition     = aws_s3_bucket_versioning.this.versioning_configuration[0].status == "Enabled"
+    condition     = aws_s3_bucket_versioning.this[0].versioning_configuration[0].status == "Enabled"
     error_message = "an overwritten script must be recoverable"
   }
   assert {
-    condition     = one(one(aws_s3_bucket_server_side_encryption_configuration.this.rule).apply_server_side_encryption_by_default).sse_algorithm == "AES256"
+    condition     = one(one(aws_s3_bucket_server_side_encryption_configuration.this[0].rule).apply_server_side_encryption_by_default).sse_algorithm == "AES256"
     error_message = "without a key of its own the bucket uses S3's, which keeps ETags a hash of the content"
   }
   assert {
-    condition = jsondecode(aws_s3_bucket_policy.this.policy) == jsondecode(jsonencode({
+    condition = jsondecode(aws_s3_bucket_policy.this[0].policy) == jsondecode(jsonencode({
       Version = "2012-10-17"
       Statement = [
         {
@@ -74,7 +74,7 @@ run "bucket" {
 
 run "lifecycle" {
   assert {
-    condition = sort([for rule in aws_s3_bucket_lifecycle_configuration.this.rule : rule.id]) == tolist([
+    condition = sort([for rule in aws_s3_bucket_lifecycle_configuration.this[0].rule : rule.id]) == tolist([
       "noncurrent-animations", "noncurrent-assemblies", "noncurrent-checkpoints", "noncurrent-frames", "noncurrent-manifests", "noncurrent-parts",
       "noncurrent-retries", "noncurrent-scripts", "spent-assemblies", "spent-checkpoints", "spent-retries",
       "unfinished-uploads-and-lone-delete-markers",
@@ -83,21 +83,21 @@ run "lifecycle" {
   }
   assert {
     condition = alltrue([
-      for rule in aws_s3_bucket_lifecycle_configuration.this.rule :
+      for rule in aws_s3_bucket_lifecycle_configuration.this[0].rule :
       rule.status == "Enabled" && length(rule.transition) == 0 && length(rule.noncurrent_version_transition) == 0
     ])
     error_message = "every rule must be on, and none may move objects to where reading them costs more"
   }
   assert {
     condition = {
-      for rule in aws_s3_bucket_lifecycle_configuration.this.rule : one(rule.filter).prefix => one(rule.expiration).days
+      for rule in aws_s3_bucket_lifecycle_configuration.this[0].rule : one(rule.filter).prefix => one(rule.expiration).days
       if length(rule.expiration) > 0 ? one(rule.expiration).days != null && one(rule.expiration).days != 0 : false
     } == { "assemblies/" = 7, "retries/" = 7, "checkpoints/" = 1 }
     error_message = "only claims, retry orders and checkpoints may expire by age: every other current object is a receipt"
   }
   assert {
     condition = {
-      for rule in aws_s3_bucket_lifecycle_configuration.this.rule : one(rule.filter).prefix => one(rule.noncurrent_version_expiration).noncurrent_days
+      for rule in aws_s3_bucket_lifecycle_configuration.this[0].rule : one(rule.filter).prefix => one(rule.noncurrent_version_expiration).noncurrent_days
       if length(rule.noncurrent_version_expiration) > 0
       } == {
       "scripts/" = 30, "animations/" = 30, "parts/" = 1, "frames/" = 1, "manifests/" = 1, "assemblies/" = 1, "retries/" = 1, "checkpoints/" = 1
@@ -106,7 +106,7 @@ run "lifecycle" {
   }
   assert {
     condition = [
-      for rule in aws_s3_bucket_lifecycle_configuration.this.rule : one(rule.abort_incomplete_multipart_upload).days_after_initiation
+      for rule in aws_s3_bucket_lifecycle_configuration.this[0].rule : one(rule.abort_incomplete_multipart_upload).days_after_initiation
       if length(rule.abort_incomplete_multipart_upload) > 0
     ] == [1]
     error_message = "the parts of a GIF that was given up must not be billed for longer than a day"
@@ -221,7 +221,7 @@ run "routes" {
       permission.function_name == "demo-${key}",
       permission.principal == "s3.amazonaws.com",
       permission.action == "lambda:InvokeFunction",
-      permission.source_arn == aws_s3_bucket.this.arn,
+      permission.source_arn == aws_s3_bucket.this[0].arn,
       permission.source_account == "123456789012",
     ])]) && toset(keys(aws_lambda_permission.bucket)) == toset([for route in jsondecode(file("routes.json")).routes : route.function])
     error_message = "only this bucket of this account may wake the functions"
@@ -513,7 +513,7 @@ run "tags" {
       [for resource in aws_cloudwatch_metric_alarm.unhandled : resource.tags],
       [for resource in aws_cloudwatch_metric_alarm.queue : resource.tags],
       aws_cloudwatch_metric_alarm.sweep[*].tags,
-      [aws_s3_bucket.this.tags, aws_sqs_queue.failures.tags, aws_sqs_queue.dead_letters.tags, aws_iam_role.scheduler.tags],
+      [aws_s3_bucket.this[0].tags, aws_sqs_queue.failures.tags, aws_sqs_queue.dead_letters.tags, aws_iam_role.scheduler.tags],
     ) : tags == tomap({ Application = "demo" })])
     error_message = "everything must say which stack it belongs to"
   }

@@ -99,7 +99,7 @@ run "objects" {
         ]) : trimprefix(resource, "arn:aws:s3:::demo-123456789012-eu-central-1/")
       ]))
       } == {
-      render   = "assemblies/* frames/* manifests/* parts/*"
+      render   = "assemblies/* frames/*.band frames/*.error.json frames/*.png frames/*.split-* manifests/* parts/*"
       assemble = "animations/* assemblies/* checkpoints/* frames/*.error.json frames/*/@assembler.json manifests/* retries/*"
       record   = "animations/* assemblies/* checkpoints/* frames/*.error.json frames/*/@assembler.json manifests/* retries/*"
     }
@@ -237,16 +237,21 @@ run "with_a_key" {
     error_message = "the schedule may use the key for the dead-letter queue"
   }
   assert {
-    condition = alltrue([for policy in concat(values(aws_iam_role_policy.platform)[*].policy, values(output.user_policies)) : anytrue([
-      for statement in jsondecode(policy).Statement : jsonencode(statement) == jsonencode({
-        Sid       = "ReadWhatItEncrypted0"
-        Effect    = "Allow"
-        Action    = ["kms:Decrypt"]
-        Resource  = "arn:aws:kms:eu-central-1:123456789012:key/99999999-2222-3333-4444-555555555555"
-        Condition = { StringEquals = { "kms:ViaService" = ["s3.eu-central-1.amazonaws.com"] } }
-      })
-    ])])
-    error_message = "what a former key encrypted must stay readable, for functions and people"
+    condition = alltrue(flatten([
+      for services, policies in {
+        "s3 sqs" = values(aws_iam_role_policy.platform)[*].policy
+        "s3"     = values(output.user_policies)
+        } : [for policy in policies : anytrue([
+          for statement in jsondecode(policy).Statement : jsonencode(statement) == jsonencode({
+            Sid       = "ReadWhatItEncrypted0"
+            Effect    = "Allow"
+            Action    = ["kms:Decrypt"]
+            Resource  = "arn:aws:kms:eu-central-1:123456789012:key/99999999-2222-3333-4444-555555555555"
+            Condition = { StringEquals = { "kms:ViaService" = [for service in split(" ", services) : "${service}.eu-central-1.amazonaws.com"] } }
+          })
+      ])]
+    ]))
+    error_message = "what a former key encrypted must stay readable: objects for functions and people, failure messages for the functions"
   }
   assert {
     condition = {

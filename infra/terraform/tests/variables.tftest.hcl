@@ -24,7 +24,7 @@ run "name" {
         [for group in aws_cloudwatch_log_group.this : group.name],
         [for role in aws_iam_role.function : role.name],
         [aws_iam_role.scheduler.name, aws_scheduler_schedule.sweep.name, aws_scheduler_schedule_group.this.name],
-        [aws_sqs_queue.failures.name, aws_sqs_queue.dead_letters.name, aws_s3_bucket.this.bucket],
+        [aws_sqs_queue.failures.name, aws_sqs_queue.dead_letters.name, aws_s3_bucket.this[0].bucket],
         aws_cloudwatch_dashboard.this[*].dashboard_name,
         [for alarm in aws_cloudwatch_metric_alarm.function : alarm.alarm_name],
         [for alarm in aws_cloudwatch_metric_alarm.queue : alarm.alarm_name],
@@ -36,7 +36,7 @@ run "name" {
     error_message = "two stacks in one account must not share a name"
   }
   assert {
-    condition     = aws_s3_bucket.this.tags["Application"] == "film-2"
+    condition     = aws_s3_bucket.this[0].tags["Application"] == "film-2"
     error_message = "the tag must name the stack"
   }
 }
@@ -81,7 +81,7 @@ run "longest_names_fit" {
 
   assert {
     condition = alltrue([
-      length(aws_s3_bucket.this.bucket) <= 63,
+      length(aws_s3_bucket.this[0].bucket) <= 63,
       length("${var.name}-123456789012-ap-southeast-1") <= 63,
       alltrue([for function in aws_lambda_function.this : length(function.function_name) <= 64]),
       length("${var.name}-ap-southeast-1-sweep-schedule") <= 64,
@@ -98,7 +98,7 @@ run "tags" {
   }
 
   assert {
-    condition     = aws_s3_bucket.this.tags == tomap({ Application = "mine", Team = "film" }) && aws_lambda_function.this["render"].tags == aws_s3_bucket.this.tags
+    condition     = aws_s3_bucket.this[0].tags == tomap({ Application = "mine", Team = "film" }) && aws_lambda_function.this["render"].tags == aws_s3_bucket.this[0].tags
     error_message = "the caller's tags must be there, and win"
   }
 }
@@ -109,13 +109,50 @@ run "bucket_name" {
   }
 
   assert {
-    condition     = aws_s3_bucket.this.bucket == "films-of-mine" && output.bucket == "films-of-mine"
+    condition     = aws_s3_bucket.this[0].bucket == "films-of-mine" && output.bucket == "films-of-mine"
     error_message = "the bucket must have the name given"
   }
   assert {
     condition     = alltrue([for function in aws_lambda_function.this : one(function.environment).variables["RAYFOLD_BUCKET"] == "films-of-mine"])
     error_message = "the functions must be told the name given"
   }
+}
+
+run "existing_bucket" {
+  variables {
+    existing_bucket = "of-mine"
+  }
+
+  assert {
+    condition     = output.bucket == "of-mine" && output.bucket_arn == "arn:aws:s3:::of-mine" && aws_s3_bucket_notification.this.bucket == "of-mine"
+    error_message = "the bucket that was given must be used"
+  }
+  assert {
+    condition = alltrue([for count in [
+      length(aws_s3_bucket.this), length(aws_s3_bucket_ownership_controls.this), length(aws_s3_bucket_public_access_block.this),
+      length(aws_s3_bucket_policy.this), length(aws_s3_bucket_server_side_encryption_configuration.this),
+      length(aws_s3_bucket_versioning.this), length(aws_s3_bucket_lifecycle_configuration.this),
+      length(aws_s3_bucket_logging.this), length(terraform_data.bucket_must_be_empty),
+    ] : count == 0])
+    error_message = "a bucket that was given keeps its settings, and the stack's end is not its end"
+  }
+  assert {
+    condition = alltrue(flatten([for policy in aws_iam_role_policy.objects : [
+      for statement in jsondecode(policy.policy).Statement : [
+        for resource in flatten([statement.Resource]) : startswith(resource, "arn:aws:s3:::of-mine")
+      ]
+    ]]))
+    error_message = "the functions' rights must be on that bucket"
+  }
+}
+
+run "existing_bucket_with_settings_of_a_new_one" {
+  command = plan
+  variables {
+    existing_bucket = "of-mine"
+    force_destroy   = true
+  }
+  expect_failures = [var.existing_bucket]
 }
 
 run "bucket_name_with_dots" {
@@ -132,7 +169,7 @@ run "force_destroy" {
   }
 
   assert {
-    condition     = aws_s3_bucket.this.force_destroy == true
+    condition     = aws_s3_bucket.this[0].force_destroy == true
     error_message = "destroying must then take the objects too"
   }
 }
@@ -146,7 +183,7 @@ run "retention" {
 
   assert {
     condition = {
-      for rule in aws_s3_bucket_lifecycle_configuration.this.rule : one(rule.filter).prefix => one(rule.noncurrent_version_expiration).noncurrent_days
+      for rule in aws_s3_bucket_lifecycle_configuration.this[0].rule : one(rule.filter).prefix => one(rule.noncurrent_version_expiration).noncurrent_days
       if length(rule.noncurrent_version_expiration) > 0
       } == {
       "scripts/" = 90, "animations/" = 90, "parts/" = 1, "frames/" = 1, "manifests/" = 1, "assemblies/" = 1, "retries/" = 1, "checkpoints/" = 1
@@ -155,7 +192,7 @@ run "retention" {
   }
   assert {
     condition = {
-      for rule in aws_s3_bucket_lifecycle_configuration.this.rule : one(rule.filter).prefix => one(rule.expiration).days
+      for rule in aws_s3_bucket_lifecycle_configuration.this[0].rule : one(rule.filter).prefix => one(rule.expiration).days
       if startswith(rule.id, "spent-")
     } == { "assemblies/" = 2, "retries/" = 2, "checkpoints/" = 1 }
     error_message = "claims and retry orders must expire after the days given"
@@ -212,7 +249,7 @@ run "kms_key_arn" {
 
   assert {
     condition = alltrue([
-      for rule in aws_s3_bucket_server_side_encryption_configuration.this.rule : alltrue([
+      for rule in aws_s3_bucket_server_side_encryption_configuration.this[0].rule : alltrue([
         rule.bucket_key_enabled,
         one(rule.apply_server_side_encryption_by_default).sse_algorithm == "aws:kms",
         one(rule.apply_server_side_encryption_by_default).kms_master_key_id == var.kms_key_arn,
@@ -276,7 +313,7 @@ run "bucket_policy_statements" {
   }
 
   assert {
-    condition     = [for statement in jsondecode(aws_s3_bucket_policy.this.policy).Statement : statement.Sid] == ["TlsOnly", "Tls12OrNewer", "Auditors", "NotFromOutside"]
+    condition     = [for statement in jsondecode(aws_s3_bucket_policy.this[0].policy).Statement : statement.Sid] == ["TlsOnly", "Tls12OrNewer", "Auditors", "NotFromOutside"]
     error_message = "the statements given must be added to the stack's own"
   }
 }
@@ -872,7 +909,10 @@ run "budget" {
       budget.limit_amount == "20",
       budget.limit_unit == "USD",
       budget.time_unit == "MONTHLY",
-      one(budget.cost_filter).values == tolist(["user:Application$demo"]),
+      { for filter in budget.cost_filter : filter.name => one(filter.values) } == {
+        TagKeyValue = "user:Application$demo"
+        Region      = "eu-central-1"
+      },
     ])]) && length(aws_budgets_budget.this) == 1
     error_message = "the budget must be the stack's"
   }

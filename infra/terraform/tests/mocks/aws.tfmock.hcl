@@ -13,7 +13,7 @@ mock_data "aws_region" {
 }
 
 override_resource {
-  target = aws_s3_bucket.this
+  target = aws_s3_bucket.this[0]
   values = { arn = "arn:aws:s3:::demo-123456789012-eu-central-1" }
 }
 
