@@ -85,6 +85,9 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
             Some(Err(error)) => faults.conflict(path, Severity::Error, &error),
             Some(Ok(plan)) => {
                 frames += plan.len();
+                if let Some(warning) = plan.light_cut_off()? {
+                    faults.conflict(path, Severity::Warning, &warning);
+                }
                 if let Err(error) = plan.one_size() {
                     // A script of unlike frames cannot be an animation, but it can be pictures.
                     let severity = if path.is_dir() { Severity::Error } else { Severity::Warning };

@@ -7,11 +7,12 @@ use std::ops::RangeInclusive;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use rayfold_scene::{AnimationSettings, Limits, SETTINGS_FILE, Samples, Scene, Screen, Script};
-use rayfold_tracer::{Exposure, Precision};
+use rayfold_scene::{AnimationSettings, Depth, Limits, SETTINGS_FILE, Samples, Scene, Screen, Script};
+use rayfold_tracer::{CutLight, Exposure, Precision, RenderOptions};
 
 use crate::console::Console;
 use crate::input::{Input, ScriptFile};
+use crate::interrupt;
 use crate::survey::{Faults, parse_all};
 use crate::wording::number;
 
@@ -261,6 +262,40 @@ impl Plan {
             ..script.frame_after(job.index, frames).unwrap_or_else(|| scene.clone())
         };
         Ok(draw(Exposure::moving(&scene, &after)))
+    }
+
+    /// Looks at the first, the middle and the last frame for light that their depth cuts off, and says which depth would show
+    /// it.
+    ///
+    /// # Errors
+    /// Those of [`Self::scene`].
+    pub(crate) fn light_cut_off(&self) -> anyhow::Result<Option<String>> {
+        let last = self.len() - 1;
+        let mut looked_at = vec![0, last / 2, last];
+        looked_at.dedup();
+        let options = RenderOptions { cancel: Some(interrupt::flag()), ..Default::default() };
+        for nth in looked_at {
+            let Some(job) = self.jobs().nth(nth as usize) else { continue };
+            let scene = self.scene(&job)?;
+            // A scene that cannot be drawn is an error when it is.
+            let Ok(Some(CutLight { share, enough })) = rayfold_tracer::cut_light(&scene, &options) else {
+                continue;
+            };
+            let depth = scene.depth.bounces();
+            let advice = match enough {
+                Some(enough) => format!("`Depth {enough}` shows all but a thousandth of it"),
+                None => format!("`Depth {}`, the greatest, still misses more than a thousandth", Depth::MOST),
+            };
+            let percent = (share * 100.0).max(0.1);
+            let digits = if percent < 10.0 { 1 } else { 0 };
+            return Ok(Some(format!(
+                "frame {} ({}): `Depth {depth}` cuts off {percent:.digits$} % of the light: what is seen after more mirrors \
+                 and glass is black; {advice}",
+                job.number,
+                self.name(&job),
+            )));
+        }
+        Ok(None)
     }
 
     /// The script of a frame, as messages name it.

@@ -313,7 +313,7 @@ fn curves_where_none_may_stand() {
 #[test]
 fn settings_out_of_their_range() {
     check(
-        "Screen 4 3\nSamples 0 -1\nShutter 1.5\nTone gamma\nTone rgb\nDepth 17\nLens -1 0\nFrames 2.5\nFrames 9 3\nFrames 0\nTrace",
+        "Screen 4 3\nSamples 0 -1\nShutter 1.5\nTone gamma\nTone rgb\nDepth 65\nLens -1 0\nFrames 2.5\nFrames 9 3\nFrames 0\nTrace",
         expect![[r#"
             error: `0` is not a number of rays
              --> a.txt:2:9
@@ -347,11 +347,11 @@ fn settings_out_of_their_range() {
               |
               = help: did you mean `srgb`?
 
-            error: `17` is not a number of bounces
+            error: `65` is not a number of bounces
              --> a.txt:6:7
               |
-            6 | Depth 17
-              |       ^^ expected `n`, a whole number up to 16
+            6 | Depth 65
+              |       ^^ expected `n`, a whole number up to 64
 
             error: the lens's radius must not be negative
              --> a.txt:7:6

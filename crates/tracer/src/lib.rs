@@ -17,6 +17,7 @@
 //! ```
 
 mod camera;
+mod cut_light;
 mod exposure;
 mod fast;
 #[cfg(feature = "accuracy")]
@@ -27,6 +28,7 @@ mod sampling;
 mod scale;
 
 pub use camera::pixel_ray;
+pub use cut_light::{CutLight, cut_light};
 pub use exposure::Exposure;
 #[cfg(feature = "accuracy")]
 pub use fast::Means;

@@ -189,6 +189,11 @@ fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<(
     if let Some(size) = args.size {
         warn_if_squashed(&plan, size, console)?;
     }
+    if !console.quiet
+        && let Some(warning) = plan.light_cut_off()?
+    {
+        console.warn(warning);
+    }
     match target {
         Target::Animation(container, place) => animation(args, *container, place, &plan, console),
         Target::Image(path, format) => image(path, *format, &plan, console),

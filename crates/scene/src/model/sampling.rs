@@ -136,13 +136,13 @@ impl Scripted for Tone {
     }
 }
 
-/// How many mirrorings and refractions are followed, from 0 to 16.
+/// How many mirrorings and refractions are followed, from 0 to 64.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Depth(u32);
 
 impl Depth {
     /// The most that can be asked for.
-    pub const MOST: u32 = 16;
+    pub const MOST: u32 = 64;
 
     /// # Errors
     /// When it is more than [`Self::MOST`].
