@@ -2,11 +2,12 @@
 
 use crate::allowance::Loan;
 use crate::block::Area;
+use crate::bound;
 use crate::exact::FewColours;
 use crate::histogram::Histogram;
 use crate::nearest::{self, Nearest};
-use crate::needs::{Need, Needs};
-use crate::palette::{Palette, Sample};
+use crate::needs::Needs;
+use crate::palette::{Guesses, Palette, Sample};
 
 /// Mean squared error (see [`colour`](crate::colour)) up to which a palette of half as many colours is taken: it takes up
 /// half as many bytes, and the indices fewer, too.
@@ -32,8 +33,11 @@ pub(crate) enum Plan {
 /// What is drawn with which palette.
 #[derive(Debug)]
 pub(crate) struct LossyPlan {
-    /// `None` for the first frame.
+    /// `None` if the frame is encoded as if it were alone: the first one, and those that cannot be drawn well enough over
+    /// others.
     pub(crate) loan: Option<Loan>,
+    /// How far a pixel may be off.
+    pub(crate) bound: u8,
     /// The part of the frame that is drawn because it changed.
     pub(crate) changed: f64,
     /// `None` if nothing is to be drawn.
@@ -53,34 +57,49 @@ pub(crate) struct Quantised {
 
 impl LossyPlan {
     /// For a frame of which the needs are known. Fills the histogram with the colours that are drawn; each of `parts` counts
-    /// a part of them.
+    /// a part of them. `loan`: given if the frame is drawn over others, so that no pixel is further off than `bound`.
+    /// Where that cannot be, the loan is back in `loan`, and the frame is planned as if it were alone.
     pub(crate) fn new(
         pixels: &[[u8; 3]],
         width: usize,
-        loan: Option<Loan>,
+        loan: &mut Option<Loan>,
+        bound: u8,
         needs: &mut Needs,
         histogram: &mut Histogram,
         parts: &mut [Histogram],
     ) -> Self {
-        let least = loan.as_ref().map_or(0.0, |loan| loan.least_error);
-        let changed = needs.count(pixels, least, histogram, parts) as f64 / pixels.len() as f64;
-        let area = Area::around(&needs.pixels, width, |need| matches!(need, Need::Draw | Need::Refine));
+        if let Some(lent) = loan.take() {
+            let changed = needs.count(pixels, lent.least_error, histogram, parts) as f64 / pixels.len() as f64;
+            let area = Area::around(&needs.pixels, width, |need| need.may_draw());
+            let bins = Sample::of_bins(histogram);
+            let best = Quantised::new(histogram, &bins, 255).of_fewer_colours(histogram, &bins);
+            if let Some(quantised) = best.within((pixels, &needs.pixels), histogram, &bins, bound) {
+                let level_error = nearest::mean_level_error(histogram, &quantised.nearest, &quantised.palette);
+                return Self { loan: Some(lent), bound, changed, area, quantised: Box::new(quantised), level_error };
+            }
+            *loan = Some(lent);
+        }
+        needs.draw_all(width, pixels.len());
+        histogram.count(pixels, parts);
         let bins = Sample::of_bins(histogram);
-        let quantised = match loan {
-            // A viewer may see the first frame for long, or see nothing else.
-            None => Quantised::new(histogram, &bins, 256),
-            Some(_) => Quantised::new(histogram, &bins, 255).of_fewer_colours(histogram, &bins),
-        };
+        // A viewer may see the first frame for long, or see nothing else.
+        let quantised = Quantised::new(histogram, &bins, 256);
         let level_error = nearest::mean_level_error(histogram, &quantised.nearest, &quantised.palette);
-        Self { loan, changed, area, quantised: Box::new(quantised), level_error }
+        let area = Some(Area::whole(width, pixels.len()));
+        Self { loan: None, bound: bound::NONE, changed: 1.0, area, quantised: Box::new(quantised), level_error }
     }
 }
 
 impl Quantised {
     /// With at most so many colours.
-    fn new(histogram: &Histogram, bins: &[Sample], size: usize) -> Self {
+    pub(crate) fn new(histogram: &Histogram, bins: &[Sample], size: usize) -> Self {
         let (palette, guesses) = Palette::of_bins(histogram, bins, size);
-        let nearest = Nearest::of_bins(bins, &palette, &guesses);
+        Self::of(palette, &guesses, histogram, bins)
+    }
+
+    /// With the colours of a palette.
+    pub(crate) fn of(palette: Palette, guesses: &Guesses, histogram: &Histogram, bins: &[Sample]) -> Self {
+        let nearest = Nearest::of_bins(bins, &palette, guesses);
         let error = nearest::mean_error(histogram, &nearest);
         Self { palette, nearest, error }
     }
