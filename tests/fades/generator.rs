@@ -102,7 +102,8 @@ impl Fade {
             let changes = f64::from(x) >= self.still * f64::from(self.width);
             let time = if changes { number } else { 0 };
             let shift = f64::from(time) * self.speed;
-            let (u, v) = ((f64::from(x) + shift) / f64::from(self.width), f64::from(y) / f64::from(self.height));
+            let (u, v) =
+                ((f64::from(x) + shift) / f64::from(self.width), f64::from(y) / f64::from(self.height));
             let steps = match time.checked_div(self.turn).unwrap_or(0) % 2 {
                 0 => time.checked_rem(self.turn).unwrap_or(time),
                 _ => self.turn - time % self.turn,
@@ -147,7 +148,8 @@ fn cloud(x: f64, y: f64, seed: u32) -> f64 {
         let (sx, sy) = (fx * fx * (3.0 - 2.0 * fx), fy * fy * (3.0 - 2.0 * fy));
         let at = |dx: i32, dy: i32| {
             let (x, y) = (left as i32 + dx, top as i32 + dy);
-            f64::from(scatter(x as u32 ^ scatter(y as u32 ^ scatter(seed ^ octave as u32))) & 0xffff) / 65_535.0
+            f64::from(scatter(x as u32 ^ scatter(y as u32 ^ scatter(seed ^ octave as u32))) & 0xffff)
+                / 65_535.0
         };
         let row = |dy| at(0, dy) + (at(1, dy) - at(0, dy)) * sx;
         (row(0) + (row(1) - row(0)) * sy) * 0.5_f64.powi(octave + 1)

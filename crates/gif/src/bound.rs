@@ -24,7 +24,7 @@ pub(crate) const NONE: u8 = u8::MAX;
 /// The most colours that a palette takes in because of the bound.
 const MOST_ADDED: usize = 64;
 /// With more colours that are too far off, a palette is not mended.
-const MOST_FAR: usize = 1 << 10;
+const MOST_FAR: usize = 1 << 9;
 /// Pixels that are looked at together.
 const PART: usize = 1 << 14;
 
@@ -42,14 +42,21 @@ pub(crate) fn closest(colours: &[[u8; 3]], rgb: [u8; 3]) -> (u8, u8) {
 /// The bound of a frame of more than 256 colours. `histogram`: of all its pixels.
 pub(crate) fn of(pixels: &[[u8; 3]], histogram: &Histogram) -> u8 {
     let bins = Sample::of_bins(histogram);
-    let quantised = Quantised::new(histogram, &bins, 256);
+    let (Palette { colours, .. }, guesses) = Palette::of_bins(histogram, &bins, 256);
+    // How far a colour, or the worst before it, is off at least.
+    let worse = |worst: u8, rgb: [u8; 3]| {
+        let near = histogram.find(rgb).map_or(0, |bin| guesses.of(bin, bins[bin].rgb));
+        if levels_off(colours[usize::from(near)], rgb) <= worst {
+            return worst;
+        }
+        closest(&colours, rgb).1.max(worst)
+    };
     let worst = if histogram.is_exact() {
-        histogram.bins().iter().map(Bin::colour).fold(0, |worst, rgb| quantised.worse(histogram, worst, rgb))
+        histogram.bins().iter().map(Bin::colour).fold(0, worse)
     } else {
-        let parts = pixels.par_chunks(PART).map(|pixels| {
-            let runs = pixels.chunk_by(|a, b| a == b).map(|run| run[0]);
-            runs.fold(0, |worst, rgb| quantised.worse(histogram, worst, rgb))
-        });
+        let parts = pixels
+            .par_chunks(PART)
+            .map(|pixels| pixels.chunk_by(|a, b| a == b).map(|run| run[0]).fold(0, worse));
         parts.reduce(|| 0, u8::max)
     };
     // Two of more than 256 colours share an entry.
@@ -57,16 +64,6 @@ pub(crate) fn of(pixels: &[[u8; 3]], histogram: &Histogram) -> u8 {
 }
 
 impl Quantised {
-    /// How far a colour, or the worst before it, is off at least.
-    fn worse(&self, histogram: &Histogram, worst: u8, rgb: [u8; 3]) -> u8 {
-        let nearest = histogram.find(rgb).map_or(0, |bin| self.nearest[bin].index);
-        // The nearest entry in the metric of all errors mostly is that in this one as well.
-        if levels_off(self.palette.colours[usize::from(nearest)], rgb) <= worst {
-            return worst;
-        }
-        closest(&self.palette.colours, rgb).1.max(worst)
-    }
-
     /// Changes entries so that each colour that is drawn has one within `bound`; `None` if that cannot be.
     pub(crate) fn within(
         mut self,
@@ -83,7 +80,8 @@ impl Quantised {
             }
             // The one first that stands in for most of the others.
             let mut added = Vec::new();
-            let covered = |rgb, far: &[[u8; 3]]| far.iter().filter(|far| levels_off(**far, rgb) <= bound).count();
+            let covered =
+                |rgb, far: &[[u8; 3]]| far.iter().filter(|far| levels_off(**far, rgb) <= bound).count();
             while let Some(&rgb) = far.iter().max_by_key(|rgb| covered(**rgb, &far)) {
                 added.push(rgb);
                 far.retain(|&other| levels_off(other, rgb) > bound);
@@ -124,10 +122,11 @@ impl Quantised {
         let mut found: Vec<_> = if histogram.is_exact() {
             histogram.bins().iter().map(Bin::colour).filter_map(far).collect()
         } else {
-            let parts = pixels.par_chunks(PART).zip(needs.par_chunks(PART)).flat_map_iter(|(pixels, needs)| {
-                let drawn = pixels.iter().zip(needs).filter(|(_, need)| need.may_draw());
-                drawn.filter_map(|(&rgb, _)| far(rgb)).take(MOST_FAR)
-            });
+            let parts =
+                pixels.par_chunks(PART).zip(needs.par_chunks(PART)).flat_map_iter(|(pixels, needs)| {
+                    let drawn = pixels.iter().zip(needs).filter(|(_, need)| need.may_draw());
+                    drawn.filter_map(|(&rgb, _)| far(rgb)).take(MOST_FAR)
+                });
             parts.collect()
         };
         found.sort_unstable();
@@ -153,7 +152,9 @@ impl Quantised {
 
     /// With other colours, most of which are the same.
     fn with(&self, colours: Vec<[u8; 3]>, histogram: &Histogram, bins: &[Sample]) -> Self {
-        let place = |rgb: &[u8; 3]| colours.binary_search(rgb).unwrap_or_else(|next| next.min(colours.len() - 1)) as u8;
+        let place = |rgb: &[u8; 3]| {
+            colours.binary_search(rgb).unwrap_or_else(|next| next.min(colours.len() - 1)) as u8
+        };
         let places = self.palette.colours.iter().map(place).collect::<Vec<_>>();
         let guesses = self.nearest.iter().map(|entry: &Nearest| places[usize::from(entry.index)]).collect();
         Self::of(Palette::new(colours), &Guesses::of_each(guesses), histogram, bins)

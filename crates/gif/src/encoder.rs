@@ -267,8 +267,7 @@ impl<W: Write> Encoder<W> {
                 let quantiser = Quantiser::read(&mut state, size, exact)?;
                 // The file's beginning is written already.
                 let nowhere = Counting { inner: None, bytes: 0 };
-                let mut file =
-                    begin(nowhere, size, plays).map_err(|source| Error::State { source })?;
+                let mut file = begin(nowhere, size, plays).map_err(|source| Error::State { source })?;
                 *file.get_mut() = Counting { inner: Some(writer), bytes };
                 Stage::Running(Box::new(Running { size, file, quantiser }))
             }

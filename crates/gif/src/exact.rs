@@ -224,7 +224,8 @@ mod tests {
 
     #[test]
     fn a_frame_drifts_from_the_first_slight_change_to_the_next_large_one() {
-        let colours = |by: u32| (0..=LARGE as u32).map(|k| [((k + by) / 640) as u8, 10, 20]).collect::<Vec<_>>();
+        let colours =
+            |by: u32| (0..=LARGE as u32).map(|k| [((k + by) / 640) as u8, 10, 20]).collect::<Vec<_>>();
         let kind = |previous: Option<(u32, bool)>, now: u32, exact: bool| {
             let before = previous.map(|(by, drifts)| (colours(by), drifts));
             let before = before.as_ref().map(|(before, drifts)| (&before[..], *drifts));
@@ -245,7 +246,8 @@ mod tests {
 
     #[test]
     fn a_small_frame_does_not_drift() {
-        let colours = |by: u32| (0..LARGE as u32).map(|k| [((k + by) / 640) as u8, 10, 20]).collect::<Vec<_>>();
+        let colours =
+            |by: u32| (0..LARGE as u32).map(|k| [((k + by) / 640) as u8, 10, 20]).collect::<Vec<_>>();
         let kind = Kind::of(&colours(640), Some((&colours(0), false)), false);
         assert!(kind.few.is_some() && !kind.drifts);
     }

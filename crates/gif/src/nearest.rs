@@ -21,10 +21,9 @@ impl Nearest {
 
     /// For each bin of a histogram.
     pub(crate) fn of_bins(bins: &[Sample], palette: &Palette, guesses: &Guesses) -> Vec<Self> {
-        let nearest =
-            bins.par_iter().enumerate().with_min_len(512).map(|(number, bin)| {
-                Self::new(palette.nearest(&bin.point, guesses.of(number, bin.rgb)), bin, palette)
-            });
+        let nearest = bins.par_iter().enumerate().with_min_len(512).map(|(number, bin)| {
+            Self::new(palette.nearest(&bin.point, guesses.of(number, bin.rgb)), bin, palette)
+        });
         nearest.collect()
     }
 }

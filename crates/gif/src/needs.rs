@@ -2,7 +2,9 @@
 //!
 //! A frame is compared with what a viewer will see before it. That is known before the previous frame is drawn, so both
 //! frames can be worked on at once: where the previous frame leaves a pixel, the viewer sees what was seen before; where
-//! it draws one, the palette's nearest entry is assumed. Where another index was chosen, the next comparison finds it.
+//! it draws one, the palette's nearest entry is assumed; what it may leave counts as left. Where another index was chosen, the
+//! next comparison finds it. Before a frame is drawn itself, it is known what is seen, and what would be left too far off is
+//! [drawn](Needs::draw_what_is_off).
 //!
 //! The frame is divided into tiles. A tile whose changes are small is left as a whole. Of the pixels that stay as they were
 //! but are seen wrong, the worst of each tile are refined: drawn once more with a better colour. Tiles apart from all

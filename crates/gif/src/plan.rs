@@ -69,13 +69,22 @@ impl LossyPlan {
         parts: &mut [Histogram],
     ) -> Self {
         if let Some(lent) = loan.take() {
-            let changed = needs.count(pixels, lent.least_error, histogram, parts) as f64 / pixels.len() as f64;
+            let changed =
+                needs.count(pixels, lent.least_error, histogram, parts) as f64 / pixels.len() as f64;
             let area = Area::around(&needs.pixels, width, |need| need.may_draw());
             let bins = Sample::of_bins(histogram);
             let best = Quantised::new(histogram, &bins, 255).of_fewer_colours(histogram, &bins);
             if let Some(quantised) = best.within((pixels, &needs.pixels), histogram, &bins, bound) {
-                let level_error = nearest::mean_level_error(histogram, &quantised.nearest, &quantised.palette);
-                return Self { loan: Some(lent), bound, changed, area, quantised: Box::new(quantised), level_error };
+                let level_error =
+                    nearest::mean_level_error(histogram, &quantised.nearest, &quantised.palette);
+                return Self {
+                    loan: Some(lent),
+                    bound,
+                    changed,
+                    area,
+                    quantised: Box::new(quantised),
+                    level_error,
+                };
             }
             *loan = Some(lent);
         }
@@ -86,7 +95,14 @@ impl LossyPlan {
         let quantised = Quantised::new(histogram, &bins, 256);
         let level_error = nearest::mean_level_error(histogram, &quantised.nearest, &quantised.palette);
         let area = Some(Area::whole(width, pixels.len()));
-        Self { loan: None, bound: bound::NONE, changed: 1.0, area, quantised: Box::new(quantised), level_error }
+        Self {
+            loan: None,
+            bound: bound::NONE,
+            changed: 1.0,
+            area,
+            quantised: Box::new(quantised),
+            level_error,
+        }
     }
 }
 

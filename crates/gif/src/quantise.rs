@@ -166,7 +166,8 @@ impl Quantiser {
     /// Looks at the frame that is drawn next once more, now that it is known what is seen before it.
     fn settle(&mut self) {
         let Self { prepared, seen, parts, allowance, .. } = self;
-        let Some(Prepared { frame, buffers: Buffers { needs, histogram }, plan: Plan::Lossy(plan), .. }) = prepared
+        let Some(Prepared { frame, buffers: Buffers { needs, histogram }, plan: Plan::Lossy(plan), .. }) =
+            prepared
         else {
             return;
         };
