@@ -165,7 +165,7 @@ fn slow_fades_that_are_cut_have_the_same_bytes() {
     let mut dice = fastrand::Rng::with_seed(3);
     for number in 0..4 {
         let fade = Fade::at_random(&mut dice);
-        let frames = (0..fade.frames).map(|k| fade.frame(k)).collect();
+        let frames = (0..fade.frames.min(12)).map(|k| fade.frame(k)).collect();
         let animation = Animation { settings: Settings::default(), frames };
         let whole = animation.whole();
         assert!(animation.in_pieces(|_| true) == whole, "fade {number}, cut after each frame: {fade:?}");

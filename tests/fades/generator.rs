@@ -26,6 +26,8 @@ pub(crate) struct Fade {
     still: f64,
     /// Whether a ball moves over it.
     ball: bool,
+    /// For so many frames a patch of bright noise lies over it.
+    patch: u32,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -71,10 +73,13 @@ impl Fade {
         let slope = weights.map(|weight| slope * weight / most);
         let rising = slope.iter().sum::<f64>() > 0.0;
         let base = of(dice, 120.0).map(|level| if rising { level } else { 255.0 - level });
+        // Large ones have more colours than are counted one by one.
+        let large = dice.u8(0..16) == 0;
+        let side = if large { 150..260 } else { 8..120 };
         Self {
-            width: dice.u32(8..120),
-            height: dice.u32(8..120),
-            frames: dice.u32(6..60),
+            width: dice.u32(side.clone()),
+            height: dice.u32(side),
+            frames: dice.u32(if large { 3..8 } else { 6..60 }),
             picture,
             seed: dice.u32(..),
             base,
@@ -86,6 +91,7 @@ impl Fade {
             speed: if dice.u8(0..3) == 0 { dice.f64() * 2.0 } else { 0.0 },
             still: if dice.u8(0..3) == 0 { dice.f64() } else { 0.0 },
             ball: dice.u8(0..4) == 0,
+            patch: if dice.u8(0..4) == 0 { dice.u32(1..12) } else { 0 },
         }
     }
 
@@ -98,6 +104,9 @@ impl Fade {
             if self.ball && far < 1.0 {
                 let light = (1.0 - far * far).sqrt();
                 return Rgb([(250.0 * light) as u8, (150.0 * light) as u8, 60]);
+            }
+            if number < self.patch && x < self.width / 4 && y % 4 < 3 {
+                return Rgb([0, 8, 16].map(|shift| (scatter(x << 16 ^ y ^ self.seed) >> shift) as u8));
             }
             let changes = f64::from(x) >= self.still * f64::from(self.width);
             let time = if changes { number } else { 0 };
