@@ -131,7 +131,7 @@ fn the_last_image_is_held_also_where_frames_are_left_out() {
     let folder = Folder::new();
     let level = |k: u8| Rgb([20 * k, 0, 0]);
     for k in 0..12_u8 {
-        RgbImage::from_pixel(9, 5, level(k)).save(folder.join(format!("f{k:02}.png"))).unwrap();
+        RgbImage::from_pixel(9, 5, level(k)).save(folder.join(&format!("f{k:02}.png"))).unwrap();
     }
     let files = (0..12).map(|k| format!("f{k:02}.png")).collect::<Vec<_>>().join(" ");
     for (fps, count) in [(50, 12), (100, 6), (1_000, 1)] {
@@ -148,7 +148,7 @@ fn a_slow_fade_of_few_colours_is_exact_where_that_is_asked_for() {
     let folder = Folder::new();
     let frame = |k: u32| RgbImage::from_fn(400, 300, |x, y| Rgb([(40 + (x + y) / 16 + k) as u8, 60, 90]));
     for k in 0..4 {
-        frame(k).save(folder.join(format!("{k}.png"))).unwrap();
+        frame(k).save(folder.join(&format!("{k}.png"))).unwrap();
     }
     let shown = |flag: &str| {
         folder.rayfold(&format!("encode 0.png 1.png 2.png 3.png -o a.gif {flag}")).assert().code(0);
