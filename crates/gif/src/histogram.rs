@@ -99,8 +99,7 @@ impl Histogram {
         self.shift == 0
     }
 
-    /// Counts the colours of pixels with the help of `others`, in the order in which [`Needs::count`](crate::needs::Needs::count)
-    /// counts those of a frame that is drawn whole.
+    /// Counts the colours of pixels with the help of `others`, each of which takes a part of them.
     pub(crate) fn count(&mut self, pixels: &[[u8; 3]], others: &mut [Self]) {
         let part = pixels.len().div_ceil(1 + others.len());
         let histograms = std::iter::once(&mut *self).chain(&mut *others).collect::<Vec<_>>();

@@ -49,6 +49,7 @@ mod needs;
 mod palette;
 mod plan;
 mod quantise;
+mod quantised;
 mod state;
 mod stripe;
 mod thinning;

@@ -14,7 +14,6 @@ use rayon::prelude::*;
 
 use crate::allowance::StaticPixels;
 use crate::block::Area;
-use crate::bound::levels_off;
 use crate::colour::{self, LocalMetric};
 use crate::histogram::Histogram;
 use crate::nearest::Nearest;
@@ -186,7 +185,7 @@ impl Needs {
         let found = parts.map(|((needs, pixels), seen)| {
             let mut found = false;
             for ((need, now), seen) in needs.iter_mut().zip(pixels).zip(seen) {
-                if levels_off(*now, *seen) > bound && matches!(need, Need::Keep | Need::Either) {
+                if colour::levels_off(*now, *seen) > bound && matches!(need, Need::Keep | Need::Either) {
                     *need = Need::Draw;
                     found = true;
                 }

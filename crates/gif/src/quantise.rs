@@ -19,7 +19,8 @@ use crate::error::Error;
 use crate::exact::{self, Change, Kind};
 use crate::histogram::{Histogram, MOST_BINS};
 use crate::needs::{LEFT_ERROR, LEFT_ERROR_IF_EXACT, Need, Needs, Previous};
-use crate::plan::{LossyPlan, Plan, Quantised};
+use crate::plan::{LossyPlan, Plan};
+use crate::quantised::Quantised;
 use crate::state::{StateReader, StateWriter, damaged};
 use crate::stripe::{self, Colours, Layout, Row, Stripe};
 

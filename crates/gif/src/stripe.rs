@@ -19,7 +19,6 @@ use rayon::prelude::*;
 
 use crate::allowance::Redrawn;
 use crate::block::{self, Area, Block};
-use crate::bound;
 use crate::colour::{self, LocalMetric};
 use crate::histogram::Histogram;
 use crate::lzw::{Part, Writer};
@@ -341,12 +340,12 @@ impl<'a> Stripe<'a> {
         if self.is_within(now, self.colour(entry.index)) {
             return entry;
         }
-        let (index, _) = bound::closest(&self.colours.palette.colours, now);
+        let (index, _) = colour::closest(&self.colours.palette.colours, now);
         Nearest { index, error: self.metric.error(now, self.colour(index)) }
     }
 
     fn is_within(&self, now: [u8; 3], shown: [u8; 3]) -> bool {
-        bound::levels_off(now, shown) <= self.colours.bound
+        colour::levels_off(now, shown) <= self.colours.bound
     }
 
     fn colour(&self, index: u8) -> [u8; 3] {
@@ -395,7 +394,7 @@ mod tests {
             transparent: None,
             changed: 1.0,
             error,
-            bound: bound::NONE,
+            bound: u8::MAX,
         };
         let mut writer = Writer::new(8);
         let mut stripe = Stripe::new(colours, &mut writer);
