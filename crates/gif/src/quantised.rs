@@ -200,4 +200,19 @@ mod tests {
         let (few, many) = (of_fewer(gray(), 1), of_fewer(gray(), 10_000));
         assert!(few.0 < many.0, "{few:?} {many:?}");
     }
+
+    #[test]
+    fn a_colour_that_is_too_far_off_is_taken_in_and_what_cannot_be_is_refused() {
+        let mut histogram = Histogram::new(MOST_BINS);
+        (0..400_u16).for_each(|k| histogram.add([(k / 4) as u8, (k % 4) as u8 * 8, 90], 1_000));
+        histogram.add([255, 0, 255], 1);
+        let bins = Sample::of_bins(&histogram);
+        let of_31 = || Quantised::new(&histogram, &bins, 31);
+        let far = of_31().too_far((&[], &[]), &histogram, 8).unwrap();
+        assert!(!far.is_empty());
+        let within = of_31().within((&[], &[]), &histogram, &bins, 8).unwrap();
+        assert!(within.palette.colours.contains(&[255, 0, 255]));
+        assert_eq!(within.too_far((&[], &[]), &histogram, 8), Some(Vec::new()));
+        assert!(of_31().within((&[], &[]), &histogram, &bins, 0).is_none());
+    }
 }
