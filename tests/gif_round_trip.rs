@@ -117,22 +117,50 @@ fn a_frame_of_256_colours_after_another_is_exact() {
     }
 }
 
+/// A sky that becomes brighter by a level a frame, and a cut.
+fn brightening(width: u32, height: u32) -> Vec<RgbImage> {
+    let sky = |time: u32| {
+        let level = |x: u32, y: u32| (40 + (x + y) * 24 / (width + height) + time) as u8;
+        RgbImage::from_fn(width, height, |x, y| Rgb([level(x, y), 60, (90 + time / 2) as u8]))
+    };
+    let cut = RgbImage::from_fn(width, height, |x, _| Rgb([(x * 24 / width) as u8, 200, 10]));
+    (0..12).map(sky).chain([cut]).collect()
+}
+
 #[test]
 fn few_colours_that_drift_are_near_and_small_and_a_cut_is_exact() {
-    let sky = |time: u32| {
-        RgbImage::from_fn(96, 96, |x, y| Rgb([(40 + (x + y) / 8 + time) as u8, 60, (90 + time / 2) as u8]))
-    };
-    let mut frames = (0..12).map(sky).collect::<Vec<_>>();
-    frames.push(RgbImage::from_fn(96, 96, |x, _| Rgb([(x / 4) as u8, 200, 10])));
+    let frames = brightening(400, 300);
     let (bytes, _) = encode(&frames, Settings::default()).unwrap();
     let shown = decode(&bytes);
     assert!(frames[0] == shown[0].0 && frames[12] == shown[12].0);
     for (k, (frame, (seen, _))) in frames.iter().zip(&shown).enumerate() {
         assert!(frame == seen || psnr(frame, seen) > 44.0, "frame {k}: {} dB", psnr(frame, seen));
+        let off = frame.iter().zip(seen.iter()).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(off <= Some(4), "frame {k} is off by {off:?} levels");
     }
-    let alone =
-        frames.iter().map(|frame| encode(std::slice::from_ref(frame), Settings::default()).unwrap().0.len());
-    assert!(bytes.len() * 3 < alone.sum::<usize>() * 2, "{} bytes", bytes.len());
+    let (exact, _) = encode(&frames, Settings { exact: true, ..Settings::default() }).unwrap();
+    assert!(bytes.len() * 3 < exact.len() * 2, "{} bytes, exact {}", bytes.len(), exact.len());
+}
+
+#[test]
+fn few_colours_that_drift_are_exact_where_that_is_asked_for_or_the_picture_is_small() {
+    let settings = Settings { exact: true, ..Settings::default() };
+    for (size, settings) in [((400, 300), settings), ((320, 240), Settings::default())] {
+        let frames = brightening(size.0, size.1);
+        let (bytes, _) = encode(&frames, settings).unwrap();
+        for (k, (frame, (seen, _))) in frames.iter().zip(decode(&bytes)).enumerate() {
+            assert!(*frame == seen, "frame {k} of {size:?}");
+        }
+    }
+}
+
+#[test]
+fn two_hundred_and_fifty_six_plain_frames_are_exact() {
+    let frames = (0..=255).map(|level| RgbImage::from_pixel(20, 20, Rgb([level, 0, 0]))).collect::<Vec<_>>();
+    let (bytes, _) = encode(&frames, Settings::default()).unwrap();
+    for (k, (frame, (seen, _))) in frames.iter().zip(decode(&bytes)).enumerate() {
+        assert!(*frame == seen, "frame {k}");
+    }
 }
 
 #[test]
@@ -223,6 +251,25 @@ fn the_last_frame_stays_as_long_as_asked() {
         let (mut plain, held) = (delays(None), delays(Some(250)));
         *plain.last_mut().unwrap() = 250;
         assert_eq!(held, plain, "{fps} frames a second");
+    }
+}
+
+#[test]
+fn an_animation_ends_with_its_last_frame_also_where_frames_are_dropped() {
+    let frames = (0..12).map(|k| RgbImage::from_pixel(9, 5, Rgb([20 * k, 0, 0]))).collect::<Vec<_>>();
+    for fps in [10.0, 50.0, 60.0, 80.0, 99.0, 100.0, 144.0, 200.0, 1_000.0] {
+        for count in 1..=12 {
+            for last_delay_cs in [None, Some(200)] {
+                let settings = Settings { fps, last_delay_cs, ..Settings::default() };
+                let (bytes, summary) = encode(&frames[..count], settings).unwrap();
+                let shown = decode(&bytes);
+                let (last, delay) = &shown[shown.len() - 1];
+                assert!(*last == frames[count - 1], "{count} frames, {fps} a second");
+                assert!(last_delay_cs.is_none_or(|asked| asked == *delay), "{delay}");
+                assert_eq!(summary.frames + summary.dropped, count as u64);
+                assert_eq!(summary.frames, shown.len() as u64);
+            }
+        }
     }
 }
 

@@ -5,12 +5,16 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
 
+#[path = "fades/generator.rs"]
+mod generator;
+
 use std::io::{Read, Write};
 use std::num::NonZeroU16;
 
 use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
+use generator::Fade;
 use image::{Rgb, RgbImage};
 use rayfold_gif::{Encoder, Error, Plays, Settings, Summary};
 
@@ -67,7 +71,8 @@ fn animation(dice: &mut fastrand::Rng) -> Animation {
     };
     // Above 50 a second frames are dropped.
     let fps = f64::from(dice.u32(1..9_000)) / 100.0;
-    let settings = Settings { fps, plays, last_delay_cs: dice.bool().then(|| dice.u16(..)) };
+    let last_delay_cs = dice.bool().then(|| dice.u16(..));
+    let settings = Settings { fps, plays, last_delay_cs, exact: dice.bool() };
     let mut image = RgbImage::new(dice.u32(1..120), dice.u32(1..120));
     // So that there is something to refine from the beginning.
     if dice.bool() {
@@ -132,6 +137,40 @@ fn whatever_an_animation_is_cut_after_its_bytes_are_the_same() {
         assert!(animation.in_pieces(|_| true) == whole, "animation {number}, cut after each frame");
         let lot = dice.u64(..);
         assert!(animation.in_pieces(|at| lot >> at & 1 == 1) == whole, "animation {number}, cut at {lot:b}");
+    }
+}
+
+/// Frames that are large enough to drift, and that then do not.
+#[test]
+fn a_large_slow_fade_that_is_cut_has_the_same_bytes() {
+    let sky = |k: u32| {
+        let level = |x: u32, y: u32| 40 + (x + y) / 8 + k;
+        RgbImage::from_fn(400, 300, |x, y| Rgb([level(x, y) as u8, 60, if k < 5 { 9 } else { x as u8 }]))
+    };
+    for exact in [false, true] {
+        let settings = Settings { exact, ..Settings::default() };
+        let animation = Animation { settings, frames: (0..8).map(sky).collect() };
+        let whole = animation.whole();
+        for cut in 1..8 {
+            assert!(animation.in_pieces(|at| at == cut) == whole, "cut after {cut} frames, exact: {exact}");
+        }
+        assert!(animation.in_pieces(|_| true) == whole, "cut after each frame, exact: {exact}");
+    }
+}
+
+/// A fade whose pixels are left until they are off by too much: what is decided once the frame before is drawn is decided
+/// in another process as well.
+#[test]
+fn slow_fades_that_are_cut_have_the_same_bytes() {
+    let mut dice = fastrand::Rng::with_seed(3);
+    for number in 0..4 {
+        let fade = Fade::at_random(&mut dice);
+        let frames = (0..fade.frames.min(12)).map(|k| fade.frame(k)).collect();
+        let animation = Animation { settings: Settings::default(), frames };
+        let whole = animation.whole();
+        assert!(animation.in_pieces(|_| true) == whole, "fade {number}, cut after each frame: {fade:?}");
+        let lot = dice.u64(..);
+        assert!(animation.in_pieces(|at| lot >> (at % 64) & 1 == 1) == whole, "fade {number}: {fade:?}");
     }
 }
 

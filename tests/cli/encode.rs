@@ -125,3 +125,36 @@ error: --fps -1: -1 frames a second: a GIF can hold rates from 0.00153 up
 
 "#]]);
 }
+
+#[test]
+fn the_last_image_is_held_also_where_frames_are_left_out() {
+    let folder = Folder::new();
+    let level = |k: u8| Rgb([20 * k, 0, 0]);
+    for k in 0..12_u8 {
+        RgbImage::from_pixel(9, 5, level(k)).save(folder.join(&format!("f{k:02}.png"))).unwrap();
+    }
+    let files = (0..12).map(|k| format!("f{k:02}.png")).collect::<Vec<_>>().join(" ");
+    for (fps, count) in [(50, 12), (100, 6), (1_000, 1)] {
+        folder.rayfold(&format!("encode {files} -o a.gif --fps {fps} --final-delay 2")).assert().code(0);
+        let shown = decode_gif(&folder.read("a.gif"));
+        assert_eq!(shown.len(), count, "{fps} frames a second");
+        let (image, delay) = shown.last().unwrap();
+        assert_eq!((image.get_pixel(0, 0), *delay), (&level(11), 200), "{fps} frames a second");
+    }
+}
+
+#[test]
+fn a_slow_fade_of_few_colours_is_exact_where_that_is_asked_for() {
+    let folder = Folder::new();
+    let frame = |k: u32| RgbImage::from_fn(400, 300, |x, y| Rgb([(40 + (x + y) / 16 + k) as u8, 60, 90]));
+    for k in 0..4 {
+        frame(k).save(folder.join(&format!("{k}.png"))).unwrap();
+    }
+    let shown = |flag: &str| {
+        folder.rayfold(&format!("encode 0.png 1.png 2.png 3.png -o a.gif {flag}")).assert().code(0);
+        decode_gif(&folder.read("a.gif")).into_iter().map(|(image, _)| image).collect::<Vec<_>>()
+    };
+    let meant = (0..4).map(frame).collect::<Vec<_>>();
+    assert!(shown("--exact") == meant);
+    assert!(shown("") != meant, "by default such a fade is near, and smaller");
+}

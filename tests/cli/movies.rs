@@ -5,6 +5,7 @@ use std::process::{Command, Stdio};
 
 use image::AnimationDecoder;
 use image::codecs::png::PngDecoder;
+use snapbox::str;
 
 use crate::{Folder, RAYFOLD, ball_at};
 
@@ -119,4 +120,48 @@ fn flags_that_a_video_has_no_room_for_are_refused() {
         assert!(said.contains("are for .gif and .apng"), "{said}");
     }
     folder.rayfold("render balls -o %d.apng").assert().code(2);
+}
+
+/// Browsers show a frame of 10 ms or less for 100 ms.
+#[test]
+fn an_apng_of_many_frames_a_second_takes_its_time_and_ends_with_its_last_frame() {
+    let folder = balls(12);
+    for (fps, count) in [(50, 12), (60, 12), (90, 12), (95, 6), (100, 6), (120, 5), (200, 3), (1_000, 1)] {
+        for (flag, last_ms) in [("", None), (" --final-delay 2", Some(2_000.0))] {
+            folder.rayfold(&format!("render balls -o a.apng --fps {fps}{flag}")).assert().code(0);
+            let file = folder.read("a.apng");
+            let decoder = PngDecoder::new(Cursor::new(&file)).unwrap();
+            let frames = decoder.apng().unwrap().into_frames().collect_frames().unwrap();
+            assert_eq!(frames.len(), count, "{fps} frames a second");
+            let delays = frames.iter().map(|frame| {
+                let (parts, whole) = frame.delay().numer_denom_ms();
+                f64::from(parts) / f64::from(whole)
+            });
+            let mut delays = delays.collect::<Vec<_>>();
+            let last = delays.pop().unwrap();
+            assert!(last_ms.is_none_or(|ms| (last - ms).abs() < 0.1), "{fps}: {last} ms");
+            delays.extend(last_ms.is_none().then_some(last));
+            assert!(delays.iter().all(|&ms| ms >= 11.0), "{fps} frames a second: {delays:?}");
+            let shown = frames.last().unwrap().buffer().clone();
+            let shown = image::DynamicImage::ImageRgba8(shown).into_rgb8();
+            assert_eq!(shown, folder.image("12.png"), "{fps} frames a second");
+        }
+    }
+    folder.rayfold("render balls -o a.apng --fps 100").assert().code(0).stderr_eq(str![[r#"
+a.apng: 6 frames of 24 x 16, [..]B, in [..] s
+6 frames left out: browsers show at most 90 frames of an APNG a second, not 100
+
+"#]]);
+}
+
+#[test]
+fn only_a_gif_is_asked_to_be_exact() {
+    let folder = balls(2);
+    folder.rayfold("render balls -o a.gif --exact").assert().code(0);
+    for name in ["a.apng", "a.y4m", "%d.png"] {
+        folder.rayfold(&format!("render balls -o {name} --exact")).assert().code(2).stderr_eq(str![[r#"
+error: --exact is for .gif: every other output keeps all colours of a frame
+
+"#]]);
+    }
 }

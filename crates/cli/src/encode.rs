@@ -46,11 +46,15 @@ pub(crate) struct Args {
     /// Show the files in the order in which they are given
     #[arg(long)]
     no_sort: bool,
-    /// Frames a second; above 50 some are left out, because a GIF cannot show them
+    /// Frames a second; above 50 some are left out, because a GIF cannot show them, but never the last
     #[arg(long, value_name = "RATE", default_value_t = Settings::default().fps, value_parser = values::rate, allow_negative_numbers = true)]
     fps: f64,
     #[command(flatten)]
     playback: Playback,
+    /// Keep every frame of at most 256 colours exactly. Without this flag, a slow fade of a large image (more than 100,000
+    /// pixels) may be off by up to 4 levels of 255, in a file several times smaller
+    #[arg(long)]
+    exact: bool,
     #[command(flatten)]
     threads: Threads,
 }
@@ -70,6 +74,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         fps,
         plays: args.playback.plays(Plays::Endless),
         last_delay_cs: args.playback.last_delay_cs(),
+        exact: args.exact,
     };
     let mut progress = Progress::start(console, "frames", movie.frames);
     let place = Place::File(args.output.clone());

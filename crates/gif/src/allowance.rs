@@ -139,6 +139,12 @@ impl Allowance {
         Loan { pixels, share, difference, least_error }
     }
 
+    /// Takes back a loan of which nothing is used.
+    pub(crate) fn give_back(&mut self, loan: &Loan) {
+        self.share += loan.share;
+        self.difference += loan.difference;
+    }
+
     /// Takes back what was not used of a loan, and adds what a frame of which a part `changed` adds.
     pub(crate) fn pay(&mut self, loan: &Loan, redrawn: &[Redrawn], changed: f64) {
         if loan.least_error == f32::INFINITY {

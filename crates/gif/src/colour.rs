@@ -114,6 +114,17 @@ pub(crate) fn levels_apart(a: [u8; 3], b: [u8; 3]) -> u32 {
     square(0) + square(1) + square(2)
 }
 
+/// The largest difference of a level.
+pub(crate) fn levels_off(a: [u8; 3], b: [u8; 3]) -> u8 {
+    a[0].abs_diff(b[0]).max(a[1].abs_diff(b[1])).max(a[2].abs_diff(b[2]))
+}
+
+/// The index of the colour that is off least, and by how much.
+pub(crate) fn closest(colours: &[[u8; 3]], rgb: [u8; 3]) -> (u8, u8) {
+    let off = colours.iter().map(|&colour| levels_off(colour, rgb));
+    (0..=u8::MAX).zip(off).fold((0, u8::MAX), |best, now| if now.1 < best.1 { now } else { best })
+}
+
 /// For each of 16 x 16 x 16 cells of sRGB the quadratic form that [`error`] is there: the coefficients of r², g², b²,
 /// rg, rb and gb.
 static METRIC: LazyLock<Box<[[f32; 6]; 4096]>> = LazyLock::new(|| {

@@ -10,17 +10,21 @@ use crate::block::Block;
 use crate::error::{Error, LONGEST_SIDE};
 use crate::quantise::Quantiser;
 use crate::state::{StateReader, StateWriter, damaged};
-use crate::timeline::Timeline;
+use crate::thinning::{Thinning, read_size};
+use crate::timeline::{MOST_FPS, Timeline};
 
 /// How to write the animation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Frames a second: above 0, at least 100 / 65,535. Above 50, frames are dropped.
+    /// Frames a second: above 0, at least 100 / 65,535. Above 50, frames are dropped, but not the last.
     pub fps: f64,
     /// How often the animation is shown.
     pub plays: Plays,
     /// How long the last frame is shown, in hundredths of a second; as long as `fps` says if not given.
     pub last_delay_cs: Option<u16>,
+    /// Whether frames of at most 256 colours are exact in slow fades of large pictures, too. There the file may become
+    /// several times larger.
+    pub exact: bool,
 }
 
 /// How often an animation is shown.
@@ -45,7 +49,7 @@ impl Plays {
 impl Settings {
     /// So many frames a second, repeated so many times (0: for ever).
     pub fn new(fps: f64, repetitions: u16) -> Self {
-        Self { fps, plays: Plays::repeated(repetitions), last_delay_cs: None }
+        Self { fps, plays: Plays::repeated(repetitions), last_delay_cs: None, exact: false }
     }
 }
 
@@ -75,6 +79,7 @@ pub struct Summary {
 /// See the [crate's documentation](crate) for what holds and for an example.
 pub struct Encoder<W: Write> {
     settings: Settings,
+    thinning: Thinning,
     timeline: Timeline,
     pushed: u64,
     written: u64,
@@ -102,7 +107,9 @@ impl<W: Write> Encoder<W> {
     /// [`Error::FrameRate`].
     pub fn new(writer: W, settings: Settings) -> Result<Self, Error> {
         let timeline = Timeline::new(settings.fps)?;
-        Ok(Self { settings, timeline, pushed: 0, written: 0, duration_cs: 0, stage: Stage::Empty(writer) })
+        let thinning = Thinning::new(settings.fps, MOST_FPS);
+        let stage = Stage::Empty(writer);
+        Ok(Self { settings, thinning, timeline, pushed: 0, written: 0, duration_cs: 0, stage })
     }
 
     /// Adds the next frame, and writes the one before it.
@@ -117,21 +124,27 @@ impl<W: Write> Encoder<W> {
         if found.0.min(found.1) == 0 || found.0.max(found.1) > LONGEST_SIDE {
             return Err(Error::Size { frame: number, found });
         }
-        if let Stage::Running(running) = &self.stage
-            && running.size != found
-        {
-            return Err(Error::UnlikeSize { frame: number, found, expected: running.size });
+        let size = match &self.stage {
+            Stage::Running(running) => Some(running.size),
+            Stage::Empty(_) | Stage::Failed => self.thinning.size(),
+        };
+        if let Some(expected) = size.filter(|&size| size != found) {
+            return Err(Error::UnlikeSize { frame: number, found, expected });
         }
-        let delay = self.timeline.advance();
         self.pushed = number;
-        let Some(delay_cs) = delay else { return Ok(()) };
+        self.thinning.push(frame).map_or(Ok(()), |frame| self.encode(frame))
+    }
 
+    /// Adds a frame that is not dropped.
+    fn encode(&mut self, frame: RgbImage) -> Result<(), Error> {
+        let (number, size) = (self.pushed, frame.dimensions());
+        let delay_cs = self.timeline.advance();
         let mut running = match std::mem::replace(&mut self.stage, Stage::Failed) {
             Stage::Empty(writer) => {
                 let writer = Counting { inner: Some(writer), bytes: 0 };
-                let file = begin(writer, found, self.settings.plays)
+                let file = begin(writer, size, self.settings.plays)
                     .map_err(|source| Error::Write { frame: number, source })?;
-                Box::new(Running { size: found, file, quantiser: Quantiser::new() })
+                Box::new(Running { size, file, quantiser: Quantiser::new(self.settings.exact) })
             }
             Stage::Running(running) => running,
             Stage::Failed => return Err(self.failed_before()),
@@ -149,6 +162,9 @@ impl<W: Write> Encoder<W> {
     ///
     /// [`Error::NoFrames`], [`Error::Write`].
     pub fn finish(mut self) -> Result<Summary, Error> {
+        if let Some(last) = self.thinning.finish() {
+            self.encode(last)?;
+        }
         let Running { size, mut file, mut quantiser } =
             match std::mem::replace(&mut self.stage, Stage::Failed) {
                 Stage::Empty(_) => return Err(Error::NoFrames),
@@ -171,7 +187,7 @@ impl<W: Write> Encoder<W> {
 
     /// Writes down where the animation stands, so that [`resume`](Self::resume) goes on with it, in another process, too.
     /// What has been written to the writer up to now is to be kept beside it. Bytes, compressed: mostly 2 to 4 for each
-    /// pixel of a frame, at most some 7.
+    /// pixel of a frame, at most some 7; above 50 frames a second up to 6 more.
     ///
     /// # Errors
     ///
@@ -180,7 +196,7 @@ impl<W: Write> Encoder<W> {
         if matches!(self.stage, Stage::Failed) {
             return Err(self.failed_before());
         }
-        let Self { settings, pushed, written, duration_cs, stage, .. } = self;
+        let Self { settings, thinning, timeline, pushed, written, duration_cs, stage } = self;
         let write = |stage: Stage<W>| {
             let mut state = StateWriter::new();
             state.f64(settings.fps)?;
@@ -189,12 +205,13 @@ impl<W: Write> Encoder<W> {
                 Plays::Once => (ONCE, 0),
                 Plays::Repeated(times) => (REPEATED, times.get()),
             };
-            state.bytes(&[plays, u8::from(settings.last_delay_cs.is_some())])?;
+            state.bytes(&[plays, u8::from(settings.last_delay_cs.is_some()), u8::from(settings.exact)])?;
             state.u16(times)?;
             state.u16(settings.last_delay_cs.unwrap_or_default())?;
-            for count in [pushed, written, duration_cs] {
+            for count in [pushed, written, duration_cs, timeline.handed_out()] {
                 state.u64(count)?;
             }
+            thinning.write(&mut state)?;
             match stage {
                 Stage::Empty(_) | Stage::Failed => state.bytes(&[EMPTY])?,
                 Stage::Running(running) => {
@@ -220,7 +237,8 @@ impl<W: Write> Encoder<W> {
     /// [`Error::StateVersion`], [`Error::State`]: encode the animation from its beginning.
     pub fn resume(writer: W, state: &[u8]) -> Result<Self, Error> {
         let mut state = StateReader::new(state)?;
-        let (fps, plays, has_last_delay) = (state.f64()?, state.u8()?, state.u8()? != 0);
+        let (fps, plays, has_last_delay, exact) =
+            (state.f64()?, state.u8()?, state.u8()? != 0, state.u8()? != 0);
         let (times, last_delay_cs) = (state.u16()?, state.u16()?);
         let plays = match (plays, NonZeroU16::new(times)) {
             (ENDLESS, _) => Plays::Endless,
@@ -228,37 +246,35 @@ impl<W: Write> Encoder<W> {
             (REPEATED, Some(times)) => Plays::Repeated(times),
             _ => return Err(damaged("it says not how often it is shown")),
         };
-        let settings = Settings { fps, plays, last_delay_cs: has_last_delay.then_some(last_delay_cs) };
-        let (pushed, written, duration_cs) = (state.u64()?, state.u64()?, state.u64()?);
-        if written > pushed || pushed > MOST_COUNTED || duration_cs > MOST_COUNTED {
+        let settings = Settings { fps, plays, last_delay_cs: has_last_delay.then_some(last_delay_cs), exact };
+        let (pushed, written, duration_cs, timed) = (state.u64()?, state.u64()?, state.u64()?, state.u64()?);
+        if written > timed || timed > pushed || pushed > MOST_COUNTED || duration_cs > MOST_COUNTED {
             return Err(damaged("it has frames that there cannot be"));
         }
-        let timeline = Timeline::new(fps).map_err(|_| damaged("its frame rate is wrong"))?.after(pushed);
+        let timeline = Timeline::new(fps).map_err(|_| damaged("its frame rate is wrong"))?.after(timed);
+        let thinning = Thinning::new(fps, MOST_FPS).read(&mut state, pushed)?;
         let stage = match state.u8()? {
             EMPTY => Stage::Empty(writer),
             RUNNING => {
-                let sides = (state.u64()?, state.u64()?);
-                let side =
-                    |side: u64| u32::try_from(side).ok().filter(|side| (1..=LONGEST_SIDE).contains(side));
-                let (Some(width), Some(height)) = (side(sides.0), side(sides.1)) else {
-                    return Err(damaged("its size is wrong"));
-                };
+                let size = read_size(&mut state)?;
+                if thinning.size().is_some_and(|held| held != size) {
+                    return Err(damaged("a frame that it holds has another size"));
+                }
                 let bytes = state.u64()?;
                 if bytes > MOST_COUNTED {
                     return Err(damaged("it is longer than there can be"));
                 }
-                let quantiser = Quantiser::read(&mut state, (width, height))?;
+                let quantiser = Quantiser::read(&mut state, size, exact)?;
                 // The file's beginning is written already.
                 let nowhere = Counting { inner: None, bytes: 0 };
-                let mut file =
-                    begin(nowhere, (width, height), plays).map_err(|source| Error::State { source })?;
+                let mut file = begin(nowhere, size, plays).map_err(|source| Error::State { source })?;
                 *file.get_mut() = Counting { inner: Some(writer), bytes };
-                Stage::Running(Box::new(Running { size: (width, height), file, quantiser }))
+                Stage::Running(Box::new(Running { size, file, quantiser }))
             }
             _ => return Err(damaged("it is neither begun nor not")),
         };
         state.finish()?;
-        Ok(Self { settings, timeline, pushed, written, duration_cs, stage })
+        Ok(Self { settings, thinning, timeline, pushed, written, duration_cs, stage })
     }
 
     fn write(&mut self, file: &mut gif::Encoder<Counting<W>>, block: Block) -> Result<(), Error> {

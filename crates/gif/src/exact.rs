@@ -1,7 +1,8 @@
 //! Frames of at most 256 colours, which are drawn without loss.
 //!
-//! An exception are frames that drift: much of the picture [changes](change) slightly from frame to frame. To draw all of
-//! that would cost several times the bytes, so these are drawn like frames of more colours.
+//! An exception are large frames that drift: much of the picture [changes](change) slightly from frame to frame. To draw all
+//! of that would cost several times the bytes, so these are drawn like frames of more colours, but no pixel is off by more
+//! than [a few levels](crate::bound::DRIFTING). In small frames it is not worth the error.
 
 use rayon::prelude::*;
 
@@ -25,6 +26,8 @@ const PROBE: usize = 61;
 const ONE_IN: usize = 4;
 /// Much of a frame changes if one pixel in so many does.
 const MUCH: usize = 8;
+/// Frames of more pixels may drift.
+const LARGE: usize = 100_000;
 /// Parts of a frame that are compared in parallel.
 const PARTS: usize = 2;
 
@@ -117,11 +120,11 @@ pub(crate) struct Kind {
 }
 
 impl Kind {
-    /// `previous`: the pixels of the frame before it, and whether that one drifts.
-    pub(crate) fn of(pixels: &[[u8; 3]], previous: Option<(&[[u8; 3]], bool)>) -> Self {
+    /// `previous`: the pixels of the frame before it, and whether that one drifts. `exact`: whether none drifts.
+    pub(crate) fn of(pixels: &[[u8; 3]], previous: Option<(&[[u8; 3]], bool)>, exact: bool) -> Self {
         let few = few_colours(pixels);
         let change = match previous {
-            Some((before, _)) if few.is_some() => change(pixels, before),
+            Some((before, _)) if few.is_some() && !exact && pixels.len() > LARGE => change(pixels, before),
             _ => Change::Large,
         };
         let drifts = match change {
@@ -221,21 +224,31 @@ mod tests {
 
     #[test]
     fn a_frame_drifts_from_the_first_slight_change_to_the_next_large_one() {
-        let colours = |by: u32| (0..10_000).map(|k| [((k + by) / 64) as u8, 10, 20]).collect::<Vec<_>>();
-        let kind = |previous: Option<(u32, bool)>, now: u32| {
+        let colours =
+            |by: u32| (0..=LARGE as u32).map(|k| [((k + by) / 640) as u8, 10, 20]).collect::<Vec<_>>();
+        let kind = |previous: Option<(u32, bool)>, now: u32, exact: bool| {
             let before = previous.map(|(by, drifts)| (colours(by), drifts));
-            let kind =
-                Kind::of(&colours(now), before.as_ref().map(|(before, drifts)| (&before[..], *drifts)));
+            let before = before.as_ref().map(|(before, drifts)| (&before[..], *drifts));
+            let kind = Kind::of(&colours(now), before, exact);
             (kind.few.is_some(), kind.drifts)
         };
-        assert_eq!(kind(None, 0), (true, false));
-        assert_eq!(kind(Some((0, false)), 0), (true, false));
-        assert_eq!(kind(Some((0, false)), 64), (false, true));
-        assert_eq!(kind(Some((64, true)), 64), (false, true));
-        assert_eq!(kind(Some((64, true)), 64 * 90), (true, false));
+        assert_eq!(kind(None, 0, false), (true, false));
+        assert_eq!(kind(Some((0, false)), 0, false), (true, false));
+        assert_eq!(kind(Some((0, false)), 640, false), (false, true));
+        assert_eq!(kind(Some((0, false)), 640, true), (true, false));
+        assert_eq!(kind(Some((640, true)), 640, false), (false, true));
+        assert_eq!(kind(Some((640, true)), 640 * 90, false), (true, false));
         // A frame of many colours never is, whatever came before.
         let many = (0..300_u32).map(|k| [k as u8, (k / 256) as u8, 0]).collect::<Vec<_>>();
-        let kind = Kind::of(&many, Some((&many, true)));
+        let kind = Kind::of(&many, Some((&many, true)), false);
         assert!(kind.few.is_none() && !kind.drifts);
+    }
+
+    #[test]
+    fn a_small_frame_does_not_drift() {
+        let colours =
+            |by: u32| (0..LARGE as u32).map(|k| [((k + by) / 640) as u8, 10, 20]).collect::<Vec<_>>();
+        let kind = Kind::of(&colours(640), Some((&colours(0), false)), false);
+        assert!(kind.few.is_some() && !kind.drifts);
     }
 }

@@ -4,6 +4,8 @@
 //! neighbours in cells of 2, 4 or 8 levels a channel. A frame with so many colours has a palette whose colours are farther
 //! apart than that.
 
+use rayon::prelude::*;
+
 /// The most bins that a histogram grows to.
 pub(crate) const MOST_BINS: usize = 1 << 14;
 const EMPTY: u32 = u32::MAX;
@@ -52,6 +54,12 @@ impl Bin {
         [mean(r, self.above[0]), mean(g, self.above[1]), mean(b, self.above[2])]
     }
 
+    /// Its colour, if it is only one.
+    pub(crate) fn colour(&self) -> [u8; 3] {
+        let [_, r, g, b] = self.key.to_be_bytes();
+        [r, g, b]
+    }
+
     /// The same pixels in a cell with another key.
     fn moved(mut self, key: u32) -> Self {
         let (from, to) = (self.key.to_be_bytes(), key.to_be_bytes());
@@ -89,6 +97,21 @@ impl Histogram {
     /// Whether each bin is one colour.
     pub(crate) fn is_exact(&self) -> bool {
         self.shift == 0
+    }
+
+    /// Counts the colours of pixels with the help of `others`, each of which takes a part of them.
+    pub(crate) fn count(&mut self, pixels: &[[u8; 3]], others: &mut [Self]) {
+        let part = pixels.len().div_ceil(1 + others.len());
+        let histograms = std::iter::once(&mut *self).chain(&mut *others).collect::<Vec<_>>();
+        histograms.into_par_iter().zip(pixels.par_chunks(part)).for_each(|(histogram, pixels)| {
+            histogram.clear();
+            for run in pixels.chunk_by(|a, b| a == b) {
+                histogram.add(run[0], run.len() as u32);
+            }
+        });
+        for other in &others[..pixels.len().div_ceil(part) - 1] {
+            self.absorb(other);
+        }
     }
 
     /// Adds what another one counted.

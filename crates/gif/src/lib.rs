@@ -6,16 +6,19 @@
 //! What holds:
 //!
 //! - Every frame is there, in order, for its time: also one that equals its predecessor. Only above 50 frames a second
-//!   are frames dropped, and the [`Summary`] says how many.
-//! - Memory does not grow with the number of frames: two of them, what a viewer sees, and a block. [`Encoder::push`]
-//!   writes the frame before the one that it takes.
+//!   are frames dropped, never the last, and the [`Summary`] says how many.
+//! - Memory does not grow with the number of frames: two of them, what a viewer sees, and a block; above 50 frames a second
+//!   two more frames. [`Encoder::push`] writes the frame before the one that it takes.
 //! - Between two frames an animation can be [suspended](Encoder::suspend), and gone on with in another process: the bytes are
 //!   the same.
 //! - The bytes depend on frames and settings alone, not on threads or time. Work is spread over the rayon pool that
 //!   [`Encoder::push`] is called in, by fork and join only: a pool of one thread is enough, inside or outside.
-//! - A frame with at most 256 colours is kept exactly, but where the picture drifts: where an eighth of it or more
-//!   changes from one frame to the next, and three quarters of that by less than three levels, as in a slow fade of a
-//!   gradient. Such a frame, and those after it until much changes clearly, come as near as others. The first is exact.
+//! - A frame with at most 256 colours is kept exactly. An exception are frames of more than 100,000 pixels where the picture
+//!   drifts: where an eighth of it or more changes from one frame to the next, and three quarters of that by less than three
+//!   levels, as in a slow fade of a gradient. Such a frame, and those after it until much changes clearly, are off by at most
+//!   4 levels; the first is exact. With [`Settings::exact`] all are.
+//! - No pixel of another frame is further off than 1.25 times the worst pixel of that frame encoded alone, counted as the
+//!   largest difference of a level, however many frames come before it.
 //!
 //! ```
 //! use image::{Rgb, RgbImage};
@@ -34,6 +37,7 @@
 
 mod allowance;
 mod block;
+mod bound;
 mod colour;
 mod encoder;
 mod error;
@@ -45,9 +49,12 @@ mod needs;
 mod palette;
 mod plan;
 mod quantise;
+mod quantised;
 mod state;
 mod stripe;
+mod thinning;
 mod timeline;
 
 pub use encoder::{Encoder, Plays, Settings, Summary};
 pub use error::Error;
+pub use thinning::Thinning;

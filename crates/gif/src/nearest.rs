@@ -14,13 +14,16 @@ pub(crate) struct Nearest {
 }
 
 impl Nearest {
+    /// An entry that is to be drawn for a bin.
+    pub(crate) fn new(index: u8, bin: &Sample, palette: &Palette) -> Self {
+        Self { index, error: colour::error(&bin.point, &palette.points[usize::from(index)]) }
+    }
+
     /// For each bin of a histogram.
     pub(crate) fn of_bins(bins: &[Sample], palette: &Palette, guesses: &Guesses) -> Vec<Self> {
-        let nearest =
-            bins.par_iter().enumerate().with_min_len(512).map(|(number, Sample { point, rgb, .. })| {
-                let index = palette.nearest(point, guesses.of(number, *rgb));
-                Self { index, error: colour::error(point, &palette.points[usize::from(index)]) }
-            });
+        let nearest = bins.par_iter().enumerate().with_min_len(512).map(|(number, bin)| {
+            Self::new(palette.nearest(&bin.point, guesses.of(number, bin.rgb)), bin, palette)
+        });
         nearest.collect()
     }
 }

@@ -2,7 +2,9 @@
 //!
 //! A frame is compared with what a viewer will see before it. That is known before the previous frame is drawn, so both
 //! frames can be worked on at once: where the previous frame leaves a pixel, the viewer sees what was seen before; where
-//! it draws one, the palette's nearest entry is assumed. Where another index was chosen, the next comparison finds it.
+//! it draws one, the palette's nearest entry is assumed; what it may leave counts as left. Where another index was chosen, the
+//! next comparison finds it. Before a frame is drawn itself, it is known what is seen, and what would be left too far off is
+//! [drawn](Needs::draw_what_is_off).
 //!
 //! The frame is divided into tiles. A tile whose changes are small is left as a whole. Of the pixels that stay as they were
 //! but are seen wrong, the worst of each tile are refined: drawn once more with a better colour. Tiles apart from all
@@ -27,6 +29,8 @@ pub(crate) const LEFT_ERROR_IF_EXACT: f32 = 6.0;
 pub(crate) const GLARING: f32 = 50.0;
 /// The level error up to which a pixel that changes may be left in a tile that is drawn.
 const SEEN_RIGHT: f32 = 2.0;
+/// The same of a pixel that could be left in the frame before: a level in each channel.
+const SEEN_RIGHT_AGAIN: f32 = 6.0;
 /// The squared error (see [`colour`]) above which a pixel that stays needs a better colour.
 const SEEN_WRONG: f32 = 1.5;
 /// Of these, the worst of a tile are refined: from this part of the tile's mean error on. Only they are worth the flicker.
@@ -49,6 +53,11 @@ pub(crate) enum Need {
 }
 
 impl Need {
+    /// Whether it may take a colour of the palette that is made for it.
+    pub(crate) fn may_draw(self) -> bool {
+        matches!(self, Need::Draw | Need::Refine)
+    }
+
     /// As a suspended animation holds it.
     pub(crate) fn to_byte(self) -> u8 {
         match self {
@@ -166,6 +175,24 @@ impl Needs {
             }
         }
         waited + 1
+    }
+
+    /// Draws the pixels that would be left further off than `bound`, now that it is known what is seen of them. Returns
+    /// whether there are any.
+    pub(crate) fn draw_what_is_off(&mut self, pixels: &[[u8; 3]], seen: &[[u8; 3]], bound: u8) -> bool {
+        let part = pixels.len().div_ceil(rayon::current_num_threads());
+        let parts = self.pixels.par_chunks_mut(part).zip(pixels.par_chunks(part)).zip(seen.par_chunks(part));
+        let found = parts.map(|((needs, pixels), seen)| {
+            let mut found = false;
+            for ((need, now), seen) in needs.iter_mut().zip(pixels).zip(seen) {
+                if colour::levels_off(*now, *seen) > bound && matches!(need, Need::Keep | Need::Either) {
+                    *need = Need::Draw;
+                    found = true;
+                }
+            }
+            found
+        });
+        found.reduce(|| false, |a, b| a || b)
     }
 
     /// Counts the colours of the pixels that are to be drawn or refined, into `all` with the help of `others`, each of
@@ -327,7 +354,8 @@ impl Tile {
             (&previous.frame[..count], &previous.seen[..count], &previous.needs[..count]);
         for (k, need) in needs[..count].iter_mut().enumerate() {
             let (now, was, seen) = (pixels[k], frame[k], shown[k]);
-            let left = drawn[k] == Need::Keep;
+            // What may be left is mostly left. Were it taken as drawn, one small change after the other would be left.
+            let left = matches!(drawn[k], Need::Keep | Need::Either);
             *need = if now == was {
                 let error = match self.refine {
                     Some(metric) if left && now != seen => metric.error(now, seen),
@@ -350,10 +378,11 @@ impl Tile {
                 } else {
                     self.excess += error;
                 }
+                let right = if drawn[k] == Need::Either { SEEN_RIGHT_AGAIN } else { SEEN_RIGHT };
                 self.worst = self.worst.max(error);
                 match error {
                     0.0 => Need::Keep,
-                    error if error > SEEN_RIGHT => Need::Draw,
+                    error if error > right => Need::Draw,
                     _ => Need::Either,
                 }
             };

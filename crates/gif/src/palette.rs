@@ -88,6 +88,11 @@ pub(crate) struct Guesses {
 }
 
 impl Guesses {
+    /// One for each bin; without any, the first entry for all.
+    pub(crate) fn of_each(indices: Vec<u8>) -> Self {
+        Self { coarse: None, indices }
+    }
+
     /// The index of an entry near a bin, given by its number and its mean colour.
     pub(crate) fn of(&self, number: usize, mean: [f32; 3]) -> u8 {
         let at = match &self.coarse {
@@ -115,7 +120,7 @@ impl Palette {
         if histogram.is_exact() && bins.len() <= size {
             let mut colours = bins.iter().map(|bin| bin.mean().map(|level| level as u8)).collect::<Vec<_>>();
             colours.sort_unstable();
-            return (Self::new(colours), Guesses { coarse: None, indices: Vec::new() });
+            return (Self::new(colours), Guesses::of_each(Vec::new()));
         }
         if bins.len() <= SAMPLES {
             let (palette, indices) = Self::of(samples, size);
@@ -164,6 +169,11 @@ impl Palette {
             centres.iter().map(|rgb| colours.binary_search(rgb).unwrap_or(0) as u8).collect::<Vec<_>>();
         let indices = owners.into_iter().map(|owner| places[usize::from(owner)]).collect();
         (Self::new(colours), indices)
+    }
+
+    /// The squared distance of a colour from the nearest other one.
+    pub(crate) fn apart_from_others(&self, index: u8) -> f32 {
+        self.neighbours.at(index).first().map_or(f32::INFINITY, |neighbour| neighbour.apart)
     }
 
     /// The index of the nearest colour. The search begins at `guess`.

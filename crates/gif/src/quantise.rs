@@ -13,12 +13,14 @@ use image::RgbImage;
 
 use crate::allowance::{Allowance, Loan, Redrawn};
 use crate::block::{Area, Block};
+use crate::bound;
 use crate::colour::LocalMetric;
 use crate::error::Error;
 use crate::exact::{self, Change, Kind};
 use crate::histogram::{Histogram, MOST_BINS};
 use crate::needs::{LEFT_ERROR, LEFT_ERROR_IF_EXACT, Need, Needs, Previous};
-use crate::plan::{LossyPlan, Plan, Quantised};
+use crate::plan::{LossyPlan, Plan};
+use crate::quantised::Quantised;
 use crate::state::{StateReader, StateWriter, damaged};
 use crate::stripe::{self, Colours, Layout, Row, Stripe};
 
@@ -35,6 +37,8 @@ const MANY_COLOURS: usize = 4096;
 /// Turns frames into blocks, one after the other.
 #[derive(Debug)]
 pub(crate) struct Quantiser {
+    /// Whether no frame [drifts](Kind).
+    exact: bool,
     /// The frame that is drawn next.
     prepared: Option<Prepared>,
     /// What a viewer sees after the last block.
@@ -42,6 +46,8 @@ pub(crate) struct Quantiser {
     allowance: Allowance,
     /// Used for each frame anew.
     parts: Vec<Histogram>,
+    /// All colours of a frame.
+    whole: Histogram,
     spare: Option<Buffers>,
     /// Mean level error of what the last palette draws.
     drawn_error: f32,
@@ -74,18 +80,23 @@ struct Preparation<'a> {
     width: usize,
     previous: Option<&'a Prepared>,
     drawn_error: f32,
+    exact: bool,
     allowance: &'a mut Allowance,
     parts: &'a mut [Histogram],
+    whole: &'a mut Histogram,
     buffers: &'a mut Buffers,
 }
 
 impl Quantiser {
-    pub(crate) fn new() -> Self {
+    /// `exact`: whether frames of few colours are exact also where they drift.
+    pub(crate) fn new(exact: bool) -> Self {
         Self {
+            exact,
             prepared: None,
             seen: RgbImage::default(),
             allowance: Allowance::new(),
             parts: (1..PARTS).map(|_| Histogram::new(MOST_BINS)).collect(),
+            whole: Histogram::new(MOST_BINS),
             spare: None,
             drawn_error: 0.0,
         }
@@ -98,20 +109,23 @@ impl Quantiser {
     }
 
     fn step(&mut self, frame: RgbImage, delay_cs: u16) -> Option<Block> {
+        self.settle();
         let previous = self.prepared.take();
         let first = previous.is_none();
         if first {
             self.seen = RgbImage::new(frame.width(), frame.height());
         }
-        let Self { seen, allowance, parts, spare, drawn_error, .. } = self;
+        let Self { exact, seen, allowance, parts, whole, spare, drawn_error, .. } = self;
         let mut buffers = spare.take().unwrap_or_else(Buffers::new);
         let mut preparation = Preparation {
             pixels: pixels_of(&frame),
             width: frame.width() as usize,
             previous: previous.as_ref(),
             drawn_error: *drawn_error,
+            exact: *exact,
             allowance,
             parts,
+            whole,
             buffers: &mut buffers,
         };
         let ((plan, drifts), drawn) = match &previous {
@@ -150,8 +164,31 @@ impl Quantiser {
         Some(block)
     }
 
+    /// Looks at the frame that is drawn next once more, now that it is known what is seen before it.
+    fn settle(&mut self) {
+        let Self { prepared, seen, parts, allowance, .. } = self;
+        let Some(Prepared { frame, buffers: Buffers { needs, histogram }, plan: Plan::Lossy(plan), .. }) =
+            prepared
+        else {
+            return;
+        };
+        let (pixels, width) = (pixels_of(frame), frame.width() as usize);
+        if plan.loan.is_none() || !needs.draw_what_is_off(pixels, pixels_of(seen), plan.bound) {
+            return;
+        }
+        let mut loan = plan.loan.take();
+        *plan = LossyPlan::new(pixels, width, &mut loan, plan.bound, needs, histogram, parts);
+        if let Some(loan) = loan {
+            allowance.give_back(&loan);
+        }
+        if plan.area.is_some() {
+            self.drawn_error = plan.level_error;
+        }
+    }
+
     /// The block of the last frame.
     pub(crate) fn finish(&mut self) -> Option<Block> {
+        rayon::scope(|_| self.settle());
         let last = self.prepared.take()?;
         rayon::scope(|_| Some(last.draw(&mut self.seen).0))
     }
@@ -176,8 +213,8 @@ impl Quantiser {
         match plan {
             Plan::Lossless(_) => state.bytes(&[LOSSLESS])?,
             Plan::Lossy(LossyPlan { loan: None, .. }) => state.bytes(&[LOSSY])?,
-            Plan::Lossy(LossyPlan { loan: Some(loan), .. }) => {
-                state.bytes(&[LOSSY_WITH_LOAN])?;
+            Plan::Lossy(LossyPlan { loan: Some(loan), bound, .. }) => {
+                state.bytes(&[LOSSY_WITH_LOAN, *bound])?;
                 loan.write(state)?;
             }
         }
@@ -196,12 +233,19 @@ impl Quantiser {
     }
 
     /// Reads what was written for frames of a size.
-    pub(crate) fn read(state: &mut StateReader<'_>, (width, height): (u32, u32)) -> Result<Self, Error> {
+    pub(crate) fn read(
+        state: &mut StateReader<'_>,
+        (width, height): (u32, u32),
+        exact: bool,
+    ) -> Result<Self, Error> {
         let mut quantiser =
-            Self { allowance: Allowance::read(state)?, drawn_error: state.f32()?, ..Self::new() };
+            Self { allowance: Allowance::read(state)?, drawn_error: state.f32()?, ..Self::new(exact) };
         let (delay_cs, first, drifts) = (state.u16()?, state.u8()? != 0, state.u8()? != 0);
         let kind = state.u8()?;
-        let loan = if kind == LOSSY_WITH_LOAN { Some(Loan::read(state)?) } else { None };
+        let (bound, loan) = match kind {
+            LOSSY_WITH_LOAN => (state.u8()?, Some(Loan::read(state)?)),
+            _ => (bound::NONE, None),
+        };
         let pixels = width as usize * height as usize;
         let seen = state.bytes(pixels * 3)?;
         let mut frame = state.bytes(pixels * 3)?;
@@ -221,11 +265,14 @@ impl Quantiser {
                 let few = exact::few_colours(pixels_of(&frame));
                 Plan::Lossless(few.ok_or_else(|| damaged("a frame without loss has too many colours"))?)
             }
-            LOSSY | LOSSY_WITH_LOAN if first == loan.is_none() => {
+            LOSSY | LOSSY_WITH_LOAN if loan.is_none() || !first => {
                 let Buffers { needs, histogram } = &mut buffers;
                 let (pixels, parts) = (pixels_of(&frame), &mut quantiser.parts);
-                let plan = || LossyPlan::new(pixels, width as usize, loan, needs, histogram, parts);
-                Plan::Lossy(rayon::scope(|_| plan()))
+                let (mut loan, width) = (loan, width as usize);
+                let plan = rayon::scope(|_| {
+                    LossyPlan::new(pixels, width, &mut loan, bound, needs, histogram, parts)
+                });
+                Plan::Lossy(plan)
             }
             _ => return Err(damaged("a frame is drawn as there is not")),
         };
@@ -249,8 +296,9 @@ impl Preparation<'_> {
     /// Finds out what the frame needs, and what it may use of the allowance; no loan if all of it is drawn. `seen`: what a
     /// viewer sees before the previous frame is drawn.
     fn compare(&mut self, seen: &RgbImage) -> (Kind, Option<Loan>) {
-        let Self { pixels, width, previous, drawn_error, .. } = *self;
-        let kind = Kind::of(pixels, previous.map(|previous| (pixels_of(&previous.frame), previous.drifts)));
+        let Self { pixels, width, previous, drawn_error, exact, .. } = *self;
+        let before = previous.map(|previous| (pixels_of(&previous.frame), previous.drifts));
+        let kind = Kind::of(pixels, before, exact);
         let needs = &mut self.buffers.needs;
         let Some(previous) = previous.filter(|_| kind.few.is_none()) else {
             needs.draw_all(width, pixels.len());
@@ -267,10 +315,25 @@ impl Preparation<'_> {
 
     /// How the frame is drawn, and whether it drifts.
     fn plan(self, (kind, loan): (Kind, Option<Loan>)) -> (Plan, bool) {
-        let Self { pixels, width, parts, buffers: Buffers { needs, histogram }, .. } = self;
+        let Self { pixels, width, parts, whole, allowance, buffers: Buffers { needs, histogram }, .. } = self;
+        let mut loan = loan;
         let plan = match kind.few {
             Some(colours) => Plan::Lossless(colours),
-            None => Plan::Lossy(LossyPlan::new(pixels, width, loan, needs, histogram, parts)),
+            None => {
+                let bound = match loan {
+                    None => bound::NONE,
+                    Some(_) if kind.drifts => bound::DRIFTING,
+                    Some(_) => {
+                        whole.count(pixels, parts);
+                        bound::of(pixels, whole)
+                    }
+                };
+                let plan = LossyPlan::new(pixels, width, &mut loan, bound, needs, histogram, parts);
+                if let Some(loan) = loan {
+                    allowance.give_back(&loan);
+                }
+                Plan::Lossy(plan)
+            }
         };
         (plan, kind.drifts)
     }
@@ -301,12 +364,12 @@ impl Prepared {
                 (exact::draw(pixels, width, self.first, seen, colours, self.delay_cs), Vec::new())
             }
             Plan::Lossy(LossyPlan { area: None, .. }) => (Block::nothing(self.delay_cs), Vec::new()),
-            Plan::Lossy(LossyPlan { area: Some(area), quantised, changed, .. }) => {
+            Plan::Lossy(LossyPlan { area: Some(area), quantised, changed, loan, bound, .. }) => {
                 let Quantised { palette, nearest, error } = &**quantised;
-                let transparent = (!self.first).then_some(palette.colours.len() as u8);
+                let transparent = loan.is_some().then_some(palette.colours.len() as u8);
                 let histogram = &self.buffers.histogram;
-                let (changed, error) = (*changed, *error);
-                let colours = Colours { palette, nearest, histogram, transparent, changed, error };
+                let (changed, error, bound) = (*changed, *error, *bound);
+                let colours = Colours { palette, nearest, histogram, transparent, changed, error, bound };
                 draw(pixels, width, *area, &self.buffers.needs.pixels, seen, colours, self.delay_cs)
             }
         }
@@ -382,7 +445,7 @@ mod tests {
 
     #[test]
     fn each_frame_is_planned_by_what_is_seen_before_it() {
-        let mut quantiser = Quantiser::new();
+        let mut quantiser = Quantiser::new(false);
         assert!(quantiser.push(frame(64, 0), 5).is_none());
         let Some(Prepared { first: true, plan: Plan::Lossy(plan), .. }) = &quantiser.prepared else {
             panic!("{:?}", quantiser.prepared)
@@ -407,7 +470,7 @@ mod tests {
 
     #[test]
     fn few_colours_are_planned_without_loss() {
-        let mut quantiser = Quantiser::new();
+        let mut quantiser = Quantiser::new(false);
         quantiser.push(RgbImage::from_pixel(16, 16, image::Rgb([9; 3])), 5);
         assert!(matches!(quantiser.prepared, Some(Prepared { plan: Plan::Lossless(_), .. })));
     }

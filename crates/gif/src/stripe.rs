@@ -27,10 +27,13 @@ use crate::needs::Need;
 use crate::palette::Palette;
 
 /// The additional squared error (see [`colour`]) that an index may have if it makes the file smaller.
-const TOLERANCE: f32 = 6.0;
+const TOLERANCE: f32 = 5.85;
+/// The same where no pixel may be off by more than `FEW_LEVELS`: there a larger error is not seen either.
+const TOLERANCE_IF_FEW_LEVELS: f32 = 9.0;
+const FEW_LEVELS: u8 = 2;
 /// The same where much of the frame changes, for each unit of the palette's mean error; the larger of the two holds. Such
 /// pixels are soon drawn anew, and need no better colours than the palette has.
-const TOLERANCE_BY_ERROR: f32 = 1.4;
+const TOLERANCE_BY_ERROR: f32 = 1.36;
 /// Added to it there where the surroundings are not smooth.
 const TOLERANCE_IF_ROUGH: f32 = 10.0;
 /// A pixel that stays is drawn anew only if its squared error becomes so many times smaller: a smaller gain is not worth
@@ -76,6 +79,8 @@ pub(crate) struct Colours<'a> {
     pub(crate) changed: f64,
     /// Mean squared error of what is drawn.
     pub(crate) error: f32,
+    /// How far a pixel may be off; the nearest entries are within it.
+    pub(crate) bound: u8,
 }
 
 /// Where a block lies, and how it is divided.
@@ -148,7 +153,8 @@ impl<'a> Stripe<'a> {
         let part = (colours.changed / MUCH_CHANGED).min(1.0) as f32;
         // A viewer may see the first frame for long.
         let soon_gone = if colours.transparent.is_some() { part } else { 0.0 };
-        let tolerance = TOLERANCE.max(TOLERANCE_BY_ERROR * colours.error * soon_gone);
+        let least = if colours.bound <= FEW_LEVELS { TOLERANCE_IF_FEW_LEVELS } else { TOLERANCE };
+        let tolerance = least.max(TOLERANCE_BY_ERROR * colours.error * soon_gone);
         Self {
             colours,
             writer,
@@ -185,8 +191,7 @@ impl<'a> Stripe<'a> {
                 Need::Either => self.kept_or_repeated(now, seen, previous),
                 Need::Refine | Need::Draw => {
                     if last.0 != now || last.1.is_none() {
-                        let bin = self.colours.histogram.find(now).unwrap_or(0);
-                        last = (now, Some(self.colours.nearest[bin]));
+                        last = (now, Some(self.nearest(now)));
                     }
                     let Some(entry) = last.1 else { continue };
                     let levels = colour::levels(now);
@@ -228,7 +233,8 @@ impl<'a> Stripe<'a> {
         let index = match previous.filter(|&index| index != transparent) {
             Some(index)
                 if self.writer.continues(index)
-                    && self.metric.error(now, self.colour(index)) <= self.metric.error(now, seen) =>
+                    && self.metric.error(now, self.colour(index)) <= self.metric.error(now, seen)
+                    && self.is_within(now, self.colour(index)) =>
             {
                 index
             }
@@ -259,7 +265,9 @@ impl<'a> Stripe<'a> {
         }
         let form = self.metric.around(now);
         let nearest = form.error(target, colour::levels(self.colour(entry.index)));
-        if let Some(transparent) = self.colours.transparent {
+        if let Some(transparent) = self.colours.transparent
+            && self.is_within(now, seen)
+        {
             let shown = form.error(target, colour::levels(seen));
             let bound = if need == Need::Refine { MUCH_BETTER * nearest } else { nearest };
             if bound >= shown {
@@ -289,7 +297,7 @@ impl<'a> Stripe<'a> {
         if nearest > new_string {
             for (at, &index) in others.indices.iter().enumerate() {
                 let error = error(at);
-                if error < best.1 {
+                if error < best.1 && self.is_within(now, self.colour(index)) {
                     best = (index, error);
                 }
             }
@@ -314,12 +322,30 @@ impl<'a> Stripe<'a> {
             let at = candidates.trailing_zeros() as usize;
             candidates &= candidates - 1;
             let error = error(at);
-            if error < found.1 && self.writer.continues(others.indices[at]) {
+            if error < found.1
+                && self.writer.continues(others.indices[at])
+                && self.is_within(now, self.colour(others.indices[at]))
+            {
                 found = (others.indices[at], error);
             }
         }
         self.writer.put(found.0);
         found.0
+    }
+
+    /// The palette entry nearest to a colour, or the closest where that one is too far off.
+    fn nearest(&self, now: [u8; 3]) -> Nearest {
+        let bin = self.colours.histogram.find(now).unwrap_or(0);
+        let entry = self.colours.nearest[bin];
+        if self.is_within(now, self.colour(entry.index)) {
+            return entry;
+        }
+        let (index, _) = colour::closest(&self.colours.palette.colours, now);
+        Nearest { index, error: self.metric.error(now, self.colour(index)) }
+    }
+
+    fn is_within(&self, now: [u8; 3], shown: [u8; 3]) -> bool {
+        colour::levels_off(now, shown) <= self.colours.bound
     }
 
     fn colour(&self, index: u8) -> [u8; 3] {
@@ -368,6 +394,7 @@ mod tests {
             transparent: None,
             changed: 1.0,
             error,
+            bound: u8::MAX,
         };
         let mut writer = Writer::new(8);
         let mut stripe = Stripe::new(colours, &mut writer);

@@ -1,8 +1,8 @@
 //! When each frame is shown.
 //!
 //! A GIF counts in hundredths of a second, and players slow a delay below two of them down to ten. So frame `k` starts
-//! at `100 k / fps` rounded, which carries the rounding error from frame to frame (30 fps gives 3, 4, 3, ...), and above
-//! 50 frames a second the first frame of each fiftieth of a second is kept, the others are dropped.
+//! at `100 k / fps` rounded, which carries the rounding error from frame to frame (30 fps gives 3, 4, 3, ...). Above 50
+//! frames a second some are [left out](crate::Thinning), and each of the others is shown for two hundredths.
 
 use crate::error::Error;
 
@@ -11,7 +11,7 @@ const SHORTEST_DELAY_CS: u64 = 2;
 /// The longest delay that the format can hold, in hundredths of a second.
 const LONGEST_DELAY_CS: f64 = 65_535.0;
 /// The most frames a second that [`SHORTEST_DELAY_CS`] leaves room for.
-const MOST_FPS: f64 = 100.0 / SHORTEST_DELAY_CS as f64;
+pub(crate) const MOST_FPS: f64 = 100.0 / SHORTEST_DELAY_CS as f64;
 
 /// Hands out delays for frames in order.
 #[derive(Debug, Clone)]
@@ -33,16 +33,17 @@ impl Timeline {
         Self { next: frames, ..self }
     }
 
-    /// The delay of the next frame in hundredths of a second; `None` if it is dropped.
-    pub(crate) fn advance(&mut self) -> Option<u16> {
+    /// How many frames have a delay.
+    pub(crate) fn handed_out(&self) -> u64 {
+        self.next
+    }
+
+    /// The delay of the next frame in hundredths of a second.
+    pub(crate) fn advance(&mut self) -> u16 {
         let k = self.next;
         self.next += 1;
-        if self.fps > MOST_FPS {
-            let slot = |k: u64| (k as f64 * MOST_FPS / self.fps).floor();
-            return (k == 0 || slot(k) > slot(k - 1)).then_some(SHORTEST_DELAY_CS as u16);
-        }
-        let start = |k: u64| (k as f64 * 100.0 / self.fps).round();
-        Some((start(k + 1) - start(k)).min(LONGEST_DELAY_CS) as u16)
+        let start = |k: u64| (k as f64 * 100.0 / self.fps.min(MOST_FPS)).round();
+        (start(k + 1) - start(k)).min(LONGEST_DELAY_CS) as u16
     }
 }
 
@@ -50,14 +51,14 @@ impl Timeline {
 mod tests {
     use super::*;
 
-    fn delays(fps: f64, frames: usize) -> Vec<Option<u16>> {
+    fn delays(fps: f64, frames: usize) -> Vec<u16> {
         let mut timeline = Timeline::new(fps).unwrap();
         (0..frames).map(|_| timeline.advance()).collect()
     }
 
     #[test]
     fn thirty_a_second_is_three_four_three() {
-        assert_eq!(delays(30.0, 6), [3, 4, 3, 3, 4, 3].map(Some));
+        assert_eq!(delays(30.0, 6), [3, 4, 3, 3, 4, 3]);
     }
 
     #[test]
@@ -66,23 +67,21 @@ mod tests {
             let mut at = 0.0;
             for (k, delay) in delays(fps, 2_000).into_iter().enumerate() {
                 assert!((at - k as f64 * 100.0 / fps).abs() <= 0.5 + 1e-6, "{fps} fps, frame {k}");
-                at += f64::from(delay.unwrap());
+                at += f64::from(delay);
             }
         }
     }
 
     #[test]
-    fn above_fifty_a_second_frames_are_dropped_and_time_is_kept() {
+    fn above_fifty_a_second_each_is_shown_for_two_hundredths() {
         for fps in [50.1, 60.0, 100.0, 144.0, 1_000.0] {
-            let kept = delays(fps, 10 * fps as usize).into_iter().flatten().collect::<Vec<_>>();
-            assert!(kept.iter().all(|&cs| cs == 2));
-            assert!((kept.len() as i64 - 500).abs() <= 1, "{fps} fps: {} of 500", kept.len());
+            assert!(delays(fps, 1_000).iter().all(|&cs| cs == 2), "{fps} fps");
         }
     }
 
     #[test]
     fn slowest_rate_that_fits() {
-        assert_eq!(delays(100.0 / 65_535.0, 1), [Some(65_535)]);
+        assert_eq!(delays(100.0 / 65_535.0, 1), [65_535]);
         for fps in [0.0, -1.0, 0.0015, f64::NAN, f64::INFINITY] {
             assert!(matches!(Timeline::new(fps), Err(Error::FrameRate { .. })), "{fps}");
         }

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use image::{GenericImageView, RgbImage};
 use png::{BitDepth, ColorType, Compression, EncodingError};
-use rayfold_gif::Plays;
+use rayfold_gif::{Plays, Thinning};
 
 use super::target::Movie;
 
@@ -12,11 +12,18 @@ use super::target::Movie;
 /// hundredths where those have no room in the format's 16 bits.
 const PARTS: [u16; 2] = [1_000, 100];
 
+/// The most frames a second that browsers show: they show a frame of 10 ms or less for 100 ms, and round down to whole
+/// milliseconds. With more, frames are left out as in a GIF.
+pub(super) const MOST_FPS: f64 = 90.0;
+
 /// Frames on their way.
 pub(super) struct Apng<W: Write> {
     file: png::Writer<W>,
     movie: Movie,
-    pushed: u64,
+    thinning: Thinning,
+    /// How many frames there will be in the file, and how many there are.
+    frames: u64,
+    written: u64,
     last: Option<RgbImage>,
 }
 
@@ -29,22 +36,29 @@ impl<W: Write> Apng<W> {
         file.set_color(ColorType::Rgb);
         file.set_depth(BitDepth::Eight);
         file.set_compression(Compression::Balanced);
-        let frames = u32::try_from(movie.frames).map_err(io::Error::other)?;
-        file.set_animated(frames, plays(movie.plays)).map_err(into_io)?;
-        Ok(Self { file: file.write_header().map_err(into_io)?, movie, pushed: 0, last: None })
+        let thinning = Thinning::new(movie.fps, MOST_FPS);
+        let frames = thinning.left_of(movie.frames);
+        let count = u32::try_from(frames).map_err(io::Error::other)?;
+        file.set_animated(count, plays(movie.plays)).map_err(into_io)?;
+        let file = file.write_header().map_err(into_io)?;
+        Ok(Self { file, movie, thinning, frames, written: 0, last: None })
     }
 
-    /// Writes the next frame, which is as large as the others.
+    /// Takes the next frame, which is as large as the others.
     ///
     /// # Errors
     /// The writer's.
     pub(super) fn push(&mut self, frame: RgbImage) -> io::Result<()> {
-        let (number, whole) = (self.pushed, (0, 0, frame.width(), frame.height()));
-        self.pushed += 1;
+        self.thinning.push(frame).map_or(Ok(()), |frame| self.write(frame))
+    }
+
+    fn write(&mut self, frame: RgbImage) -> io::Result<()> {
+        let (number, whole) = (self.written, (0, 0, frame.width(), frame.height()));
+        self.written += 1;
         let (left, top, width, height) = self.last.as_ref().map_or(whole, |last| changed(last, &frame));
         let (time, parts) = match self.movie.last_delay_cs {
-            Some(hundredths) if self.pushed == self.movie.frames => (hundredths, 100),
-            _ => delay(self.movie.fps, number),
+            Some(hundredths) if self.written == self.frames => (hundredths, 100),
+            _ => delay(self.thinning.fps(), number),
         };
         self.file.set_frame_delay(time, parts).map_err(into_io)?;
         if self.last.is_some() {
@@ -58,10 +72,16 @@ impl<W: Write> Apng<W> {
         Ok(())
     }
 
+    /// Returns how many frames were left out.
+    ///
     /// # Errors
     /// The writer's.
-    pub(super) fn finish(self) -> io::Result<()> {
-        self.file.finish().map_err(into_io)
+    pub(super) fn finish(mut self) -> io::Result<u64> {
+        if let Some(last) = self.thinning.finish() {
+            self.write(last)?;
+        }
+        self.file.finish().map_err(into_io)?;
+        Ok(self.movie.frames - self.frames)
     }
 }
 

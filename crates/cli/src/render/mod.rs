@@ -69,6 +69,10 @@ pub(crate) struct Args {
     fps: Option<f64>,
     #[command(flatten)]
     playback: Playback,
+    /// In a .gif, keep every frame of at most 256 colours exactly. Without this flag, a slow fade of a large image (more than 100,000
+    /// pixels) may be off by up to 4 levels of 255, in a file several times smaller
+    #[arg(long)]
+    exact: bool,
     /// Draw every frame in this size, such as 640x480, instead of that of its Screen
     #[arg(long, value_name = "WxH", value_parser = values::size)]
     size: Option<Screen>,
@@ -146,6 +150,9 @@ fn check(args: &Args, target: &Target) -> Result<(), Usage> {
             );
         }
         Target::Image(..) | Target::Images(..) => {}
+    }
+    if args.exact && !matches!(target, Target::Animation(Container::Gif, _)) {
+        return usage("--exact is for .gif: every other output keeps all colours of a frame");
     }
     if args.skip_existing && !matches!(target, Target::Images(..)) {
         return usage("--skip-existing is for a file a frame: expected a pattern such as frames/%04d.png");
@@ -236,6 +243,7 @@ fn animation(
         fps,
         plays: args.playback.plays(Plays::repeated(plan.settings.loops())),
         last_delay_cs: args.playback.last_delay_cs(),
+        exact: args.exact,
     };
     let mut progress = Progress::start(console, "frames", plan.len());
     let mut done = 0;

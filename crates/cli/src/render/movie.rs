@@ -6,7 +6,7 @@ use std::time::Duration;
 use image::RgbImage;
 use rayfold_gif::{Encoder, Settings};
 
-use super::apng::Apng;
+use super::apng::{Apng, MOST_FPS};
 use super::target::{Container, Movie, Place};
 use super::y4m::Y4m;
 use crate::console::Console;
@@ -35,7 +35,8 @@ pub(crate) enum MovieError {
 #[derive(Debug)]
 pub(crate) struct Written {
     pub(crate) frames: u64,
-    /// Left out because a GIF has no time for them.
+    pub(crate) container: Container,
+    /// Left out because what shows the container has no time for them.
     pub(crate) dropped: u64,
     pub(crate) size: (u32, u32),
     pub(crate) bytes: u64,
@@ -68,7 +69,7 @@ pub(crate) fn write(
     let sink = out.into_inner().map_err(|error| failed(error.into_error()))?;
     let bytes = sink.bytes;
     sink.finish()?;
-    Ok(Written { frames: frames - dropped, dropped, size: movie.size, bytes })
+    Ok(Written { frames: frames - dropped, container, dropped, size: movie.size, bytes })
 }
 
 /// Says what was written.
@@ -86,11 +87,11 @@ pub(crate) fn tell(place: &Place, written: &Written, fps: f64, took: Duration, c
         took.as_secs_f64()
     ));
     if written.dropped > 0 {
-        console.note(format_args!(
-            "{} left out: a GIF shows at most 50 frames a second, not {}",
-            number(written.dropped, "frame"),
-            fps
-        ));
+        let most = match written.container {
+            Container::Apng => format!("browsers show at most {MOST_FPS} frames of an APNG a second"),
+            Container::Gif | Container::Y4m => "a GIF shows at most 50 frames a second".into(),
+        };
+        console.note(format_args!("{} left out: {most}, not {fps}", number(written.dropped, "frame")));
     }
 }
 
@@ -108,9 +109,11 @@ enum Failure {
 
 impl<W: Write> Encoding<W> {
     fn begin(out: W, container: Container, movie: Movie) -> Result<Self, Failure> {
-        let Movie { size, fps, plays, last_delay_cs, .. } = movie;
+        let Movie { size, fps, plays, last_delay_cs, exact, .. } = movie;
         Ok(match container {
-            Container::Gif => Self::Gif(Box::new(Encoder::new(out, Settings { fps, plays, last_delay_cs })?)),
+            Container::Gif => {
+                Self::Gif(Box::new(Encoder::new(out, Settings { fps, plays, last_delay_cs, exact })?))
+            }
             Container::Apng => Self::Apng(Box::new(Apng::new(out, movie)?)),
             Container::Y4m => Self::Y4m(Y4m::new(out, size, fps)?),
         })
@@ -128,7 +131,7 @@ impl<W: Write> Encoding<W> {
     fn finish(self) -> Result<u64, Failure> {
         match self {
             Self::Gif(encoder) => Ok(encoder.finish()?.dropped),
-            Self::Apng(encoder) => Ok(encoder.finish().map(|()| 0)?),
+            Self::Apng(encoder) => Ok(encoder.finish()?),
             Self::Y4m(encoder) => Ok(encoder.finish().map(|()| 0)?),
         }
     }

@@ -47,6 +47,8 @@ pub(crate) struct Movie {
     pub(crate) plays: Plays,
     /// How long the last frame is shown, if not as long as the others.
     pub(crate) last_delay_cs: Option<u16>,
+    /// Whether a GIF keeps frames of at most 256 colours exactly, whatever that takes.
+    pub(crate) exact: bool,
 }
 
 /// How a single image is written.
