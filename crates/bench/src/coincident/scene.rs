@@ -14,10 +14,17 @@ pub(super) struct Pair {
     pub(super) script: String,
     /// Has the solid that counts a little thicker, or the other one left out.
     pub(super) expected: String,
+    /// Whether single precision cannot tell which is in front.
+    pub(super) is_fine: bool,
+    /// Whether a pixel has several samples.
+    pub(super) is_sampled: bool,
 }
 
 /// How much thicker: far more than rounding, far less than a pixel.
 const THICKER: f64 = 1e-6;
+
+/// How far apart surfaces lie that do not coincide, for the largest number of the scene: some thousand roundoffs.
+const APART: f64 = 1e-12;
 
 /// How far from the origin scenes stand at most.
 const FARTHEST: f64 = 1e7;
@@ -38,12 +45,15 @@ enum Written {
 const WRITTEN: [Written; 5] =
     [Written::Straight, Written::Turned, Written::OneGroup, Written::TwoGroups, Written::Mixed];
 
-/// What the solids are made of: of equal hits that of the first counts, but one of glass after one without.
+/// What the solids are made of, and how near to each other: of equal hits that of the first counts, but one of glass after one
+/// without.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Matter {
     Opaque,
     FirstOfGlass,
     BothOfGlass,
+    /// Opaque ones of which the second lies in front by more than rounding.
+    SecondInFront,
 }
 
 /// Solids, each with the name of its material.
@@ -52,13 +62,20 @@ type Solids = Vec<(Solid, &'static str)>;
 /// The scene of a seed.
 pub(super) fn of_seed(seed: u64) -> Pair {
     let rng = &mut Rng::with_seed(seed);
-    let matter = match rng.u32(0..8) {
+    let matter = match rng.u32(0..10) {
         0 => Matter::FirstOfGlass,
         1 => Matter::BothOfGlass,
+        2 | 3 => Matter::SecondInFront,
         _ => Matter::Opaque,
     };
     let [first, second] = if matter == Matter::BothOfGlass { twins(rng) } else { two(rng) };
-    let place = Place { angles: angles(rng), shift: shift(rng) };
+    let second = if rng.u32(0..3) == 0 { second.jittered(rng) } else { second };
+    let shift = match shift(rng) {
+        // So far away what is thicker would not be told from what is in front.
+        far if matter == Matter::SecondInFront && far.length() > 1e4 => far * 1e-4,
+        shift => shift,
+    };
+    let place = Place { angles: angles(rng), shift };
     let written = WRITTEN[rng.usize(0..WRITTEN.len())];
     // A box that is turned can only be had of a group.
     let is_written = |solid: &Solid| solid.placed(place.turn(), place.shift).is_some();
@@ -69,15 +86,23 @@ pub(super) fn of_seed(seed: u64) -> Pair {
     };
     let place = if written == Written::Straight { Place { angles: DVec3::ZERO, ..place } } else { place };
     let around = Surroundings::new(rng, matter, place);
-    let thicker = |solid: &Solid, name| solid.thicker(THICKER).into_iter().map(|s| (s, name)).collect();
+    let by = |depth: f64, solid: &Solid, name| solid.thicker(depth).into_iter().map(|s| (s, name)).collect();
+    let thicker = |solid: &Solid, name| -> Solids { by(THICKER, solid, name) };
     let (one, other): (Solids, Solids) = match matter {
         Matter::Opaque => (thicker(&first, "first"), vec![(second.clone(), "second")]),
         Matter::FirstOfGlass => (vec![(first.clone(), "first")], thicker(&second, "second")),
         Matter::BothOfGlass => (vec![(first.clone(), "first")], vec![]),
+        Matter::SecondInFront => (vec![(first.clone(), "first")], thicker(&second, "second")),
+    };
+    let drawn = match matter {
+        Matter::SecondInFront => by(APART * around.largest, &second, "second"),
+        Matter::Opaque | Matter::FirstOfGlass | Matter::BothOfGlass => vec![(second, "second")],
     };
     Pair {
         expected: around.script(&one, &other, written),
-        script: around.script(&vec![(first, "first")], &vec![(second, "second")], written),
+        script: around.script(&vec![(first, "first")], &drawn, written),
+        is_fine: matter == Matter::SecondInFront,
+        is_sampled: around.is_sampled,
     }
 }
 
@@ -245,6 +270,9 @@ fn flat(rng: &mut Rng, height: f64) -> Solid {
 /// All of a script but the two solids.
 struct Surroundings {
     place: Place,
+    /// The largest number of the scene, about.
+    largest: f64,
+    is_sampled: bool,
     before: String,
     after: String,
 }
@@ -257,6 +285,8 @@ impl Surroundings {
             if rng.u32(0..4) == 0 { 10f64.powf(1.0 + 3.0 * rng.f64()) } else { 3.0 + 3.0 * rng.f64() };
         let eye = target + distance * towards_eye;
         let field = 2.0 * (1.5 / distance).atan().to_degrees();
+        // Without what brings double precision in any case.
+        let is_plain = rng.u32(0..3) == 0 && matches!(matter, Matter::Opaque | Matter::SecondInFront);
         let mut before = String::from("Screen 40 32\nBackground .1 .1 .3\n");
         let vector = |v: DVec3| format!("{} {} {}", v.x, v.y, v.z);
         let mut line = |text: String| {
@@ -267,12 +297,19 @@ impl Surroundings {
         let is_lit = rng.bool();
         if is_lit {
             line(format!("Ilight .8 .8 .8 {}", vector(-(towards_eye + 0.8 * direction(rng)))));
+        }
+        if is_lit && !is_plain {
             let lamp = target + 2.5 * (towards_eye + 0.6 * direction(rng)).normalize();
             line(format!("Plight .6 .6 .6 {}", vector(lamp)));
         }
-        for (name, color, is_glass) in
-            [("first", "1 0 0", matter != Matter::Opaque), ("second", "0 1 0", matter == Matter::BothOfGlass)]
-        {
+        let is_sampled = !is_lit && rng.u32(0..4) == 0;
+        if is_sampled {
+            line("Samples 4".into());
+        }
+        for (name, color, is_glass) in [
+            ("first", "1 0 0", matches!(matter, Matter::FirstOfGlass | Matter::BothOfGlass)),
+            ("second", "0 1 0", matter == Matter::BothOfGlass),
+        ] {
             line(if is_glass {
                 format!("Material {name} ambient {color} glass .6 .7 .8 1.0")
             } else if is_lit {
@@ -290,25 +327,33 @@ impl Surroundings {
             after.push('\n');
         };
         // A mirror that shows the back, a pane in front, a floor for shadows, and crowds that take other ways to be found.
-        if rng.bool() {
+        if is_plain && rng.bool() {
+            let (x, y) = towards_eye.any_orthonormal_pair();
+            let corner = |turn: f64| target - 3.0 * towards_eye + 9.0 * (turn.cos() * x + turn.sin() * y);
+            let [a, b, c] = [0.1, 2.2, 4.3].map(|turn| vector(corner(turn)));
+            add(format!("Triangle {a} {b} {c} mirror"));
+        }
+        if !is_plain && rng.bool() {
             let tilted = (towards_eye + 0.3 * direction(rng)).normalize();
             add(format!("Disc 9 {} {} mirror", vector(target - 2.5 * towards_eye), vector(tilted)));
         }
-        if rng.u32(0..3) == 0 {
+        if !is_plain && rng.u32(0..3) == 0 {
             let tilted = towards_eye + 0.3 * direction(rng);
             add(format!("Disc 9 {} {} pane", vector(target + 2.2 * towards_eye), vector(tilted)));
         }
-        if rng.bool() {
+        if !is_plain && rng.bool() {
             add(format!("Disc 5 {} 0 1 0 back", vector(target - 2.1 * DVec3::Y)));
         }
         let crowd = [0, 0, 5, 80][rng.usize(0..4)];
         for k in 0..crowd {
             let beside = target + 4.0 * direction(rng) - 2.5 * towards_eye;
-            let name = if k % 2 == 0 { "Sphere .2" } else { "Disc .3" };
-            let normal = if k % 2 == 0 { String::new() } else { vector(direction(rng)) };
+            let is_ball = is_plain || k % 2 == 0;
+            let name = if is_ball { "Sphere .2" } else { "Disc .3" };
+            let normal = if is_ball { String::new() } else { vector(direction(rng)) };
             add(format!("{name} {} {normal} back", vector(beside)));
         }
-        Self { place, before, after }
+        let largest = target.abs().max_element() + distance;
+        Self { place, largest, is_sampled, before, after }
     }
 
     fn script(&self, first: &Solids, second: &Solids, written: Written) -> String {

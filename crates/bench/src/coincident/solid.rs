@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use fastrand::Rng;
 use glam::{DMat3, DVec3};
 
 /// A solid by the numbers of its line.
@@ -65,6 +66,47 @@ impl Solid {
                 normal: turn * *normal,
             },
         })
+    }
+
+    /// The solid with each of its numbers as it is, or the next one up or down: as programs write what they compute.
+    pub(super) fn jittered(&self, rng: &mut Rng) -> Self {
+        let mut number = |x: f64| match rng.u32(0..3) {
+            0 if x != 0.0 => x.next_up(),
+            1 if x != 0.0 => x.next_down(),
+            _ => x,
+        };
+        let mut vector = |v: DVec3, number: &mut dyn FnMut(f64) -> f64| v.map(number);
+        match self {
+            Self::Sphere { radius, center } => {
+                Self::Sphere { radius: number(*radius), center: vector(*center, &mut number) }
+            }
+            // What is flat stays flat.
+            Self::Box([u, v]) => {
+                let other = vector(*v, &mut number);
+                Self::Box([*u, DVec3::select(u.cmpeq(*v), *v, other)])
+            }
+            Self::Triangle(vertices) => Self::Triangle(vertices.map(|v| vector(v, &mut number))),
+            Self::Plane { point, normal } => {
+                Self::Plane { point: vector(*point, &mut number), normal: vector(*normal, &mut number) }
+            }
+            Self::Disc { radius, center, normal } => Self::Disc {
+                radius: *radius,
+                center: vector(*center, &mut number),
+                normal: vector(*normal, &mut number),
+            },
+            Self::Cylinder { radius, ends } => {
+                Self::Cylinder { radius: number(*radius), ends: ends.map(|end| vector(end, &mut number)) }
+            }
+            Self::Cone { radii, ends } => {
+                Self::Cone { radii: radii.map(&mut number), ends: ends.map(|end| vector(end, &mut number)) }
+            }
+            Self::Torus { radius, thickness, center, normal } => Self::Torus {
+                radius: number(*radius),
+                thickness: number(*thickness),
+                center: vector(*center, &mut number),
+                normal: vector(*normal, &mut number),
+            },
+        }
     }
 
     /// Solids whose surface lies outside this one's, by `depth`; for what is flat, one on either side.

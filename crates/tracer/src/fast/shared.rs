@@ -165,7 +165,7 @@ impl SharedSurfaces {
         let Hits { distance, order, start, normal, sides, packets, .. } = hits;
         for &(at, _) in &*packets {
             for lane in at..at + lanes {
-                if distance.0[lane].widen() >= E::FAR {
+                if distance.0[lane].widen() >= E::narrow(E::FAR).widen() {
                     continue;
                 }
                 let offset = self.offset(order.0[lane]);
