@@ -58,10 +58,11 @@ pub(in crate::fast) struct Ring {
     pub(in crate::fast) thickness: f64,
 }
 
-/// No direction that anybody means is square to it, so that it tells one side from the other; and one that is square to
-/// neither it nor those.
+/// A direction that is square to none that people write: it tells one side of a plane from the other.
 pub(super) const ASIDE: DVec3 = DVec3::new(0.577_215_664_9, 0.302_775_637_7, 0.141_592_653_6);
-const ACROSS: DVec3 = DVec3::new(-0.261_497_212_8, 0.662_743_419_3, 0.434_294_481_9);
+
+/// Another such direction, along which places are sorted.
+const ACROSS: DVec3 = DVec3::new(-0.261_497_212_8, 0.662_743_419_3, 0.428_249_505_6);
 
 impl Surface {
     /// Two numbers that are about the same for parts that lie in one surface: of what is flat one of its direction, and one of
