@@ -22,10 +22,10 @@ use crate::backends::{self, Arithmetic, Backend};
 pub struct Args {
     /// How many scripts to draw at random
     #[arg(long, default_value_t = 10_000)]
-    pub scenes: u64,
+    scenes: u64,
     /// Seed of the first of them; the others have those that follow
     #[arg(long, default_value_t = 1)]
-    pub seed: u64,
+    seed: u64,
 }
 
 /// Channels of neighbours that differ by more are those of an outline.

@@ -56,8 +56,8 @@ enum Matter {
     SecondInFront,
 }
 
-/// Solids, each with the name of its material.
-type Solids = Vec<(Solid, &'static str)>;
+/// A solid and the name of its material.
+type Named = (Solid, &'static str);
 
 /// The scene of a seed.
 pub(super) fn of_seed(seed: u64) -> Pair {
@@ -87,8 +87,8 @@ pub(super) fn of_seed(seed: u64) -> Pair {
     let place = if written == Written::Straight { Place { angles: DVec3::ZERO, ..place } } else { place };
     let around = Surroundings::new(rng, matter, place);
     let by = |depth: f64, solid: &Solid, name| solid.thicker(depth).into_iter().map(|s| (s, name)).collect();
-    let thicker = |solid: &Solid, name| -> Solids { by(THICKER, solid, name) };
-    let (one, other): (Solids, Solids) = match matter {
+    let thicker = |solid: &Solid, name| -> Vec<Named> { by(THICKER, solid, name) };
+    let (one, other): (Vec<Named>, Vec<Named>) = match matter {
         Matter::Opaque => (thicker(&first, "first"), vec![(second.clone(), "second")]),
         Matter::FirstOfGlass => (vec![(first.clone(), "first")], thicker(&second, "second")),
         Matter::BothOfGlass => (vec![(first.clone(), "first")], vec![]),
@@ -100,7 +100,7 @@ pub(super) fn of_seed(seed: u64) -> Pair {
     };
     Pair {
         expected: around.script(&one, &other, written),
-        script: around.script(&vec![(first, "first")], &drawn, written),
+        script: around.script(&[(first, "first")], &drawn, written),
         is_fine: matter == Matter::SecondInFront,
         is_sampled: around.is_sampled,
     }
@@ -356,10 +356,10 @@ impl Surroundings {
         Self { place, largest, is_sampled, before, after }
     }
 
-    fn script(&self, first: &Solids, second: &Solids, written: Written) -> String {
+    fn script(&self, first: &[Named], second: &[Named], written: Written) -> String {
         let Place { angles, shift } = self.place;
         let mut text = self.before.clone();
-        let by_hand = |solids: &Solids| {
+        let by_hand = |solids: &[Named]| {
             let mut lines = String::new();
             for (solid, material) in solids {
                 // Boxes are turned by groups alone.
@@ -368,7 +368,7 @@ impl Surroundings {
             }
             lines
         };
-        let group = |name: &str, parts: &[&Solids]| {
+        let group = |name: &str, parts: &[&[Named]]| {
             let mut lines = format!("Group {name}\n");
             for (solid, material) in parts.iter().copied().flatten() {
                 let _ = writeln!(lines, "{} {material}", solid.line());

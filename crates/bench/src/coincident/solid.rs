@@ -75,7 +75,7 @@ impl Solid {
             1 if x != 0.0 => x.next_down(),
             _ => x,
         };
-        let mut vector = |v: DVec3, number: &mut dyn FnMut(f64) -> f64| v.map(number);
+        let vector = |v: DVec3, number: &mut dyn FnMut(f64) -> f64| v.map(number);
         match self {
             Self::Sphere { radius, center } => {
                 Self::Sphere { radius: number(*radius), center: vector(*center, &mut number) }
