@@ -8,6 +8,7 @@
 
 pub mod accuracy;
 pub mod backends;
+pub mod coincident;
 #[cfg(feature = "bucket")]
 pub mod cold_start;
 pub mod cpu_time;

@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 use rayfold_bench::{
-    accuracy, fingerprints, gif, measure, metamorphic, needs, parsing, sampling, speed, studio,
+    accuracy, coincident, fingerprints, gif, measure, metamorphic, needs, parsing, sampling, speed, studio,
 };
 #[cfg(feature = "bucket")]
 use rayfold_bench::{cold_start, explore, footprint, pipeline, scale, simulate};
@@ -18,6 +18,8 @@ struct Cli {
 enum Measurement {
     /// Error and speed of every backend, and the hard cases at full size
     Accuracy(accuracy::Args),
+    /// Random pairs of solids that share a surface: the first in the script is seen
+    Coincident(coincident::Args),
     /// The paper's table: scenes from upload to GIF, in a local bucket and by the local invoker
     #[cfg(feature = "bucket")]
     Pipeline(pipeline::Args),
@@ -62,6 +64,7 @@ enum Measurement {
 fn main() -> anyhow::Result<()> {
     match Cli::parse().measurement {
         Measurement::Accuracy(args) => accuracy::run(&args),
+        Measurement::Coincident(args) => coincident::run(&args),
         #[cfg(feature = "bucket")]
         Measurement::Pipeline(args) => pipeline::run(&args),
         #[cfg(feature = "bucket")]

@@ -4,8 +4,8 @@
 //! same image for any number of threads. The crate knows the typed scene and nothing of text, files or clocks.
 //!
 //! Invariants: no length is compared with an absolute epsilon, what keeps a ray off the surface that it leaves is a
-//! bound on the rounding error there; of hits at the same distance the object that comes first wins; a direction in
-//! here is a unit vector.
+//! bound on the rounding error there; a hit is a function of ray and object alone; of hits within that bound of each other
+//! the object that comes first wins; a direction in here is a unit vector.
 //!
 //! ```
 //! use rayfold_scene::{Camera, Scene, Screen};

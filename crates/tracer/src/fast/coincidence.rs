@@ -3,7 +3,8 @@
 //! Where two surfaces of different colours lie nearer behind each other than `f32` tells apart, over more than a pixel,
 //! rounding decides which of them is seen. Pairs of such surfaces are looked for here, in `f64`: faces of triangles and
 //! boxes in almost one plane, spheres that touch from within, and spheres that touch a face. Those that coincide in `f64`,
-//! too, are meant to, and are not counted. Of a sphere and a face the colours do not matter: what lies so near a sphere is
+//! too, are meant to; they are not counted if their numbers are the same in `f32`, so that rays meet both at the same distance
+//! bit for bit. Of a sphere and a face the colours do not matter: what lies so near a sphere is
 //! in the shadow of its rounding.
 //!
 //! What is found does not depend on the order of the objects.
@@ -219,7 +220,10 @@ impl Search<'_> {
         }
         let region = self.region(bounds.0, bounds.1);
         match (one.shape.ball(), other.shape.ball()) {
-            (Some(ball), Some(b)) => self.spheres_blur(ball, b, &region) && self.differ(one, other),
+            (Some(ball), Some(b)) => {
+                let are_one = || one.shape.is_one_in_single(&other.shape);
+                self.spheres_blur(ball, b, &region, are_one) && self.differ(one, other)
+            }
             (Some(ball), None) => self.sphere_blurs(ball, &other.shape, &region),
             (None, Some(ball)) => self.sphere_blurs(ball, &one.shape, &region),
             (None, None) => {
@@ -237,16 +241,25 @@ impl Search<'_> {
     }
 
     /// Whether two spheres are within the slack of each other on a strip as wide as a pixel. Those that touch from without
-    /// are seen apart from everywhere but within.
-    fn spheres_blur(&self, one: (DVec3, f64), other: (DVec3, f64), region: &Region) -> bool {
+    /// are seen apart from everywhere but within. Those that are meant to be one do if they are not in single precision.
+    fn spheres_blur(
+        &self,
+        one: (DVec3, f64),
+        other: (DVec3, f64),
+        region: &Region,
+        are_one: impl Fn() -> bool,
+    ) -> bool {
         let ((center, radius), (c, r)) = if one.1 >= other.1 { (one, other) } else { (other, one) };
         let apart = (center - c).length();
         let largest = center.abs().max(c.abs()).max_element() + radius;
         let is_one = apart + (radius - r) <= MEANT * largest;
         let without = apart * apart > radius * radius + r * r;
         let contains_eye = || !self.parallel && (center.length() < radius || c.length() < r);
-        if is_one || 2.0 * r <= region.pixel || without && !contains_eye() {
+        if 2.0 * r <= region.pixel || without && !contains_eye() {
             return false;
+        }
+        if is_one {
+            return !are_one();
         }
         let slack = region.slack.max(on_sphere(one).max(on_sphere(other)) / 2.0);
         ring_on_sphere(radius, r, apart, slack) >= region.pixel

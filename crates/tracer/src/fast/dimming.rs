@@ -57,6 +57,9 @@ impl<S: Simd, E: Real> Arriving<S, E> {
                     if let Some(bodies) = beyond.bodies() {
                         bodies.meet(simd, ANY, ray, &mut found);
                     }
+                    if let Some(shared) = &scene.shared {
+                        shared.settle::<S, E, F, false>(simd, scene, ray, &mut found);
+                    }
                     let hit = open & found.distance.simd_lt(far);
                     lit |= open & !hit;
                     open = hit;
@@ -74,7 +77,10 @@ impl<S: Simd, E: Real> Arriving<S, E> {
                         };
                         let dimmed = color.mul(Vec3::splat(simd, pane.color));
                         color = Vec3::select(same, dimmed, color);
-                        let surface = surface::<S, E, F, false>(simd, scene, entry, ray, found.distance);
+                        let mut surface = surface::<S, E, F, false>(simd, scene, entry, ray, found.distance);
+                        if let Some(shared) = &scene.shared {
+                            surface = shared.lifted(simd, surface, orders[lane as usize]);
+                        }
                         ray.origin = Vec3::select(same, surface.beyond(simd), ray.origin);
                     }
                     far = hit.select(far - found.distance, far);

@@ -57,7 +57,7 @@ impl Finishes {
         }
         for &(at, _) in &hits.packets {
             for lane in at..at + lanes {
-                if hits.distance.0[lane].widen() >= E::FAR {
+                if hits.distance.0[lane].widen() >= E::narrow(E::FAR).widen() {
                     continue;
                 }
                 let order = hits.order.0[lane].to_index();

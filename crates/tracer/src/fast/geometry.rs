@@ -18,12 +18,13 @@ use super::lights::sun::Direction;
 use super::placed::{Placed, nearest_within};
 use super::planes;
 use super::shapes::{Shape, Solid, reach};
+use super::shared::SharedSurfaces;
 use super::tree::{Branches, Copies, Part, group};
-use crate::RenderError;
 use crate::camera::{Axis, Single, grid, look_grid};
 use crate::parallel::map;
 use crate::sampling::places::spread;
 use crate::scale::below_inverse;
+use crate::{Precision, RenderError, RenderOptions};
 
 /// Where the rays of the pixels come from.
 #[derive(Clone, Copy, Debug)]
@@ -51,6 +52,8 @@ pub(super) struct Geometry {
     pub(super) lens: Option<Lens>,
     /// Whether surfaces have more than coefficients.
     pub(super) is_finished: bool,
+    /// The objects that share surfaces, once they are [looked for](Self::with_shared_surfaces).
+    pub(super) shared: Option<SharedSurfaces>,
     /// A length of the scene times this is a length in here.
     pub(super) scale: f64,
     /// Where the origin of these coordinates is in the scene: `(point - center) * scale` is a point in here.
@@ -116,6 +119,7 @@ impl Geometry {
             lamps,
             lens: lens.map(|lens| lens.scaled(scale)),
             is_finished,
+            shared: None,
             scale,
             center,
         })
@@ -131,6 +135,21 @@ impl Geometry {
             planes::share(solids);
         }
         self
+    }
+
+    /// With the objects that share surfaces.
+    pub(super) fn with_shared_surfaces(mut self, scene: &Scene) -> Self {
+        self.shared = SharedSurfaces::find(&self, scene);
+        self
+    }
+
+    /// The same for single precision where that was asked for: where it is chosen, no surfaces are shared but those that it
+    /// meets at the same distance bit for bit.
+    pub(super) fn with_shared_surfaces_if_single(self, scene: &Scene, options: &RenderOptions) -> Self {
+        match options.precision {
+            Precision::F32 => self.with_shared_surfaces(scene),
+            Precision::Auto | Precision::F64 => self,
+        }
     }
 
     /// How near to the origin a solid's surface comes, at least.

@@ -46,6 +46,7 @@ mod sampled;
 mod search;
 mod shape;
 mod shapes;
+mod shared;
 mod sights;
 mod sky;
 mod surfaces;
@@ -128,9 +129,13 @@ impl<'a> Drawing<'a> {
         let precision = |geometry| Some((precision::resolve(options, &geometry, ranked)?, geometry));
         Ok(Self(match geometry.and_then(precision) {
             Some((Precision::F64, geometry)) => {
-                Backend::Double(Setup::new(scene, ranked, &geometry.with_shared_planes(ranked), options)?)
+                let geometry = geometry.with_shared_planes(ranked).with_shared_surfaces(ranked);
+                Backend::Double(Setup::new(scene, ranked, &geometry, options)?)
             }
-            Some((_, geometry)) => Backend::Single(Setup::new(scene, ranked, &geometry, options)?),
+            Some((_, geometry)) => {
+                let geometry = geometry.with_shared_surfaces_if_single(ranked, options);
+                Backend::Single(Setup::new(scene, ranked, &geometry, options)?)
+            }
             None => Backend::Reference(exposure, options),
         }))
     }
@@ -259,10 +264,16 @@ fn sampled_backend<'a>(
     let Some(precisions) = precisions.collect::<Option<Vec<_>>>() else { return Ok(None) };
     Ok(Some(if precisions.contains(&Precision::F64) {
         let geometries = geometries.into_iter().zip(&moments);
-        let geometries: Vec<_> =
-            geometries.map(|(geometry, moment)| geometry.with_shared_planes(moment)).collect();
+        let exact = |(geometry, moment): (Geometry, &Scene)| {
+            geometry.with_shared_planes(moment).with_shared_surfaces(moment)
+        };
+        let geometries: Vec<_> = geometries.map(exact).collect();
         Backend::SampledDouble(Sampled::new(scene, &moments, &geometries, options)?)
     } else {
+        let geometries = geometries.into_iter().zip(&moments);
+        let single =
+            |(geometry, moment): (Geometry, &Scene)| geometry.with_shared_surfaces_if_single(moment, options);
+        let geometries: Vec<_> = geometries.map(single).collect();
         Backend::SampledSingle(Sampled::new(scene, &moments, &geometries, options)?)
     }))
 }

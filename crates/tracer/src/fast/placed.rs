@@ -68,6 +68,18 @@ pub(super) struct Face {
     /// Counterclockwise about the normal; a triangle's last comes twice.
     pub(super) corners: [DVec3; 4],
     pub(super) normal: DVec3,
+    /// `normal · point` of its points.
+    pub(super) height: f64,
+}
+
+impl Face {
+    /// Whether rays meet both at the same distance bit for bit in single precision: the numbers of their planes are rounded to
+    /// the same ones.
+    pub(super) fn is_one_in_single(&self, other: &Self) -> bool {
+        let of = |normal: DVec3, height: f64| (normal.as_vec3(), height as f32);
+        let one = of(self.normal, self.height);
+        one == of(other.normal, other.height) || one == of(-other.normal, -other.height)
+    }
 }
 
 /// What can be seen of an error.

@@ -25,6 +25,7 @@ use super::placed::Placed;
 use super::rays::Rays;
 use super::real::Real;
 use super::shapes::{Obstacles, Shape, Shapes, Solid, Sorted};
+use super::shared::SharedSurfaces;
 use super::sights::Sights;
 use super::sky::Sky;
 use super::tree::{Tree, stump};
@@ -92,6 +93,8 @@ pub(super) struct Prepared<E> {
     pub(super) needs: Needs,
     /// What few scenes have.
     pub(super) beyond: Option<Beyond<E>>,
+    /// The objects that share surfaces, if there are any.
+    pub(super) shared: Option<SharedSurfaces>,
     /// Of scenes with glass and few objects: those of the row, and the bodies that have bounds.
     balls: Option<[Balls; 2]>,
 }
@@ -133,7 +136,8 @@ impl<E: Real> Prepared<E> {
         }
         let sky = Sky::new(scene.background);
         let beyond = Beyond::new(scene, geometry);
-        needs.beyond = beyond.is_some() || sky.is_some();
+        let shared = geometry.shared.clone().filter(|_| BUILT.beyond);
+        needs.beyond = beyond.is_some() || sky.is_some() || shared.is_some();
         needs.glass = beyond.as_ref().is_some_and(Beyond::has_glass);
         for (order, at) in beyond.iter().filter_map(Beyond::bodies).flat_map(|bodies| bodies.places()) {
             let entry = &mut entries[order];
@@ -179,6 +183,7 @@ impl<E: Real> Prepared<E> {
             sights,
             entries,
             beyond,
+            shared,
             balls,
         })
     }
@@ -205,7 +210,8 @@ impl<E: Real> Prepared<E> {
         self.is_plain() || bodies == 0 && self.sky().is_none() && !has_planes()
     }
 
-    /// Whether there is nothing to be seen but what masks, lists and trees hold, on a background of one colour.
+    /// Whether there is nothing to be seen but what masks, lists and trees hold, which shares no surface, on a background of
+    /// one colour.
     #[inline(always)]
     pub(super) fn is_plain(&self) -> bool {
         !self.needs.beyond || !BUILT.beyond

@@ -53,14 +53,17 @@ pub fn nearest_hits(
     let geometry = Geometry::new(&ranked.scene, options.tree)?;
     match resolve(options, &geometry, &ranked.scene) {
         Some(Precision::F64) => {
-            let geometry = geometry.with_shared_planes(&ranked.scene);
+            let geometry = geometry.with_shared_planes(&ranked.scene).with_shared_surfaces(&ranked.scene);
             probe::<f64>(ranked, &geometry, rays, options, |batch, level, out| {
                 on!(level, simd => batch.nearest(simd, out));
             })
         }
-        Some(_) => probe::<f32>(ranked, &geometry, rays, options, |batch, level, out| {
-            on!(level, simd => batch.nearest(simd, out));
-        }),
+        Some(_) => {
+            let geometry = geometry.with_shared_surfaces_if_single(&ranked.scene, options);
+            probe::<f32>(ranked, &geometry, rays, options, |batch, level, out| {
+                on!(level, simd => batch.nearest(simd, out));
+            })
+        }
         None => Ok(one_by_one()),
     }
 }
@@ -131,6 +134,15 @@ impl<E: Real> Batch<'_, E> {
                 };
                 if let Some(bodies) = self.scene.beyond.as_ref().and_then(Beyond::bodies) {
                     bodies.meet(simd, ANY, ray, &mut found);
+                }
+                match &self.scene.shared {
+                    Some(shared) if from_eye => {
+                        shared.settle::<S, E, Anything<Robust>, true>(simd, self.scene, ray, &mut found);
+                    }
+                    Some(shared) => {
+                        shared.settle::<S, E, Anything<Robust>, false>(simd, self.scene, ray, &mut found);
+                    }
+                    None => {}
                 }
                 let hit = found.hit(simd).to_bitmask();
                 let mut normals = [DVec3::ZERO; 16];

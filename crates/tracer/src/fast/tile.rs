@@ -257,7 +257,10 @@ fn shade_more<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
             shade_softly::<S, E, N, EYE>(simd, scene, way, met, hits, in_the_way);
         }
         (Some(beyond), None) => shade_beyond::<S, E, N, EYE>(simd, scene, beyond, met, hits, in_the_way),
-        (None, None) => shade_plain::<S, E, N, EYE>(simd, scene, met, hits, in_the_way),
+        (None, None) => {
+            settle_shared::<S, E, N, EYE>(simd, scene, queue, hits);
+            shade_plain::<S, E, N, EYE>(simd, scene, met, hits, in_the_way);
+        }
     }
     if let Some(sky) = scene.sky() {
         show_sky::<S, E, EYE>(simd, sky, count, queue, hits);
@@ -281,6 +284,7 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     if hits.packets.is_empty() {
         return;
     }
+    settle_shared::<S, E, N, EYE>(simd, scene, queue, hits);
     surfaces_of_all::<S, E, N, EYE>(simd, scene, met.background, queue, hits);
     let is_painted = paint::<S, E, EYE>(beyond, queue, hits);
     in_the_way.find(simd, scene, hits);
@@ -293,6 +297,27 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
         light_up_beyond::<S, E, Anything<N::By>, EYE, false>(simd, scene, beyond, queue, hits, in_the_way);
     }
     go_on::<S, E, N, EYE>(simd, scene, is_painted, met, hits);
+}
+
+/// Makes of the nearest hits those that count, where objects share surfaces.
+#[inline(always)]
+fn settle_shared<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    queue: &Queue<E>,
+    hits: &mut Hits<E>,
+) {
+    if let Some(shared) = &scene.shared {
+        shared.settle_all::<S, E, Anything<N::By>, EYE>(simd, scene, queue, hits);
+    }
+}
+
+/// Lets rays that go on start off all that shares the surface of their hit.
+#[inline(always)]
+fn lift_shared<S: Simd, E: Real>(scene: &Prepared<E>, hits: &mut Hits<E>) {
+    if let Some(shared) = &scene.shared {
+        shared.lift(hits, Lanes::<S, E>::LEN);
+    }
 }
 
 /// The surfaces of whatever a scene can have.
@@ -309,6 +334,7 @@ fn surfaces_of_all<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     } else {
         surfaces::<S, E, Anything<N::By>, EYE, true, true, false>(simd, scene, background, queue, hits);
     }
+    lift_shared::<S, E>(scene, hits);
 }
 
 /// In pictures whose lights have an extent.
@@ -328,6 +354,7 @@ fn shade_softly<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     if hits.packets.is_empty() {
         return;
     }
+    settle_shared::<S, E, N, EYE>(simd, scene, queue, hits);
     surfaces_of_all::<S, E, N, EYE>(simd, scene, met.background, queue, hits);
     let is_painted = beyond.is_some_and(|beyond| paint::<S, E, EYE>(beyond, queue, hits));
     in_the_way.find(simd, scene, hits);
@@ -399,6 +426,7 @@ fn shade_plain<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
                 surfaces::<S, E, Variant<N::By, C, T, false>, EYE, true, false, false>(simd, scene, background, queue, hits)
             });
         }
+        lift_shared::<S, E>(scene, hits);
         if BUILT.shadows && scene.needs.shadows {
             let kinds = in_the_way.find(simd, scene, hits);
             let tree = BUILT.tree && scene.tree.is_some();
@@ -412,6 +440,7 @@ fn shade_plain<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
         fitted!(N, kinds, C T => {
             surfaces::<S, E, Variant<N::By, C, T, false>, EYE, false, true, false>(simd, scene, background, queue, hits)
         });
+        lift_shared::<S, E>(scene, hits);
     } else {
         ambient::<S, E, EYE>(simd, scene, background, queue, hits);
     }

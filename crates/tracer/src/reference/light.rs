@@ -5,7 +5,7 @@ use rayfold_scene::model::unit;
 use rayfold_scene::{Lamp, Light, Object, Shine};
 
 use super::shapes::{self, Surface};
-use super::world::{World, glass, nearest};
+use super::world::{World, glass};
 use crate::camera::Ray;
 use crate::scale::below_inverse;
 
@@ -64,7 +64,7 @@ impl Arriving {
         }
         let mut left = DVec3::ONE;
         let mut ray = self.ray(start);
-        while let Some(hit) = nearest(&world.objects, ray) {
+        while let Some(hit) = world.nearest(ray) {
             let object = &world.objects[hit.object];
             if !self.is_before(ray, hit.distance, &hit.surface) {
                 break;

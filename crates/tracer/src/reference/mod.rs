@@ -98,17 +98,17 @@ pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
     Shader { world: &world, lights: &world.middles(), cancel: None }.color(ray, scene.depth.bounces())
 }
 
-/// The nearest hit of a ray; of hits at the same distance one without glass, and of those that of the object which comes
-/// first.
+/// The nearest hit of a ray; of equal hits, which are within the bound on rounding of each other, one without glass, and of those
+/// that of the object which comes first.
 ///
 /// `direction` is of unit length.
 pub fn nearest(objects: &[Object], origin: DVec3, direction: DVec3) -> Option<Hit> {
     let ray = Ray { origin, direction };
     if objects.iter().any(|object| matches!(object, Object::Instance(_))) {
         let objects: Vec<Object> = objects.iter().map(|o| shapes::in_world(o).into_owned()).collect();
-        world::nearest(&objects, ray)
+        world::nearest(&objects, ray, DVec3::ZERO)
     } else {
-        world::nearest(objects, ray)
+        world::nearest(objects, ray, DVec3::ZERO)
     }
 }
 

@@ -79,7 +79,7 @@ impl<'a> World<'a> {
     }
 
     pub(super) fn nearest(&self, ray: Ray) -> Option<Hit> {
-        nearest(&self.objects, ray)
+        nearest(&self.objects, ray, self.center)
     }
 
     /// Where a surface is hit, and its normal, in the coordinates of its object's numbers; and the object, which is not an
@@ -97,21 +97,61 @@ impl<'a> World<'a> {
     }
 }
 
-/// The nearest hit; see [`super::nearest`]. No object is an instance that could be moved into the world.
-pub(super) fn nearest(objects: &[Object], ray: Ray) -> Option<Hit> {
+/// How far apart hits may be that count as equal, in roundoffs of the distance and of numbers that were rounded before: those
+/// by which new rays start off curved surfaces.
+const EQUAL: f64 = 32.0 * f64::EPSILON;
+
+/// The sine of the angle between surfaces above which they cross, and are not one.
+const PARALLEL: f64 = 1.0 / (1u64 << 20) as f64;
+
+/// Hits farther apart than this, for the numbers that take part, are not looked at any closer.
+const APART: f64 = 1.0 / (1u64 << 30) as f64;
+
+/// The nearest hit; see [`super::nearest`]. No object is an instance that could be moved into the world. The objects' own
+/// numbers were rounded when they were moved by `center`.
+///
+/// Hits are equal to the nearest if they are no farther from its surface than new rays start off both, and the surfaces are
+/// parallel there. Rays that go on start off all of them.
+pub(super) fn nearest(objects: &[Object], ray: Ray, center: DVec3) -> Option<Hit> {
+    let rank = |index: usize| (glass(&objects[index]).is_some(), index);
     let mut best: Option<(usize, f64)> = None;
+    let mut others: Vec<(usize, f64)> = vec![];
     for (index, object) in objects.iter().enumerate() {
         let Some(distance) = shapes::distance(object, ray) else { continue };
-        let is_before = best.is_none_or(|(other, least)| {
-            distance < least && !shapes::are_one(&objects[other], least, object, distance)
-                || distance == least && glass(object).is_none() && glass(&objects[other]).is_some()
-        });
-        if is_before {
-            best = Some((index, distance));
+        let is_before =
+            |(other, least): (usize, f64)| distance < least || distance == least && rank(index) < rank(other);
+        match best {
+            Some(known) if !is_before(known) => others.push((index, distance)),
+            known => {
+                others.extend(known);
+                best = Some((index, distance));
+            }
         }
     }
     let (object, distance) = best?;
-    Some(Hit { object, distance, surface: shapes::surface(&objects[object], ray, distance) })
+    let surface = shapes::surface(&objects[object], ray, distance);
+    let mut hit = Hit { object, distance, surface };
+    let climb = surface.normal.dot(ray.direction).abs();
+    let rounded = DVec3::select(surface.normal.cmpeq(DVec3::ZERO), DVec3::ZERO, center.abs()).element_sum();
+    let slack = EQUAL * (distance + rounded);
+    let extent = shapes::extent(&objects[object], ray) + distance + rounded;
+    for (index, far) in others {
+        let apart = (far - distance) * climb;
+        if apart > APART * (extent + shapes::extent(&objects[index], ray)) {
+            continue;
+        }
+        let other = shapes::surface(&objects[index], ray, far);
+        let bound = slack + surface.offset + other.offset;
+        if apart > bound || other.normal.cross(surface.normal).length() > PARALLEL {
+            continue;
+        }
+        let offset = hit.surface.offset.max(bound);
+        if rank(index) < rank(hit.object) {
+            hit = Hit { object: index, distance: far, surface: other };
+        }
+        hit.surface.offset = offset;
+    }
+    Some(hit)
 }
 
 /// What an object lets through.

@@ -179,6 +179,20 @@ impl<E: Real> Body<E> {
         }
     }
 
+    /// Offers where the rays meet the body, a plane, if any of the `open` ones do.
+    #[inline(always)]
+    fn meet_plane<S: Simd>(&self, simd: S, ray: Ray<S, E>, open: Mask<S, E>, nearest: &mut Nearest<S, E>) {
+        let zero = constant::<S, E>(simd, 0.0);
+        let up = Vec3::<S, E>::splat(simd, self.axes[2]);
+        let high = up.dot(ray.origin.sub(Vec3::splat(simd, self.center)));
+        let climb = up.dot(ray.direction);
+        let comes = (high.simd_gt(zero) & climb.simd_lt(zero)) | (high.simd_lt(zero) & climb.simd_gt(zero));
+        if (open & comes).any_true() {
+            let (hit, distance) = plane::across::<S, E>(simd, high, climb);
+            nearest.offer(simd, hit, distance, self.order);
+        }
+    }
+
     /// The surface where the rays meet the body.
     #[inline(never)]
     pub(super) fn surface<S: Simd>(&self, simd: S, ray: Ray<S, E>, distance: Lanes<S, E>) -> Surface<S, E> {
@@ -378,18 +392,21 @@ impl<E: Real> Bodies<E> {
                 let zero = constant::<S, E>(simd, 0.0);
                 let open = nearest.distance.simd_gt(zero);
                 for plane in &self.bodies[..self.planes] {
-                    let up = Vec3::<S, E>::splat(simd, plane.axes[2]);
-                    let high = up.dot(ray.origin.sub(Vec3::splat(simd, plane.center)));
-                    let climb = up.dot(ray.direction);
-                    let comes = (high.simd_gt(zero) & climb.simd_lt(zero))
-                        | (high.simd_lt(zero) & climb.simd_gt(zero));
-                    if (open & comes).any_true() {
-                        let (hit, distance) = plane::across::<S, E>(simd, high, climb);
-                        nearest.offer(simd, hit, distance, plane.order);
-                    }
+                    plane.meet_plane(simd, ray, open, nearest);
                 }
             },
         );
+    }
+
+    /// Offers where the rays meet one of the bodies.
+    pub(super) fn meet_one<S: Simd>(&self, simd: S, at: usize, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+        let body = &self.bodies[at];
+        if at < self.planes {
+            let all = nearest.distance.simd_gt(constant::<S, E>(simd, 0.0));
+            body.meet_plane(simd, ray, all, nearest);
+        } else {
+            body.meet(simd, ray, nearest);
+        }
     }
 
     /// Which of the rays that `lit` names meet no plane and no body that `bits` asks for, nearer than `far`.

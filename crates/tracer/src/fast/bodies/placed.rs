@@ -8,6 +8,7 @@ use rayfold_scene::{Cuboid, Instance, Object};
 
 use crate::fast::bounds::{Bounds, NOTHING};
 use crate::fast::shapes::instance::{in_world, turned_box};
+use crate::fast::shared::{Flat, Plain, Ring, Side, Surface};
 use crate::fast::tree::Grouped;
 
 /// A body and its position in the script.
@@ -119,6 +120,45 @@ impl Solid {
             Form::Cuboid { half } => half.element_sum(),
         };
         self.center.abs().max_element() + size
+    }
+
+    /// Its position in the script.
+    pub(in crate::fast) fn order(&self) -> u32 {
+        self.order
+    }
+
+    /// The parts of its surface.
+    pub(in crate::fast) fn each_surface(&self, mut each: impl FnMut(Surface)) {
+        let flat = |normal: DVec3, center: DVec3, radius: f64, plain| {
+            Surface::Flat(Flat { normal, height: normal.dot(center), center, radius, plain })
+        };
+        let &Self { axes, center, .. } = self;
+        let axis = axes[2];
+        match self.form {
+            Form::Plane => each(flat(axis, center, f64::INFINITY, Plain::ByAxis)),
+            Form::Disc { radius } => each(flat(axis, center, radius, Plain::ByAxis)),
+            Form::Cone { radii, height, end } => {
+                for (center, radius) in [center, end].into_iter().zip(radii) {
+                    if radius > 0.0 {
+                        each(flat(axis, center, radius, Plain::ByAxis));
+                    }
+                }
+                each(Surface::Side(Side { end: center, axis, height, radii }));
+            }
+            Form::Torus { radius, thickness } => {
+                each(Surface::Ring(Ring { center, axis, radius, thickness }));
+            }
+            Form::Cuboid { half } => {
+                for number in 0..3 {
+                    let (normal, across) = (axes[number], half * (1.0 - DVec3::AXES[number]));
+                    let apart = half[number] * normal;
+                    each(flat(normal, center - apart, across.length(), Plain::No));
+                    if half[number] > 0.0 {
+                        each(flat(normal, center + apart, across.length(), Plain::No));
+                    }
+                }
+            }
+        }
     }
 
     /// Whether the origin lies so near its surface that rounding might put it on the other side. Numbers along an axis are

@@ -97,8 +97,12 @@ impl<E: Real> Torus<E> {
         let low = is_along.select(between.select(zero - far, far), a.min(b));
         let high = is_along.select(between.select(far, zero - far), a.max(b));
         let begin = (zero - middle).max(zero - half_chord).max(low);
-        let end = half_chord.min(high).min(limit - middle);
-        let mut open = begin.simd_lt(end) & near.simd_lt(outer * outer);
+        let end = half_chord.min(high);
+        // What was met before may end the search, but never the stretch in which a root is looked for: its last bits would
+        // turn on it. The rounding of the sum is far less than this.
+        let slack = (outer + middle.abs() + limit.abs()) * constant::<S, E>(simd, 8.0 * E::ROUNDOFF);
+        let limit = limit - middle + slack;
+        let mut open = begin.simd_lt(end) & begin.simd_le(limit) & near.simd_lt(outer * outer);
         let none = open & !open;
         if !open.any_true() {
             return (none, zero);
@@ -140,6 +144,7 @@ impl<E: Real> Torus<E> {
             side = goes_on.select(outside, side);
             at_from = goes_on.select(outside, at_from);
         }
+        found &= from.simd_le(limit);
         if !found.any_true() {
             return (none, zero);
         }

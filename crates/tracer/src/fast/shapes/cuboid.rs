@@ -68,7 +68,8 @@ impl placed::Placed for Placed {
         let (u, v) = (DVec3::AXES[(axis + 1) % 3], DVec3::AXES[(axis + 2) % 3]);
         let start = if number < 3 { min } else { min + (max - min) * DVec3::AXES[axis] };
         let (u, v) = (u * (max - min), v * (max - min));
-        Face { corners: [start, start + u, start + u + v, start + v], normal: DVec3::AXES[axis] }
+        let (normal, height) = (DVec3::AXES[axis], if number < 3 { min[axis] } else { max[axis] });
+        Face { corners: [start, start + u, start + u + v, start + v], normal, height }
     }
 
     fn nearest(&self) -> f64 {

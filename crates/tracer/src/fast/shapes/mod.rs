@@ -76,6 +76,13 @@ impl Shape {
         numbers
     }
 
+    /// Whether rays meet both at the same distance bit for bit in single precision: their numbers are rounded to the same ones.
+    pub(super) fn is_one_in_single(&self, other: &Self) -> bool {
+        let square = |of: &Self| of.ball().map(|(_, radius)| (radius * radius) as f32);
+        let (numbers, others) = (self.numbers(), other.numbers());
+        numbers.map(|x| x as f32) == others.map(|x| x as f32) && square(self) == square(other)
+    }
+
     /// A box of this size.
     pub(super) fn of_box((min, max): Bounds) -> Self {
         Self::Cuboid(cuboid::Placed { min, max })

@@ -78,7 +78,7 @@ impl placed::Placed for Placed {
 
     fn face(&self, _: usize) -> Face {
         let [a, b, c] = self.vertices;
-        Face { corners: [a, b, c, c], normal: self.normal }
+        Face { corners: [a, b, c, c], normal: self.normal, height: self.height }
     }
 
     fn plane(&self) -> Option<DVec3> {

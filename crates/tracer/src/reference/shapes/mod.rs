@@ -20,7 +20,6 @@ use rayfold_scene::Object;
 
 pub(crate) use instance::in_world;
 pub(crate) use sphere::power;
-pub(super) use triangle::are_one;
 pub(crate) use triangle::{normal_and_width, triangle_normal};
 
 use crate::camera::Ray;
@@ -100,6 +99,11 @@ pub(super) fn surface(object: &Object, ray: Ray, distance: f64) -> Surface {
     };
     let surface = shape(&object).surface(ray, distance * scale);
     Surface { point: surface.point / scale, offset: surface.offset / scale, ..surface }
+}
+
+/// The largest of the numbers that take part in where a ray meets an object.
+pub(super) fn extent(object: &Object, ray: Ray) -> f64 {
+    shape(object).extent(ray.origin)
 }
 
 /// The largest exponent whose fourth power leaves room for sums of products.

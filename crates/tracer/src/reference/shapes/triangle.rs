@@ -47,26 +47,6 @@ impl Shape for Triangle {
     }
 }
 
-/// Distances to one plane differ by less than this part of them.
-const ONE_PLANE: f64 = 64.0 * ROUNDOFF;
-
-/// Whether two objects are triangles in one plane as far as rounding tells, so that the distances at which a ray meets them
-/// are meant to be the same.
-pub(in crate::reference) fn are_one(one: &Object, near: f64, other: &Object, far: f64) -> bool {
-    let (Object::Triangle(one), Object::Triangle(other)) = (one, other) else { return false };
-    if (far - near).abs() > ONE_PLANE * near.abs() {
-        return false;
-    }
-    let (corners, others) = (one.vertices(), other.vertices());
-    let largest = |of: &[DVec3; 3]| of.iter().map(|v| v.abs().max_element()).fold(0.0, f64::max);
-    let slack = ONE_PLANE * largest(corners).min(largest(others));
-    let are_in_plane = |plane: &[DVec3; 3], others: &[DVec3; 3]| {
-        let normal = triangle_normal(plane);
-        others.iter().all(|corner| normal.dot(*corner - plane[0]).abs() <= slack)
-    };
-    are_in_plane(corners, others) && are_in_plane(others, corners)
-}
-
 /// In coordinates where the ray runs from the origin along z: the signed areas opposite the vertices.
 fn sheared(triangle: &Triangle, ray: Ray) -> [f64; 3] {
     let d = ray.direction;
