@@ -1,4 +1,4 @@
-//! Files of the object store rot: what is damaged is noticed, said with its place, and nothing else is lost by it.
+//! Damaged files of the object store: damage is noticed, named with its place, and nothing else is lost by it.
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 #![allow(dead_code, reason = "the stage is shared with the tests of the protocol")]

@@ -175,3 +175,42 @@ async fn damage_is_noticed_wherever_it_is_and_deletes_nothing() {
     println!("{refused} starts refused, {partly} with reads refused, {whole} whole");
     assert!(refused > 0 && whole > 0);
 }
+
+/// The first block has no checksum of ours.
+#[tokio::test]
+async fn no_flipped_bit_of_the_databases_header_hides_rows() {
+    let every = std::env::var("RAYFOLD_BUCKET_DAMAGES").map_or(29, |_| 1);
+    let mut rng = Rng::with_seed(7);
+    let (mut undamaged, model) = loop {
+        let (files, model) = history(&mut rng).await;
+        if model.len() > 10 {
+            break (files, model);
+        }
+    };
+    // As after a stop, too: then the journal has nothing that the database lacks.
+    for stopped in [false, true] {
+        if stopped {
+            let folder = tempfile::tempdir().unwrap();
+            write(folder.path(), &undamaged);
+            Storage::open(folder.path()).unwrap().1.end();
+            undamaged = files(folder.path());
+        }
+        let (mut refused, mut opened) = (0, 0);
+        for bit in (0..320 * 8).step_by(every) {
+            let mut files = undamaged.clone();
+            files.get_mut("database").unwrap()[bit / 8] ^= 1 << (bit % 8);
+            let folder = tempfile::tempdir().unwrap();
+            write(folder.path(), &files);
+            match Storage::open(folder.path()) {
+                Err(Error::Damaged { .. }) => refused += 1,
+                Err(other) => panic!("bit {bit}: {other}"),
+                Ok((storage, writing)) => {
+                    opened += 1;
+                    judge(&storage, &model);
+                    writing.end();
+                }
+            }
+        }
+        println!("stopped: {stopped}; {refused} starts refused, {opened} not");
+    }
+}

@@ -168,27 +168,29 @@ impl Salvage {
         Ok(path)
     }
 
-    /// Puts the readable rows in the place of the database and the journal, which go to `aside`.
+    /// Puts the readable rows in the place of the database and the journal, which stay in `aside`. After a kill in between, a
+    /// repair can be begun again.
     ///
     /// # Errors
     /// [`Error::File`], [`Error::Storage`].
     pub(crate) fn keep(mut self, aside: &Path) -> Result<()> {
         let transaction = self.fresh.begin().map_err(|source| self.failed(source))?;
         self.fresh.commit_durably(transaction, self.last).map_err(|source| self.failed(source))?;
-        let swap = || {
+        let link = || {
             for file in [self.folder.journal(), self.folder.database(), self.folder.sums()] {
                 if let Some(name) = file.file_name().filter(|_| file.exists()) {
-                    self.folder.rename(&file, &aside.join(name))?;
+                    fs::hard_link(&file, aside.join(name))?;
                 }
             }
-            Ok(())
+            sync_folder(aside)
         };
-        swap().map_err(Error::file(aside))?;
+        link().map_err(Error::file(aside))?;
         compaction::replace(&self.folder)?;
         let journal = self.folder.journal();
+        let new = self.folder.path().join("journal.new");
         let create = || {
-            Journal::create(self.folder.open(&journal)?, self.last)?;
-            sync_folder(self.folder.path())
+            Journal::create(self.folder.open(&new)?, self.last)?;
+            self.folder.rename(&new, &journal)
         };
         create().map_err(Error::file(&journal))?;
         self.folder.upgraded()

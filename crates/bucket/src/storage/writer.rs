@@ -289,9 +289,13 @@ impl Writer {
             return;
         }
         let Ok(rows) = open.snapshot() else { return };
-        if let Ok(compacted) = compaction::compact(&self.folder, &rows, self.journal.last()) {
-            let mut current = self.current.write().unwrap_or_else(std::sync::PoisonError::into_inner);
-            *current = Ok(Arc::new(compacted));
+        match compaction::compact(&self.folder, &rows, self.journal.last()) {
+            Ok(compacted) => {
+                let mut current = self.current.write().unwrap_or_else(std::sync::PoisonError::into_inner);
+                *current = Ok(Arc::new(compacted));
+            }
+            // The new database may have taken the place of the one that is open.
+            Err(_) => self.open_anew(),
         }
     }
 
