@@ -49,7 +49,8 @@ pub(super) fn begin(folder: &Folder) -> Result<Open> {
         // In this order: sums without a new database are those of one that took its place.
         let rows = folder.open(&path)?;
         sync_folder(folder.path())?;
-        Ok(Disk::new(rows, Sums::open(folder.open(&folder.new_sums())?, 0)?))
+        let sums = Sums::open(folder.open(&folder.new_sums())?, &*rows)?;
+        Ok(Disk::new(rows, sums))
     };
     Ok(Open::at(disk().map_err(Error::file(&path))?, false).map_err(failed)?.0)
 }

@@ -134,6 +134,7 @@ pub(super) struct Disk {
     overlay: Mutex<Overlay>,
     damage: Mutex<Option<u64>>,
     lenient: AtomicBool,
+    held: AtomicBool,
 }
 
 /// What found no room on the disk: pages that hide those of the file, and the length that the file should have.
@@ -154,15 +155,28 @@ impl Overlay {
 
 impl Disk {
     pub(super) fn new(file: Arc<dyn Medium>, sums: Sums) -> Arc<Self> {
-        let (dead, overlay, damage) = (AtomicBool::new(false), Mutex::default(), Mutex::default());
-        Arc::new(Self {
-            file,
-            sums: Mutex::new(sums),
-            dead,
-            overlay,
-            damage,
-            lenient: AtomicBool::new(false),
-        })
+        let [dead, lenient, held] = [(); 3].map(|()| AtomicBool::new(false));
+        let (overlay, damage) = (Mutex::default(), Mutex::default());
+        Arc::new(Self { file, sums: Mutex::new(sums), dead, overlay, damage, lenient, held })
+    }
+
+    /// Keeps what is written in memory, until [`Disk::release`]: a start that is refused changes nothing.
+    ///
+    /// # Errors
+    /// The system's.
+    pub(super) fn hold(&self) -> io::Result<()> {
+        self.overlay().length = Some(self.file.len()?);
+        self.held.store(true, Ordering::Release);
+        Ok(())
+    }
+
+    /// Writes what was held, now or, on a full disk, when there is room.
+    ///
+    /// # Errors
+    /// The system's.
+    pub(super) fn release(&self) -> io::Result<()> {
+        self.held.store(false, Ordering::Release);
+        self.settle()
     }
 
     /// Whether damaged blocks are read as they are.
@@ -209,7 +223,12 @@ impl Disk {
         if overlay.is_empty() {
             return Ok(());
         }
-        if let Some(length) = overlay.length {
+        if self.held.load(Ordering::Acquire) {
+            return Err(full());
+        }
+        if let Some(length) = overlay.length
+            && length != self.file.len()?
+        {
             self.file.set_len(length)?;
         }
         for (page, bytes) in overlay.pages.iter().filter(|(page, _)| **page > 0) {
@@ -220,9 +239,29 @@ impl Disk {
         if let Some(bytes) = overlay.pages.get(&0) {
             self.file.write_all_at(bytes, 0)?;
             self.file.sync()?;
+            self.sums().header_synced();
         }
         *overlay = Overlay::default();
         Ok(())
+    }
+
+    /// Brings what was written to the disk.
+    fn sync(&self) -> io::Result<()> {
+        self.file.sync()?;
+        self.sums().header_synced();
+        Ok(())
+    }
+
+    /// Brings the sum of a header to the disk that will be written.
+    fn announce(&self, header: &[u8]) -> io::Result<()> {
+        // Else there would be three headers that may be on the disk, for two sums.
+        let synced = self.sums().is_header_synced();
+        if !synced {
+            self.sync()?;
+        }
+        let mut sums = self.sums();
+        sums.set(0, header);
+        sums.save()
     }
 
     /// A page as the file has it; zeros beyond its end.
@@ -242,6 +281,14 @@ impl Handle {
             return Err(io::Error::other("the database was opened anew"));
         }
         Ok(&*self.0.file)
+    }
+
+    /// The first block, which holds the header.
+    fn first(&self) -> io::Result<Vec<u8>> {
+        let mut first = vec![0; BLOCK_BYTES];
+        let length = self.len()?.min(PAGE_BYTES) as usize;
+        self.view(0, &mut first[..length])?;
+        Ok(first)
     }
 
     /// Reads what was written, on the disk or in memory.
@@ -272,6 +319,9 @@ impl StorageBackend for Handle {
 
     fn read(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
         self.view(offset, out)?;
+        if offset < PAGE_BYTES && out.len() < BLOCK_BYTES {
+            self.0.compare(0, &self.first()?)?;
+        }
         self.0.compare(offset, out)
     }
 
@@ -303,14 +353,33 @@ impl StorageBackend for Handle {
                 }
                 Ok(())
             }
-            saved => saved.and_then(|()| file.sync()),
+            saved => saved.and_then(|()| self.0.sync()),
         }
     }
 
     fn write(&self, offset: u64, data: &[u8]) -> io::Result<()> {
         let file = self.file()?;
+        let header = match offset {
+            0..PAGE_BYTES => {
+                let mut first = self.first()?;
+                let start = offset as usize;
+                let length = data.len().min(BLOCK_BYTES - start);
+                first[start..start + length].copy_from_slice(&data[..length]);
+                Some(first)
+            }
+            _ => None,
+        };
         let mut overlay = self.0.overlay();
-        let done = if overlay.is_empty() { file.write_all_at(data, offset) } else { Err(full()) };
+        let announced = match &header {
+            Some(header) if overlay.is_empty() => self.0.announce(header),
+            Some(header) => {
+                self.0.sums().set(0, header);
+                Ok(())
+            }
+            None => Ok(()),
+        };
+        let written = |()| if overlay.is_empty() { file.write_all_at(data, offset) } else { Err(full()) };
+        let done = announced.and_then(written);
         match done {
             Err(failed) if is_full(&failed) => {
                 for (page, within, of_page) in pages(offset, data.len()) {
@@ -329,7 +398,7 @@ impl StorageBackend for Handle {
         let mut partial = vec![0; BLOCK_BYTES];
         for (page, within, of_page) in pages(offset, data.len()) {
             let block = usize::try_from(page).map_err(io::Error::other)?;
-            if of_page.len() == BLOCK_BYTES {
+            if block > 0 && of_page.len() == BLOCK_BYTES {
                 self.0.sums().set(block, &data[within]);
             } else if block > 0 {
                 partial.fill(0);
@@ -440,7 +509,9 @@ mod tests {
         let path = folder.path().join("file");
         std::fs::write(&path, [0; 8192]).unwrap();
         let sums = SystemFiles.open(&folder.path().join("sums")).unwrap();
-        let disk = Disk::new(Arc::new(File::open(&path).unwrap()), Sums::open(sums, 8192).unwrap());
+        let file = File::open(&path).unwrap();
+        let sums = Sums::open(sums, &file).unwrap();
+        let disk = Disk::new(Arc::new(file), sums);
         let handle = Handle(disk.clone());
         assert!(handle.write(0, &[1; 10]).is_err(), "the file is open for reading alone");
         assert!(handle.set_len(10).is_err());

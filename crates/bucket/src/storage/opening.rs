@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use super::bodies::sync_folder;
 use super::compaction;
-use super::database::{Disk, Open};
+use super::database::{Disk, Open, is_full};
 use super::folder::Folder;
 use super::journal::{self, Contents, Journal};
 use super::medium::Medium;
@@ -33,6 +33,7 @@ pub(super) fn open(folder: &mut Folder) -> Result<(Open, Journal)> {
         None if is_damage(&error) => folder.damaged(&database, None, error.to_string()),
         None => Error::Storage { path: folder.path().to_owned(), source: error.into() },
     };
+    disk.hold().map_err(Error::file(&database))?;
     let (open, applied) = Open::at(disk.clone(), format_1).map_err(&failed)?;
     if let Some(what) = contents.mismatch(applied) {
         return Err(folder.damaged(&journal, None, what));
@@ -47,6 +48,11 @@ pub(super) fn open(folder: &mut Folder) -> Result<(Open, Journal)> {
         open.commit_durably(transaction, contents.last(applied)).map_err(&failed)?;
     } else {
         open.commit(transaction).map_err(&failed)?;
+    }
+    match disk.release() {
+        // It goes on without the room, but needs it for another format.
+        Err(error) if format_1 || !is_full(&error) => return Err(Error::file(&database)(error)),
+        _ => {}
     }
     let resumed = contents.resume(journal_file, applied).map_err(Error::file(&journal))?;
     if format_1 {
@@ -105,7 +111,7 @@ fn disk_of(folder: &Folder) -> Result<Arc<Disk>> {
         let rows = folder.open(&database)?;
         let sums = match folder.is_of_format_1() {
             true => Sums::compute(file, &*rows)?,
-            false => Sums::open(file, rows.len()?)?,
+            false => Sums::open(file, &*rows)?,
         };
         Ok(Disk::new(rows, sums))
     };

@@ -371,7 +371,7 @@ impl Copy {
         use super::medium::{Files, SystemFiles};
         let open = || {
             let rows = SystemFiles.open(&self.database)?;
-            let sums = Sums::open(SystemFiles.open(&self.sums)?, rows.len()?)?;
+            let sums = Sums::open(SystemFiles.open(&self.sums)?, &*rows)?;
             let disk = Disk::new(rows, sums);
             disk.set_lenient(lenient);
             // Nothing is kept in memory, so that each read is compared.

@@ -1,8 +1,15 @@
 //! A checksum for each block of the database's file, in a file beside it.
 //!
 //! The database compares its own checksums only when it repairs itself: a flipped bit would otherwise be served as a row, or
-//! hide rows. Here every block is compared whenever it is read. The first block is left out: it is overwritten in place, and
-//! the database protects what counts there.
+//! hide rows. Here every block is compared whenever it is read.
+//!
+//! The first block, the database's header, is overwritten in place. It has two sums: of the header that is on the disk, and of
+//! the one that is being written.
+//!
+//! ```text
+//! sums of the header (8 bytes each)     as it is on the disk, as it was written last
+//! sums of all blocks (8 bytes each)     the first one is not used
+//! ```
 //!
 //! The sums of a commit are on the disk before the commit's header is. Blocks that no durable state refers to may have sums
 //! of earlier contents after a kill; nothing reads them before it has written them.
@@ -21,6 +28,9 @@ pub(super) const BLOCK_BYTES: usize = 4096;
 /// Bytes of a sum.
 const SUM: usize = 8;
 
+/// Bytes of the sums of the header.
+const HEADER: usize = 2 * SUM;
+
 /// What is written at a time.
 const PIECE: usize = 4096;
 
@@ -33,25 +43,45 @@ pub(super) struct Sums {
     file: Arc<dyn Medium>,
     /// By block; 0 stands for a block of zeros.
     sums: Vec<u64>,
+    /// Of the header as it is on the disk, and as it was written last.
+    header: [u64; 2],
+    header_changed: bool,
     /// Pieces of the file that differ from `sums`.
     changed: BTreeSet<usize>,
     length_changed: bool,
 }
 
 impl Sums {
-    /// Reads the sums of a database of so many bytes.
-    pub(super) fn open(file: Arc<dyn Medium>, database_bytes: u64) -> io::Result<Self> {
+    /// Reads the sums of a database.
+    pub(super) fn open(file: Arc<dyn Medium>, database: &dyn Medium) -> io::Result<Self> {
         let bytes = file.read_all()?;
-        let sums = bytes.as_chunks::<SUM>().0.iter().map(|sum| u64::from_le_bytes(*sum)).collect();
-        let mut opened = Self { file, sums, changed: BTreeSet::new(), length_changed: false };
-        opened.resize(database_bytes);
+        let (header, blocks) = bytes.split_at(HEADER.min(bytes.len()));
+        let sums_of = |bytes: &[u8]| -> Vec<u64> {
+            bytes.as_chunks::<SUM>().0.iter().map(|sum| u64::from_le_bytes(*sum)).collect()
+        };
+        let header = sums_of(header).try_into().unwrap_or_default();
+        let mut opened = Self::of(file, sums_of(blocks));
+        opened.header = header;
+        let mut first = vec![0; BLOCK_BYTES];
+        database.read_padded(&mut first, 0)?;
+        // Which of the two it is.
+        if opened.matches(0, &first) {
+            opened.header = [sum(0, &first); 2];
+        }
+        opened.resize(database.len()?);
         Ok(opened)
+    }
+
+    fn of(file: Arc<dyn Medium>, sums: Vec<u64>) -> Self {
+        let (header, changed) = ([0; 2], BTreeSet::new());
+        Self { file, sums, header, header_changed: false, changed, length_changed: false }
     }
 
     /// Computes the sums of a database as it is, and writes them.
     pub(super) fn compute(file: Arc<dyn Medium>, database: &dyn Medium) -> io::Result<Self> {
         let length = database.len()?;
-        let mut computed = Self { file, sums: Vec::new(), changed: BTreeSet::new(), length_changed: true };
+        let mut computed = Self::of(file, Vec::new());
+        computed.length_changed = true;
         computed.resize(length);
         let mut bytes = vec![0; SCAN_BLOCKS * BLOCK_BYTES];
         for start in (0..computed.sums.len()).step_by(SCAN_BLOCKS) {
@@ -60,18 +90,25 @@ impl Sums {
                 computed.set(block, bytes);
             }
         }
+        computed.header_synced();
         computed.save()?;
         Ok(computed)
     }
 
     /// Whether this is what a block should hold.
     pub(super) fn matches(&self, block: usize, bytes: &[u8]) -> bool {
-        block == 0 || self.sums.get(block).is_some_and(|expected| *expected == sum(block, bytes))
+        let found = sum(block, bytes);
+        match block {
+            0 => self.header.contains(&found),
+            _ => self.sums.get(block).is_some_and(|expected| *expected == found),
+        }
     }
 
-    /// A block now holds these bytes.
+    /// A block now holds these bytes. Of the header this must be on the disk before the header is written.
     pub(super) fn set(&mut self, block: usize, bytes: &[u8]) {
         if block == 0 {
+            self.header[1] = sum(block, bytes);
+            self.header_changed = true;
             return;
         }
         let sum = sum(block, bytes);
@@ -82,6 +119,16 @@ impl Sums {
             self.sums[block] = sum;
             self.changed.insert(block * SUM / PIECE);
         }
+    }
+
+    /// Whether the header that was written last is on the disk.
+    pub(super) fn is_header_synced(&self) -> bool {
+        self.header[0] == self.header[1]
+    }
+
+    /// The header that was written last is on the disk.
+    pub(super) fn header_synced(&mut self) {
+        self.header[0] = self.header[1];
     }
 
     /// The database now has this length.
@@ -101,20 +148,23 @@ impl Sums {
 
     /// Brings what changed to the disk.
     pub(super) fn save(&mut self) -> io::Result<()> {
-        if self.changed.is_empty() && !self.length_changed {
+        if self.changed.is_empty() && !self.length_changed && !self.header_changed {
             return Ok(());
         }
         if self.length_changed {
-            self.file.set_len((self.sums.len() * SUM) as u64)?;
+            self.file.set_len((HEADER + self.sums.len() * SUM) as u64)?;
+        }
+        if self.header_changed {
+            self.file.write_all_at(&self.header.map(u64::to_le_bytes).concat(), 0)?;
         }
         for piece in &self.changed {
             let of_piece = piece * PIECE / SUM..self.sums.len().min((piece + 1) * PIECE / SUM);
             let bytes: Vec<u8> = self.sums[of_piece].iter().flat_map(|sum| sum.to_le_bytes()).collect();
-            self.file.write_all_at(&bytes, (piece * PIECE) as u64)?;
+            self.file.write_all_at(&bytes, (HEADER + piece * PIECE) as u64)?;
         }
         self.file.sync()?;
         self.changed.clear();
-        self.length_changed = false;
+        (self.length_changed, self.header_changed) = (false, false);
         Ok(())
     }
 }
@@ -145,9 +195,10 @@ mod tests {
             database.write_all_at(&block(number), (number * BLOCK_BYTES) as u64).unwrap();
         }
         Sums::compute(open("sums"), &*database).unwrap();
-        let mut sums = Sums::open(open("sums"), database.len().unwrap()).unwrap();
+        let mut sums = Sums::open(open("sums"), &*database).unwrap();
         assert_eq!(sums.sums.len(), 1500);
-        for number in 0..1500 {
+        assert!(sums.matches(0, &block(0)) && !sums.matches(0, &block(1)));
+        for number in 1..1500 {
             assert!(sums.matches(number, &block(number)), "block {number}");
         }
         assert!(!sums.matches(252, &block(253)) && !sums.matches(1500, &block(0)));
@@ -159,7 +210,8 @@ mod tests {
         sums.resize(800 * BLOCK_BYTES as u64);
         sums.set(799, &block(9));
         sums.save().unwrap();
-        let sums = Sums::open(open("sums"), 800 * BLOCK_BYTES as u64).unwrap();
+        database.set_len(800 * BLOCK_BYTES as u64).unwrap();
+        let mut sums = Sums::open(open("sums"), &*database).unwrap();
         assert!(sums.matches(599, &block(599)) && sums.matches(799, &block(9)));
         assert!(
             sums.matches(700, &block(0)) && !sums.matches(700, &block(1)),
@@ -169,6 +221,20 @@ mod tests {
         for bit in [0, 4095 * 8 + 7] {
             flipped[bit / 8] ^= 1 << (bit % 8);
             assert!(!sums.matches(42, &flipped));
+        }
+        // While the header is written, both the one before and the new one are right.
+        sums.set(0, &block(1));
+        sums.save().unwrap();
+        for (header, other) in [(1, 2), (0, 1)] {
+            database.write_all_at(&block(header), 0).unwrap();
+            let mut sums = Sums::open(open("sums"), &*database).unwrap();
+            assert!(
+                sums.is_header_synced() && sums.matches(0, &block(header)) && !sums.matches(0, &block(other))
+            );
+            sums.set(0, &block(2));
+            assert!(
+                !sums.is_header_synced() && sums.matches(0, &block(header)) && sums.matches(0, &block(2))
+            );
         }
     }
 }
