@@ -148,6 +148,14 @@ async fn a_damaged_journal_is_repaired_to_all_that_can_be_read() {
     let folder = killed().await;
     let journal = folder.path().join("journal");
     flip(&journal, 5_000);
+    let mut start = Command::new(env!("CARGO_BIN_EXE_rayfold-bucket"));
+    start
+        .env("AWS_ACCESS_KEY_ID", "root")
+        .env("AWS_SECRET_ACCESS_KEY", "secret-key")
+        .env("RUST_BACKTRACE", "1");
+    let refused = start.arg("--data").arg(folder.path()).output().unwrap();
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert_eq!((refused.status.code(), said.lines().count()), (Some(1), 1), "{said}");
     let listed = checked(folder.path(), false);
     let text = String::from_utf8(listed.stdout).unwrap();
     assert_eq!(listed.status.code(), Some(1), "{text}");

@@ -20,8 +20,9 @@ use super::sums::Sums;
 use super::table::{Batch, Snapshot, Table, View};
 use crate::{Error, Result};
 
-/// How often a table is cut in two to find rows between damaged blocks.
+/// How often a table is cut in two to find rows between damaged blocks: in all, and since a row was found.
 const MAX_CUTS: usize = 200;
+const MAX_VAIN_CUTS: usize = 30;
 
 /// Damage that was found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -270,14 +271,18 @@ impl Old {
     fn copy(&mut self, table: Table, to: &Open) -> std::result::Result<Vec<Lost>, redb::Error> {
         let mut lost = Vec::new();
         let mut ranges = VecDeque::from([(Vec::new(), None::<Vec<u8>>)]);
-        let mut cuts = 0;
+        let (mut cuts, mut vain) = (0, 0);
         while let Some((mut from, mut before)) = ranges.pop_front() {
+            let whole = (from.clone(), before.clone());
             if self.read(table, &mut from, &mut before, to, false)?
                 || self.read(table, &mut from, &mut before, to, true)?
             {
+                vain = 0;
                 continue;
             }
-            match halfway(&from, before.as_deref()).filter(|_| cuts < MAX_CUTS) {
+            vain = if (&from, &before) == (&whole.0, &whole.1) { vain + 1 } else { 0 };
+            let goes_on = cuts < MAX_CUTS && vain < MAX_VAIN_CUTS;
+            match halfway(&from, before.as_deref()).filter(|_| goes_on) {
                 Some(middle) => {
                     cuts += 1;
                     ranges.push_back((from, Some(middle.clone())));
