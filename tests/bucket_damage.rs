@@ -247,8 +247,10 @@ async fn a_damaged_body_is_never_served_as_whole() {
     let part = client.get_object().bucket(BUCKET).key("parts").part_number(2).send().await.unwrap();
     assert_eq!(part.body.collect().await.unwrap().to_vec().len(), 300_000);
     flip(&files[4], 5);
-    let part = client.get_object().bucket(BUCKET).key("parts").part_number(2).send().await.unwrap();
-    part.body.collect().await.unwrap_err();
+    // The end may come before the client has read the head.
+    if let Ok(part) = client.get_object().bucket(BUCKET).key("parts").part_number(2).send().await {
+        part.body.collect().await.unwrap_err();
+    }
     server.stop().await;
 
     let report = check(folder.path(), false).unwrap();
