@@ -35,6 +35,26 @@ async fn every_kind_of_change_is_told() {
 }
 
 #[tokio::test]
+async fn each_object_of_a_delete_of_many_is_told() {
+    use aws_sdk_s3::types::{Delete, ObjectIdentifier};
+    let (webhook, heard) = listener(0).await;
+    let stage = stage_with(Some(webhook)).await;
+    for key in ["a", "b", "c"] {
+        stage.put(key, "1").await;
+    }
+    stage.notify().await;
+    let object = |key: &str| ObjectIdentifier::builder().key(key).build().unwrap();
+    let many = Delete::builder().objects(object("a")).objects(object("never there")).objects(object("c"));
+    let delete = stage.client.delete_objects().bucket(BUCKET).delete(many.build().unwrap());
+    delete.send().await.unwrap();
+    let mut told = heard.wait(2).await;
+    told.sort();
+    assert_eq!(told, [event("ObjectRemoved:Delete", "a"), event("ObjectRemoved:Delete", "c")]);
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    assert_eq!(heard.all().len(), 2, "what was not there was told");
+}
+
+#[tokio::test]
 async fn an_objects_events_stay_in_order_while_the_listener_refuses() {
     let (webhook, heard) = listener(30).await;
     let stage = stage_with(Some(webhook)).await;

@@ -221,3 +221,53 @@ async fn one_store_at_a_time_uses_a_folder_and_all_comes_back() {
     }
     server.stop().await;
 }
+
+/// The checksum behind a body is compared with the body, as one in a header is.
+#[tokio::test]
+async fn a_checksum_behind_the_body_is_compared() {
+    use aws_sigv4::http_request::{
+        PayloadChecksumKind, SignableBody, SignableRequest, SigningSettings, sign,
+    };
+    let stage = stage().await;
+    let put = async |key: &str, sum: &str| {
+        let identity = aws_sdk_s3::config::Credentials::new("root", "secret-key", None, None, "test").into();
+        let mut settings = SigningSettings::default();
+        settings.payload_checksum_kind = PayloadChecksumKind::XAmzSha256;
+        let signing = aws_sigv4::sign::v4::SigningParams::builder()
+            .identity(&identity)
+            .region("us-east-1")
+            .name("s3")
+            .time(std::time::SystemTime::now())
+            .settings(settings)
+            .build()
+            .unwrap()
+            .into();
+        let body = format!("5\r\nhello\r\n0\r\nx-amz-checksum-crc32:{sum}\r\n\r\n");
+        let (uri, host, length) =
+            (format!("http://{}/{BUCKET}/{key}", host(&stage)), host(&stage), body.len().to_string());
+        let headers = [
+            ("host", host.as_str()),
+            ("content-length", length.as_str()),
+            ("content-encoding", "aws-chunked"),
+            ("x-amz-decoded-content-length", "5"),
+            ("x-amz-trailer", "x-amz-checksum-crc32"),
+        ];
+        let payload = SignableBody::StreamingUnsignedPayloadTrailer;
+        let request = SignableRequest::new("PUT", &uri, headers.into_iter(), payload).unwrap();
+        let (instructions, _) = sign(request, &signing).unwrap().into_parts();
+        let signed: String =
+            instructions.headers().map(|(name, value)| format!("{name}: {value}\r\n")).collect();
+        let named: String = headers.iter().map(|(name, value)| format!("{name}: {value}\r\n")).collect();
+        let head = format!("PUT /{BUCKET}/{key} HTTP/1.1\r\n{named}{signed}Connection: close\r\n\r\n");
+        stage.raw(&format!("{head}{body}")).await
+    };
+    let good = put("good", "NhCmhg==").await;
+    assert!(good.starts_with("HTTP/1.1 200"), "{good}");
+    assert_eq!(stage.get("good").await, b"hello");
+    for (sum, code) in [("AAAAAA==", "BadDigest"), ("AAAA", "InvalidRequest")] {
+        let wrong = put("wrong", sum).await;
+        assert!(wrong.starts_with("HTTP/1.1 400") && wrong.contains(code), "{wrong}");
+    }
+    let absent = stage.client.get_object().bucket(BUCKET).key("wrong").send().await;
+    assert_eq!(failure(absent), (404, "NoSuchKey".into()));
+}

@@ -135,6 +135,29 @@ impl Digests {
     }
 }
 
+/// Compares bytes that go by with the checksum that was stored of them.
+pub(crate) struct Comparison {
+    hasher: Hasher,
+    expected: String,
+}
+
+impl Comparison {
+    /// `None` for a checksum that is not of the bytes themselves.
+    pub(crate) fn with(stored: &Checksum) -> Option<Self> {
+        let hasher = Hasher::new(stored.algorithm);
+        (stored.kind == Kind::FullObject).then(|| Self { hasher, expected: stored.value.clone() })
+    }
+
+    pub(crate) fn update(&mut self, bytes: &[u8]) {
+        self.hasher.update(bytes);
+    }
+
+    /// Whether the bytes so far are those that were stored.
+    pub(crate) fn matches(self) -> bool {
+        base64(&self.hasher.finish()) == self.expected
+    }
+}
+
 impl Hasher {
     fn new(algorithm: Algorithm) -> Self {
         match algorithm {

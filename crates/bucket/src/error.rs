@@ -1,6 +1,6 @@
 //! Why the store cannot be started. What goes wrong in a request is answered there.
 
-use std::io;
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 /// Why the store cannot be started.
@@ -36,6 +36,22 @@ pub enum Error {
         /// Why.
         source: io::Error,
     },
+    /// A file is damaged, or missing beside others. Nothing was changed.
+    #[error(
+        "{} is damaged{}: {what}. Nothing was changed. `rayfold-bucket check --data {}` lists what is damaged, and with \
+         `--repair` sets it aside and keeps the rest",
+        file.display(), at(*offset), folder.display()
+    )]
+    Damaged {
+        /// The folder of the store.
+        folder: PathBuf,
+        /// The damaged file.
+        file: PathBuf,
+        /// The first damaged byte, where one is known.
+        offset: Option<u64>,
+        /// What is wrong with it.
+        what: String,
+    },
     /// The address could not be had.
     #[error("cannot listen on {address}")]
     Listen {
@@ -70,6 +86,16 @@ impl Error {
         let path = path.into();
         move |source| Self::File { path, source }
     }
+}
+
+/// " at byte N".
+fn at(offset: Option<u64>) -> String {
+    offset.map_or_else(String::new, |offset| format!(" at byte {offset}"))
+}
+
+/// Writes a line about damage that was noticed while the store runs to standard error.
+pub(crate) fn report(damage: &dyn std::fmt::Display) {
+    let _ = writeln!(io::stderr().lock(), "rayfold-bucket: {damage}");
 }
 
 /// The crate's results.

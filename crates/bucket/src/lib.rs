@@ -22,10 +22,12 @@
 //! # Ok(()) }
 //! ```
 
+mod check;
 mod checksum;
 mod delivery;
 mod error;
 mod events;
+mod expiry;
 mod front;
 mod host;
 mod identity;
@@ -37,6 +39,8 @@ mod server;
 mod service;
 mod storage;
 
+pub use check::{Report, check};
 pub use error::{Error, Result};
 pub use options::{Credentials, Options, QUEUE_ARN, Webhook};
 pub use server::Server;
+pub use storage::Damage;

@@ -247,6 +247,16 @@ pub(crate) fn release(batch: &mut Batch<'_>, body: Body) -> Result<(), StorageEr
     Ok(())
 }
 
+/// Removes an unfinished upload, given its row's key, with its parts.
+pub(crate) fn abandon(batch: &mut Batch<'_>, upload: &[u8]) -> Result<(), StorageError> {
+    let id = upload.rsplit(|byte| *byte == 0).next().unwrap_or_default();
+    for (part, value) in all(batch, Table::Parts, &[id, b"\0"].concat())? {
+        release(batch, decode::<Part>(&value)?.body)?;
+        batch.remove(Table::Parts, &part)?;
+    }
+    batch.remove(Table::Uploads, upload).map(drop)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

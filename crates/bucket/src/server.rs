@@ -12,10 +12,12 @@ use tokio::task::{JoinHandle, JoinSet};
 use tokio::time::timeout;
 
 use crate::delivery::Delivery;
+use crate::expiry::{INTERVAL, expire_uploads};
 use crate::front::Front;
 use crate::host::Hosts;
 use crate::identity::{Access, AssumeRole, Identities, Sessions};
 use crate::options::Options;
+use crate::records::Moment;
 use crate::service::Service;
 use crate::storage::{Storage, Writing};
 use crate::{Error, Result};
@@ -32,6 +34,7 @@ pub struct Server {
     ending: Option<oneshot::Sender<()>>,
     accepting: JoinHandle<()>,
     delivering: Option<JoinHandle<()>>,
+    expiring: JoinHandle<()>,
     writing: Option<Writing>,
 }
 
@@ -40,7 +43,7 @@ impl Server {
     ///
     /// # Errors
     /// [`Error::DataInUse`], [`Error::NotOurs`], [`Error::Newer`], [`Error::Listen`], [`Error::Webhook`],
-    /// [`Error::File`] and [`Error::Storage`].
+    /// [`Error::File`], [`Error::Damaged`] and [`Error::Storage`].
     pub async fn start(options: Options) -> Result<Self> {
         let failed = |source| Error::Listen { address: options.address.to_string(), source };
         let listener = TcpListener::bind(options.address).await.map_err(failed)?;
@@ -54,6 +57,7 @@ impl Server {
         let collected = storage.clone();
         // Files that a killed run left take room, and stand in nobody's way.
         tokio::task::spawn_blocking(move || drop(collected.collect_orphans()));
+        let expiring = tokio::spawn(expire(storage.clone()));
         let sessions = Sessions::open(storage.clone(), SystemTime::now());
         let identities =
             Identities::new(options.root, sessions.map_err(|why| Error::Start(why.to_string()))?);
@@ -64,7 +68,7 @@ impl Server {
         builder.set_route(AssumeRole(identities));
         let (ending, end) = oneshot::channel();
         let accepting = tokio::spawn(accept(listener, builder.build(), end));
-        Ok(Self { address, ending: Some(ending), accepting, delivering, writing: Some(writing) })
+        Ok(Self { address, ending: Some(ending), accepting, delivering, expiring, writing: Some(writing) })
     }
 
     /// Where it listens.
@@ -81,6 +85,7 @@ impl Server {
         if let Some(delivering) = self.delivering.take() {
             delivering.abort();
         }
+        self.expiring.abort();
         if let Some(writing) = self.writing.take() {
             let _ = tokio::task::spawn_blocking(|| writing.end()).await;
         }
@@ -96,9 +101,19 @@ impl std::fmt::Debug for Server {
 impl Drop for Server {
     fn drop(&mut self) {
         self.accepting.abort();
+        self.expiring.abort();
         if let Some(delivering) = &self.delivering {
             delivering.abort();
         }
+    }
+}
+
+/// Removes unfinished uploads whose time is over, until it is aborted.
+async fn expire(storage: Storage) {
+    loop {
+        // What cannot be removed now is removed an hour later.
+        let _ = expire_uploads(&storage, Moment::now()).await;
+        tokio::time::sleep(INTERVAL).await;
     }
 }
 

@@ -6,14 +6,24 @@
 //! ```text
 //! marker, lock    whose the folder is, and that one process uses it
 //! database        rows: their durable state of some moment
+//! database.sums   a checksum of each block of the database
 //! journal         what changed since then
 //! bodies/         bodies that are too large for a row, a file each
 //! ```
 
 mod bodies;
+mod compaction;
+#[cfg(test)]
+mod damage;
 mod database;
 mod folder;
 mod journal;
+mod medium;
+mod opening;
+#[cfg(test)]
+mod power;
+mod salvage;
+mod sums;
 mod table;
 mod writer;
 
@@ -21,6 +31,7 @@ use std::path::Path;
 use std::sync::mpsc::{self, Sender};
 use std::sync::{Arc, RwLock};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use redb::StorageError;
 use tokio::sync::{Notify, oneshot};
@@ -28,11 +39,17 @@ use tokio::sync::{Notify, oneshot};
 use crate::{Error, Result};
 
 pub(crate) use bodies::{Bodies, BodyId, NewBody, Pins};
+pub use salvage::Damage;
+pub(crate) use salvage::Salvage;
 pub(crate) use table::{Batch, Row, Snapshot, Table, View};
 pub(crate) use writer::{Kind, Unavailable};
 
 use folder::Folder;
-use writer::{Change, Current, Message, RESERVE, Writer, open, read};
+use opening::open;
+use writer::{Change, Current, Message, RESERVE, Writer, read};
+
+/// So long a reader waits until a database in which damage was found is open again.
+const REOPENING: Duration = Duration::from_secs(2);
 
 /// The row that counts the starts.
 const RUN: &[u8] = b"run";
@@ -63,9 +80,13 @@ impl Storage {
 
     /// The same, leaving so many bytes of the disk free.
     fn with_reserve(path: &Path, reserve: u64) -> Result<(Self, Writing)> {
-        let folder = Folder::take(path)?;
-        let failed = |source: redb::Error| Error::Storage { path: path.to_owned(), source: source.into() };
-        let (opened, mut journal) = open(&folder).map_err(failed)?;
+        Self::of_folder(Folder::take(path)?, reserve)
+    }
+
+    fn of_folder(mut folder: Folder, reserve: u64) -> Result<(Self, Writing)> {
+        let path = folder.path().to_owned();
+        let failed = |source: redb::Error| Error::Storage { path: path.clone(), source: source.into() };
+        let (opened, mut journal) = open(&mut folder)?;
         let run = next_run(&opened, &mut journal).map_err(failed)?;
         let bodies = Arc::new(Bodies::new(folder.bodies(), run));
         let current: Current = Arc::new(RwLock::new(Ok(Arc::new(opened))));
@@ -77,6 +98,8 @@ impl Storage {
             bodies: bodies.clone(),
             current: current.clone(),
             journal,
+            // Not known, so it is looked at once.
+            removed_bytes: u64::MAX / 2,
             reserve,
             on_commit: Box::new({
                 let committed = committed.clone();
@@ -86,7 +109,7 @@ impl Storage {
         let thread = std::thread::Builder::new()
             .name("bucket-writer".to_owned())
             .spawn(move || writer.work(&waiting))
-            .map_err(Error::file(path))?;
+            .map_err(Error::file(&path))?;
         Ok((Self { current, bodies, messages, committed }, Writing { thread, messages: ending }))
     }
 
@@ -95,8 +118,15 @@ impl Storage {
     /// # Errors
     /// [`Unavailable::Failed`].
     pub(crate) fn snapshot(&self) -> Result<Snapshot, Unavailable> {
-        let open = read(&self.current).clone()?;
-        open.snapshot().map_err(|error| Unavailable::Failed(error.to_string().into()))
+        let mut open = read(&self.current).clone()?;
+        if open.damage().is_some() {
+            // The handle that read a damaged block answers nothing more. Other blocks can be read through a new one.
+            let (reopened, wait) = mpsc::channel();
+            self.messages.send(Message::Reopen(reopened)).map_err(|_| Unavailable::Ending)?;
+            let _ = wait.recv_timeout(REOPENING);
+            open = read(&self.current).clone()?;
+        }
+        Snapshot::of_database(open).map_err(|error| Unavailable::Failed(error.to_string().into()))
     }
 
     /// Runs a function on the tables, alone; on return its changes are on the disk. What it gives may say that it changed
@@ -154,14 +184,14 @@ fn next_run(open: &database::Open, journal: &mut journal::Journal) -> Result<u64
     let mut batch = Batch::of(&transaction)?;
     batch.put(Table::Settings, RUN, &run.to_be_bytes())?;
     let applied = batch.end();
-    journal.append(&applied.changes, true)?;
+    journal.append(&applied.changes)?;
     open.commit(transaction)?;
     Ok(run)
 }
 
 #[cfg(test)]
 mod tests {
-    use std::time::{Duration, Instant};
+    use std::time::Instant;
 
     use super::*;
 
@@ -186,7 +216,7 @@ mod tests {
         storage.change(Kind::Grows, |batch| set(batch, "killed", "2")).await.unwrap();
         // A copy of the folder is what a kill leaves: the thread has not caught up.
         let copy = tempfile::tempdir().unwrap();
-        for name in ["rayfold-bucket", "database", "journal"] {
+        for name in ["rayfold-bucket", "database", "database.sums", "journal"] {
             std::fs::copy(folder.path().join(name), copy.path().join(name)).unwrap();
         }
         let (killed, ending) = Storage::open(copy.path()).unwrap();
@@ -196,8 +226,9 @@ mod tests {
         writing.end();
     }
 
+    /// Bytes of the journal's entries.
     fn journal(folder: &Path) -> u64 {
-        std::fs::metadata(folder.join("journal")).unwrap().len()
+        std::fs::metadata(folder.join("journal")).unwrap().len() - 80
     }
 
     #[tokio::test]
@@ -336,5 +367,47 @@ mod tests {
         let (storage, writing) = Storage::open(folder.path()).unwrap();
         assert_eq!(value(&storage, "kept-2").as_deref(), Some("1"));
         writing.end();
+    }
+
+    #[tokio::test]
+    async fn a_folder_of_format_1_goes_on_and_has_checksums_from_then_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
+        storage.change(Kind::Grows, |batch| set(batch, "database", "1")).await.unwrap();
+        writing.end();
+        let (storage, writing) = Storage::open(folder.path()).unwrap();
+        storage.change(Kind::Grows, |batch| set(batch, "journal", "2")).await.unwrap();
+        let earlier = tempfile::tempdir().unwrap();
+        let path = |name: &str| earlier.path().join(name);
+        std::fs::copy(folder.path().join("database"), path("database")).unwrap();
+        let entries = journal::of_format_1(&folder.path().join("journal"));
+        writing.end();
+        std::fs::write(path("rayfold-bucket"), "format 1\n").unwrap();
+        for damage in [true, false] {
+            let mut bytes = entries.clone();
+            if damage {
+                // In the first of two entries.
+                bytes[30] ^= 1;
+            }
+            std::fs::write(path("journal"), bytes).unwrap();
+            let opened = Storage::open(earlier.path());
+            if damage {
+                assert!(matches!(opened, Err(Error::Damaged { offset: Some(0), .. })));
+                assert!(!path("database.sums").exists());
+                continue;
+            }
+            let (storage, writing) = opened.unwrap();
+            let values = ["database", "journal"].map(|key| value(&storage, key));
+            assert_eq!(values, [Some("1".to_owned()), Some("2".to_owned())]);
+            writing.end();
+        }
+        assert_eq!(std::fs::read_to_string(path("rayfold-bucket")).unwrap(), "format 2\n");
+        let (storage, writing) = Storage::open(earlier.path()).unwrap();
+        assert_eq!(value(&storage, "journal").as_deref(), Some("2"));
+        writing.end();
+        std::fs::remove_file(path("database.sums")).unwrap();
+        assert!(matches!(Storage::open(earlier.path()), Err(Error::Damaged { .. })));
+        std::fs::remove_file(path("journal")).unwrap();
+        assert!(matches!(Storage::open(earlier.path()), Err(Error::Damaged { .. })));
     }
 }

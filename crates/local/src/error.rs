@@ -27,6 +27,9 @@ pub enum Error {
     /// The store built in did not start.
     #[error(transparent)]
     Store(rayfold_bucket::Error),
+    /// Files of the store built in are damaged, or missing.
+    #[error("{0}. `cargo install --path crates/bucket` in rayfold's sources installs `rayfold-bucket`")]
+    StoreDamaged(#[source] rayfold_bucket::Error),
     /// MinIO ended or stayed unreachable while starting.
     #[error("MinIO did not start: {reason}; its log is {}", log.display())]
     MinioStart {

@@ -123,7 +123,10 @@ impl S3Server {
                     secret_key: credentials.secret_key.clone(),
                 };
                 let options = Options { data: objects, address, root, region: REGION.into(), webhook };
-                let server = rayfold_bucket::Server::start(options).await.map_err(Error::Store)?;
+                let server = rayfold_bucket::Server::start(options).await.map_err(|error| match error {
+                    rayfold_bucket::Error::Damaged { .. } => Error::StoreDamaged(error),
+                    other => Error::Store(other),
+                })?;
                 Running::BuiltIn(server)
             }
             StoreKind::Minio => {
@@ -250,6 +253,22 @@ mod tests {
         server.stop().await;
         assert!(!answers(address).await);
         assert_eq!(*started(data.path()).await.unwrap().credentials(), credentials);
+    }
+
+    #[tokio::test]
+    async fn a_damaged_store_says_what_to_do() {
+        let data = tempfile::tempdir().unwrap();
+        started(data.path()).await.unwrap().stop().await;
+        let objects = StoreKind::BuiltIn.objects(data.path());
+        fs::remove_file(objects.join("journal")).unwrap();
+        let Err(error @ Error::StoreDamaged(_)) = started(data.path()).await else { panic!("it started") };
+        let shown = error.to_string();
+        let command = format!("`rayfold-bucket check --data {}`", objects.display());
+        for part in
+            ["it is missing beside a database or bodies", &command, "cargo install --path crates/bucket"]
+        {
+            assert!(shown.contains(part), "{shown}");
+        }
     }
 
     #[tokio::test]

@@ -5,6 +5,7 @@ use redb::StorageError;
 use s3s::dto::Timestamp;
 use s3s::{S3Error, S3ErrorCode, StdError, s3_error};
 
+use crate::error::report;
 use crate::records::Moment;
 use crate::storage::Unavailable;
 
@@ -77,12 +78,36 @@ pub(crate) fn file_failed(error: std::io::Error) -> S3Error {
 
 /// A snapshot could not be read.
 pub(crate) fn unreadable(error: StorageError) -> S3Error {
-    s3_error!(error, InternalError, "the store could not be read")
+    let message = format!("the store could not be read: {error}");
+    s3_error!(error, InternalError, "{message}")
+}
+
+/// A stored body is not what was put.
+#[derive(Debug, thiserror::Error)]
+#[error("the body of {object} is damaged: {what}")]
+pub(super) struct BodyDamaged {
+    /// Bucket and key.
+    pub(super) object: String,
+    /// What is wrong, and where.
+    pub(super) what: String,
+}
+
+impl BodyDamaged {
+    /// Reports it; the answer of a request that has sent nothing yet.
+    pub(super) fn refuse(self) -> S3Error {
+        report(&self);
+        let message = self.to_string();
+        s3_error!(self, InternalError, "{message}")
+    }
 }
 
 /// A request's body ended with an error. s3s tells what was wrong with it in words alone.
 pub(crate) fn body_failed(error: &StdError) -> S3Error {
     let text = error.to_string();
+    if error.is::<BodyDamaged>() {
+        // Of the source of a copy.
+        return S3Error::with_message(S3ErrorCode::InternalError, text);
+    }
     if text.contains("Sha256Mismatch") {
         coded(
             "XAmzContentSHA256Mismatch",

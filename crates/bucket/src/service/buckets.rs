@@ -8,7 +8,7 @@ use super::answer::{Answer, invalid_argument, not_implemented, time, unreadable}
 use super::meaning::OWNER;
 use super::meaning::check;
 use super::objects::bucket;
-use crate::records::{self, Moment, all, decode, find, key, release, set};
+use crate::records::{self, Moment, abandon, all, decode, find, key, set};
 use crate::storage::{Kind, Table, View};
 
 /// What a page of buckets holds when the client does not say.
@@ -112,14 +112,7 @@ impl Service {
                 return Err(s3_error!(BucketNotEmpty, "The bucket you tried to delete is not empty").into());
             }
             for (row, _) in all(batch, Table::Uploads, &inside)? {
-                let (_, id) = key::of_upload(&row, &name);
-                let parts = all(batch, Table::Parts, &[id, b"\0"].concat())?;
-                for (part, value) in parts {
-                    let record: records::Part = decode(&value)?;
-                    release(batch, record.body)?;
-                    batch.remove(Table::Parts, &part)?;
-                }
-                batch.remove(Table::Uploads, &row)?;
+                abandon(batch, &row)?;
             }
             batch.remove(Table::Buckets, name.as_bytes())?;
             Ok(())

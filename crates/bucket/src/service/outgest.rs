@@ -1,15 +1,16 @@
 //! A body on its way out: the bytes of a range, block by block, out of rows and files.
 //!
-//! The next block is read while the one before is sent; memory does not grow with the body.
+//! The next block is read while the one before is sent; memory does not grow with the body. A body, or a part of one, that is
+//! sent whole is compared with its checksum: its last block is sent only when they match. Of a range of a file only the file's
+//! length is compared (rows have checksums of the storage's own).
 
 use std::collections::VecDeque;
+use std::fmt::Display;
 use std::fs::File;
-use std::io;
 use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
 use std::pin::Pin;
-use std::sync::Arc;
 use std::task::{Context, Poll};
 
 use bytes::Bytes;
@@ -19,7 +20,9 @@ use s3s::stream::{ByteStream, RemainingLength};
 use tokio::task::JoinHandle;
 
 use super::Service;
-use super::answer::{Answer, unreadable};
+use super::answer::{Answer, BodyDamaged, unreadable};
+use crate::checksum::Comparison;
+use crate::error::report;
 use crate::records::{Body, Layout, LayoutPart, Object, find};
 use crate::storage::{BodyId, Pins, Snapshot, Storage, Table, View};
 
@@ -28,6 +31,8 @@ const BLOCK_BYTES: u64 = 256 * 1024;
 
 /// An object whose bytes stay while they are read.
 pub(super) struct Held {
+    /// Bucket and key.
+    name: String,
     pub(super) object: Object,
     pub(super) layout: Option<Layout>,
     snapshot: Snapshot,
@@ -46,7 +51,8 @@ impl Service {
             // The first look says what to pin, the second one that it was still there then.
             let files = files(&object, layout.as_ref());
             if files.is_empty() || pinned == Some(object.body) {
-                return Ok(Held { object, layout, snapshot, pins });
+                let name = format!("{bucket}/{key}");
+                return Ok(Held { name, object, layout, snapshot, pins });
             }
             pinned = Some(object.body);
             pins = Some(self.storage.bodies().pin(files));
@@ -80,35 +86,61 @@ fn files(object: &Object, layout: Option<&Layout>) -> Vec<BodyId> {
 impl Held {
     /// The bytes of a range, which must lie within the object.
     pub(super) fn bytes(self, storage: &Storage, range: Range<u64>) -> Answer<Outgest> {
+        let Self { name, object, layout, snapshot, pins } = self;
+        let damaged = |what: String| BodyDamaged { object: name.clone(), what }.refuse();
         let whole =
-            [LayoutPart { number: 1, size: self.object.size, body: self.object.body, checksum: None }];
-        let parts = self.layout.as_ref().map_or(&whole[..], |layout| &layout.parts);
+            [LayoutPart { number: 1, size: object.size, body: object.body, checksum: object.checksum }];
+        let parts = match (&layout, object.body) {
+            (Some(layout), _) => &layout.parts[..],
+            (None, Body::Parts(_)) => return Err(damaged("the list of its parts is missing".to_owned())),
+            (None, Body::Row(_) | Body::File(_)) => &whole[..],
+        };
         let mut pieces = VecDeque::new();
         let mut start = 0;
         for part in parts {
             let within = range.start.max(start)..range.end.min(start + part.size);
             if within.start < within.end {
                 let within = within.start - start..within.end - start;
-                pieces.push_back(match part.body {
+                let is_whole = within.end - within.start == part.size;
+                let mut comparison = part.checksum.as_ref().filter(|_| is_whole).and_then(Comparison::with);
+                match part.body {
                     Body::Row(id) => {
-                        let row = self.snapshot.get(Table::Bodies, &id.key()).map_err(unreadable)?;
+                        let row = snapshot.get(Table::Bodies, &id.key()).map_err(unreadable)?;
                         let bytes = row.map(Bytes::from).unwrap_or_default();
-                        Piece::Bytes(slice(&bytes, &within))
+                        if let Some(comparison) = &mut comparison {
+                            comparison.update(&bytes);
+                        }
+                        if bytes.len() as u64 != part.size || !comparison.is_none_or(Comparison::matches) {
+                            let what =
+                                format!("its row has {} bytes that do not match its checksum", bytes.len());
+                            return Err(damaged(what));
+                        }
+                        pieces.push_back(Piece::Bytes(slice(&bytes, &within)));
                     }
-                    Body::File(id) => Piece::Closed(storage.bodies().path(id), within),
-                    Body::Parts(_) => Piece::Bytes(Bytes::new()),
-                });
+                    Body::File(id) => {
+                        let path = storage.bodies().path(id);
+                        let file = FilePiece { path, file: None, size: part.size, rest: within, comparison };
+                        pieces.push_back(Piece::File(Box::new(file)));
+                    }
+                    Body::Parts(_) => return Err(damaged("a part of it is made of parts".to_owned())),
+                }
             }
             start += part.size;
         }
-        Ok(Outgest { pieces, reading: None, left: range.end - range.start, _pins: self.pins })
+        // So that what is missing at once is an answer, not an end in the middle.
+        if let Some(Piece::File(file)) = pieces.front_mut() {
+            file.open().map_err(damaged)?;
+        }
+        Ok(Outgest { name, pieces, reading: None, left: range.end - range.start, _pins: pins })
     }
 }
 
 /// See the module.
 pub(super) struct Outgest {
+    /// Bucket and key.
+    name: String,
     pieces: VecDeque<Piece>,
-    reading: Option<JoinHandle<io::Result<Block>>>,
+    reading: Option<JoinHandle<Result<Block, String>>>,
     left: u64,
     _pins: Option<Pins>,
 }
@@ -118,22 +150,69 @@ type Block = (Bytes, Option<Piece>);
 
 enum Piece {
     Bytes(Bytes),
-    Closed(PathBuf, Range<u64>),
-    Open(Arc<File>, Range<u64>),
+    File(Box<FilePiece>),
+}
+
+/// What is still to be read of a file.
+struct FilePiece {
+    path: PathBuf,
+    file: Option<File>,
+    /// Of the file.
+    size: u64,
+    rest: Range<u64>,
+    /// Where all of it is sent.
+    comparison: Option<Comparison>,
+}
+
+impl FilePiece {
+    /// The file, of the right length.
+    fn open(&mut self) -> Result<&File, String> {
+        let wrong = |what: &dyn Display| format!("{}: {what}", self.path.display());
+        let file = match self.file.take() {
+            Some(file) => file,
+            None => {
+                let file = File::open(&self.path).map_err(|error| wrong(&error))?;
+                let length = file.metadata().map_err(|error| wrong(&error))?.len();
+                if length != self.size {
+                    return Err(wrong(&format_args!("it has {length} bytes instead of {}", self.size)));
+                }
+                file
+            }
+        };
+        Ok(self.file.insert(file))
+    }
+
+    /// The first block, and what comes after it.
+    fn read(mut self: Box<Self>) -> Result<Block, String> {
+        let Range { start, end } = self.rest;
+        let stop = end.min(start + BLOCK_BYTES);
+        let mut block = vec![0; usize::try_from(stop - start).unwrap_or_default()];
+        let read = self.open()?.read_exact_at(&mut block, start);
+        read.map_err(|error| format!("{}: {error}", self.path.display()))?;
+        if let Some(comparison) = &mut self.comparison {
+            comparison.update(&block);
+        }
+        self.rest = stop..end;
+        if stop < end {
+            return Ok((block.into(), Some(Piece::File(self))));
+        }
+        if !self.comparison.is_none_or(Comparison::matches) {
+            return Err(format!(
+                "{}: its {} bytes do not match their checksum",
+                self.path.display(),
+                self.size
+            ));
+        }
+        Ok((block.into(), None))
+    }
 }
 
 impl Piece {
-    /// The first block, and what comes after it.
-    fn read(self) -> io::Result<Block> {
-        let (file, range) = match self {
-            Self::Bytes(bytes) => return Ok((bytes, None)),
-            Self::Closed(path, range) => (Arc::new(File::open(path)?), range),
-            Self::Open(file, range) => (file, range),
-        };
-        let end = range.end.min(range.start + BLOCK_BYTES);
-        let mut block = vec![0; usize::try_from(end - range.start).unwrap_or_default()];
-        file.read_exact_at(&mut block, range.start)?;
-        Ok((block.into(), (end < range.end).then(|| Self::Open(file, end..range.end))))
+    fn read(self) -> Result<Block, String> {
+        match self {
+            Self::Bytes(bytes) => Ok((bytes, None)),
+            Self::File(file) => file.read(),
+        }
     }
 }
 
@@ -141,6 +220,15 @@ impl Outgest {
     /// Starts to read the next block.
     fn advance(&mut self) {
         self.reading = self.pieces.pop_front().map(|piece| tokio::task::spawn_blocking(|| piece.read()));
+    }
+
+    /// Ends with an error: the connection breaks off, so that nobody takes what was sent for the whole.
+    fn fail(&mut self, what: String) -> StdError {
+        (self.left, self.reading) = (0, None);
+        self.pieces.clear();
+        let damaged = BodyDamaged { object: self.name.clone(), what };
+        report(&damaged);
+        damaged.into()
     }
 }
 
@@ -159,9 +247,10 @@ impl Stream for Outgest {
             this.advance();
         }
         let Some(reading) = &mut this.reading else {
-            let missing = this.left > 0;
-            this.left = 0;
-            return Poll::Ready(missing.then(|| Err("the body is shorter than it should be".into())));
+            let missing = this.left;
+            return Poll::Ready(
+                (missing > 0).then(|| Err(this.fail(format!("{missing} bytes are missing")))),
+            );
         };
         let read = std::task::ready!(Pin::new(reading).poll(context));
         this.reading = None;
@@ -176,8 +265,8 @@ impl Stream for Outgest {
                 this.left = this.left.saturating_sub(bytes.len() as u64);
                 Ok(bytes)
             }
-            Ok(Err(failed)) => Err(failed.into()),
-            Err(failed) => Err(failed.into()),
+            Ok(Err(what)) => Err(this.fail(what)),
+            Err(failed) => Err(this.fail(failed.to_string())),
         }))
     }
 }
@@ -204,7 +293,7 @@ mod tests {
     async fn a_body_that_lost_bytes_ends_with_an_error() {
         for (left, whole) in [(5, false), (2, true)] {
             let pieces = VecDeque::from([Piece::Bytes(Bytes::from_static(b"ab"))]);
-            let body = Outgest { pieces, reading: None, left, _pins: None };
+            let body = Outgest { name: "films/a".into(), pieces, reading: None, left, _pins: None };
             let ends: Vec<bool> = body.map(|piece| piece.is_ok()).collect().await;
             assert_eq!(ends, if whole { vec![true] } else { vec![true, false] });
         }

@@ -14,7 +14,9 @@ use super::objects::{Destination, admit, bucket, check_key, check_metadata, expi
 use super::writes::{of, stored_encoding};
 use super::{Caller, Service, Stop};
 use crate::checksum::{self, Algorithm};
-use crate::records::{self, Body, Headers, Layout, LayoutPart, Moment, all, decode, find, key, release, set};
+use crate::records::{
+    self, Body, Headers, Layout, LayoutPart, Moment, abandon, all, decode, find, key, release, set,
+};
 use crate::storage::{Batch, Kind, Table, View};
 
 /// Part numbers begin at 1: S3's.
@@ -288,13 +290,7 @@ impl Service {
             if batch.get(Table::Uploads, &row)?.is_none() {
                 return Err(no_such_upload().into());
             }
-            for (part_row, value) in all(batch, Table::Parts, &[input.upload_id.as_bytes(), b"\0"].concat())?
-            {
-                release(batch, decode::<records::Part>(&value)?.body)?;
-                batch.remove(Table::Parts, &part_row)?;
-            }
-            batch.remove(Table::Uploads, &row)?;
-            Ok(())
+            Ok(abandon(batch, &row)?)
         });
         abort.await?;
         Ok(AbortMultipartUploadOutput::default())

@@ -32,6 +32,16 @@ impl BodyId {
     pub(crate) fn key(self) -> [u8; 8] {
         self.0.to_be_bytes()
     }
+
+    /// The run that gave it.
+    pub(super) fn run(self) -> u64 {
+        self.0 >> COUNTER_BITS
+    }
+
+    /// The id in the key of a row.
+    pub(crate) fn of_key(key: &[u8]) -> Option<Self> {
+        key.try_into().ok().map(|key| Self(u64::from_be_bytes(key)))
+    }
 }
 
 /// The folder of the files, and the source of ids.
@@ -125,6 +135,24 @@ impl Bodies {
             return;
         }
         let _ = fs::remove_file(self.path(id));
+    }
+
+    /// Every file, with its id; `None` for one that has no body's name.
+    ///
+    /// # Errors
+    /// The system's.
+    pub(crate) fn files(&self) -> io::Result<Vec<(PathBuf, Option<BodyId>)>> {
+        let mut files = Vec::new();
+        for folder in fs::read_dir(&self.folder)? {
+            for file in fs::read_dir(folder?.path())? {
+                let path = file?.path();
+                let name = path.file_name().and_then(|name| name.to_str());
+                let id = name.and_then(|name| u64::from_str_radix(name, 16).ok()).map(BodyId);
+                files.push((path, id));
+            }
+        }
+        files.sort();
+        Ok(files)
     }
 
     /// Removes the files of earlier runs that belong to nobody; says how many.

@@ -4,20 +4,22 @@
 //! finds no room stays in memory ([`Overlay`]), and whoever writes asks ([`Open::has_room`]) before it acknowledges
 //! anything. After another failure the file as it is on the disk is sound, and is opened once more: [`Disk`] takes no lock
 //! (the folder's does), and the old handle is dead before the new one reads.
+//!
+//! Each block that is read is compared with its checksum ([`Sums`]). One that differs is an error of the read, and the
+//! database has to be opened anew after it.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io;
 use std::ops::Range;
-use std::os::unix::fs::{FileExt, OpenOptionsExt};
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use redb::{Builder, Database, Durability, StorageBackend};
 
+use super::medium::Medium;
+use super::sums::{BLOCK_BYTES, Sums};
 use super::table::{Batch, Snapshot, Table, View};
-use crate::private;
+use crate::error::report;
 
 /// Pages kept in memory. Most of a store of a hundred thousand objects.
 const CACHE_BYTES: usize = 64 * 1024 * 1024;
@@ -32,13 +34,21 @@ pub(super) struct Open {
 }
 
 impl Open {
-    /// Opens or makes the database; gives the number of the journal's last entry that it holds.
-    pub(super) fn at(path: &Path) -> Result<(Self, u64), redb::Error> {
-        let mut options = File::options();
-        options.read(true).write(true).create(true).truncate(false).mode(private::FILE);
-        let disk = Disk::new(options.open(path)?);
-        let database =
-            Builder::new().set_cache_size(CACHE_BYTES).create_with_backend(Handle(disk.clone()))?;
+    /// Opens or makes the database; gives the number of the journal's last entry that it holds. `verify` reads all of it and
+    /// compares the database's own checksums.
+    pub(super) fn at(disk: Arc<Disk>, verify: bool) -> Result<(Self, u64), redb::Error> {
+        Self::with_cache(disk, verify, CACHE_BYTES)
+    }
+
+    /// The same, with so many bytes of pages kept in memory.
+    pub(super) fn with_cache(
+        disk: Arc<Disk>,
+        verify: bool,
+        cache: usize,
+    ) -> Result<(Self, u64), redb::Error> {
+        let mut builder = Builder::new();
+        builder.set_cache_size(cache).set_check_integrity_on_open(verify);
+        let database = builder.create_with_backend(Handle(disk.clone()))?;
         let open = Self { database, disk };
         let fresh = !open.has_tables()?;
         if fresh {
@@ -85,6 +95,20 @@ impl Open {
         Ok(transaction.commit()?)
     }
 
+    /// Whether less than half of the file is in use. Reads the whole tree.
+    pub(super) fn is_sparse(&self) -> Result<bool, redb::Error> {
+        let transaction = self.begin()?;
+        let stats = transaction.stats()?;
+        transaction.abort()?;
+        let used = stats.allocated_pages().saturating_mul(stats.page_size() as u64);
+        Ok(used.saturating_mul(2) < self.file_bytes()?)
+    }
+
+    /// The length of the file.
+    pub(super) fn file_bytes(&self) -> Result<u64, redb::Error> {
+        Ok(self.disk.file.len()?)
+    }
+
     /// Whether all that was written found room, now at the latest.
     pub(super) fn has_room(&self) -> bool {
         self.disk.settle().is_ok()
@@ -94,13 +118,23 @@ impl Open {
     pub(super) fn kill(&self) {
         self.disk.dead.store(true, Ordering::Release);
     }
+
+    /// Where a block was read that does not match its checksum: then this handle answers nothing more.
+    pub(super) fn damage(&self) -> Option<u64> {
+        self.disk.damage()
+    }
 }
 
+/// The database's file and its sums.
 #[derive(Debug)]
-struct Disk {
-    file: File,
+pub(super) struct Disk {
+    file: Arc<dyn Medium>,
+    sums: Mutex<Sums>,
     dead: AtomicBool,
     overlay: Mutex<Overlay>,
+    damage: Mutex<Option<u64>>,
+    lenient: AtomicBool,
+    held: AtomicBool,
 }
 
 /// What found no room on the disk: pages that hide those of the file, and the length that the file should have.
@@ -111,7 +145,7 @@ struct Overlay {
 }
 
 /// Of the overlay.
-const PAGE_BYTES: u64 = 4096;
+const PAGE_BYTES: u64 = BLOCK_BYTES as u64;
 
 impl Overlay {
     fn is_empty(&self) -> bool {
@@ -120,12 +154,67 @@ impl Overlay {
 }
 
 impl Disk {
-    fn new(file: File) -> Arc<Self> {
-        Arc::new(Self { file, dead: AtomicBool::new(false), overlay: Mutex::default() })
+    pub(super) fn new(file: Arc<dyn Medium>, sums: Sums) -> Arc<Self> {
+        let [dead, lenient, held] = [(); 3].map(|()| AtomicBool::new(false));
+        let (overlay, damage) = (Mutex::default(), Mutex::default());
+        Arc::new(Self { file, sums: Mutex::new(sums), dead, overlay, damage, lenient, held })
+    }
+
+    /// Keeps what is written in memory, until [`Disk::release`]: a start that is refused changes nothing.
+    ///
+    /// # Errors
+    /// The system's.
+    pub(super) fn hold(&self) -> io::Result<()> {
+        self.overlay().length = Some(self.file.len()?);
+        self.held.store(true, Ordering::Release);
+        Ok(())
+    }
+
+    /// Writes what was held, now or, on a full disk, when there is room.
+    ///
+    /// # Errors
+    /// The system's.
+    pub(super) fn release(&self) -> io::Result<()> {
+        self.held.store(false, Ordering::Release);
+        self.settle()
+    }
+
+    /// Whether damaged blocks are read as they are.
+    pub(super) fn set_lenient(&self, lenient: bool) {
+        self.lenient.store(lenient, Ordering::Release);
     }
 
     fn overlay(&self) -> MutexGuard<'_, Overlay> {
         self.overlay.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn sums(&self) -> MutexGuard<'_, Sums> {
+        self.sums.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Where a block was read that does not match its checksum.
+    pub(super) fn damage(&self) -> Option<u64> {
+        *self.damage.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Compares the whole blocks of what was read.
+    fn compare(&self, offset: u64, bytes: &[u8]) -> io::Result<()> {
+        if self.lenient.load(Ordering::Acquire) {
+            return Ok(());
+        }
+        let sums = self.sums();
+        for (block, bytes) in blocks(offset, bytes) {
+            if !sums.matches(block, bytes) {
+                let at = (block * BLOCK_BYTES) as u64;
+                let what =
+                    format!("the database is damaged: the block at byte {at} does not match its checksum");
+                if self.damage.lock().unwrap_or_else(PoisonError::into_inner).replace(at).is_none() {
+                    report(&what);
+                }
+                return Err(io::Error::new(io::ErrorKind::InvalidData, what));
+            }
+        }
+        Ok(())
     }
 
     /// Writes what found no room, if there is some now. The first page says which of the others count: it comes last.
@@ -134,25 +223,51 @@ impl Disk {
         if overlay.is_empty() {
             return Ok(());
         }
-        if let Some(length) = overlay.length {
+        if self.held.load(Ordering::Acquire) {
+            return Err(full());
+        }
+        if let Some(length) = overlay.length
+            && length != self.file.len()?
+        {
             self.file.set_len(length)?;
         }
         for (page, bytes) in overlay.pages.iter().filter(|(page, _)| **page > 0) {
             self.file.write_all_at(bytes, page * PAGE_BYTES)?;
         }
-        self.file.sync_data()?;
+        self.sums().save()?;
+        self.file.sync()?;
         if let Some(bytes) = overlay.pages.get(&0) {
             self.file.write_all_at(bytes, 0)?;
-            self.file.sync_data()?;
+            self.file.sync()?;
+            self.sums().header_synced();
         }
         *overlay = Overlay::default();
         Ok(())
     }
 
+    /// Brings what was written to the disk.
+    fn sync(&self) -> io::Result<()> {
+        self.file.sync()?;
+        self.sums().header_synced();
+        Ok(())
+    }
+
+    /// Brings the sum of a header to the disk that will be written.
+    fn announce(&self, header: &[u8]) -> io::Result<()> {
+        // Else there would be three headers that may be on the disk, for two sums.
+        let synced = self.sums().is_header_synced();
+        if !synced {
+            self.sync()?;
+        }
+        let mut sums = self.sums();
+        sums.set(0, header);
+        sums.save()
+    }
+
     /// A page as the file has it; zeros beyond its end.
     fn page(&self, page: u64) -> io::Result<Box<[u8]>> {
         let mut bytes = vec![0; PAGE_BYTES as usize].into_boxed_slice();
-        read_padded(&self.file, &mut bytes, page * PAGE_BYTES)?;
+        self.file.read_padded(&mut bytes, page * PAGE_BYTES)?;
         Ok(bytes)
     }
 }
@@ -161,28 +276,32 @@ impl Disk {
 struct Handle(Arc<Disk>);
 
 impl Handle {
-    fn file(&self) -> io::Result<&File> {
+    fn file(&self) -> io::Result<&dyn Medium> {
         if self.0.dead.load(Ordering::Acquire) {
             return Err(io::Error::other("the database was opened anew"));
         }
-        Ok(&self.0.file)
-    }
-}
-
-impl StorageBackend for Handle {
-    fn len(&self) -> io::Result<u64> {
-        let file = self.file()?;
-        self.0.overlay().length.map_or_else(|| Ok(file.metadata()?.len()), Ok)
+        Ok(&*self.0.file)
     }
 
-    fn read(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
+    /// The first block, which holds the header.
+    fn first(&self) -> io::Result<Vec<u8>> {
+        let mut first = vec![0; BLOCK_BYTES];
+        let length = self.len()?.min(PAGE_BYTES) as usize;
+        self.view(0, &mut first[..length])?;
+        Ok(first)
+    }
+
+    /// Reads what was written, on the disk or in memory.
+    fn view(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
         let file = self.file()?;
+        let end = offset + out.len() as u64;
         let overlay = self.0.overlay();
-        if overlay.is_empty() {
-            drop(overlay);
-            return file.read_exact_at(out, offset);
+        let length = overlay.length.map_or_else(|| file.len(), Ok)?;
+        if end > length && overlay.is_empty() {
+            let what = format!("the database ends before byte {end}, which it refers to");
+            return Err(io::Error::new(io::ErrorKind::UnexpectedEof, what));
         }
-        read_padded(file, out, offset)?;
+        file.read_padded(out, offset)?;
         for (page, within, of_page) in pages(offset, out.len()) {
             if let Some(bytes) = overlay.pages.get(&page) {
                 out[within].copy_from_slice(&bytes[of_page]);
@@ -190,11 +309,27 @@ impl StorageBackend for Handle {
         }
         Ok(())
     }
+}
+
+impl StorageBackend for Handle {
+    fn len(&self) -> io::Result<u64> {
+        let file = self.file()?;
+        self.0.overlay().length.map_or_else(|| file.len(), Ok)
+    }
+
+    fn read(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
+        self.view(offset, out)?;
+        if offset < PAGE_BYTES && out.len() < BLOCK_BYTES {
+            self.0.compare(0, &self.first()?)?;
+        }
+        self.0.compare(offset, out)
+    }
 
     fn set_len(&self, len: u64) -> io::Result<()> {
         let file = self.file()?;
         let mut overlay = self.0.overlay();
         let done = if overlay.is_empty() { file.set_len(len) } else { Err(full()) };
+        self.0.sums().resize(len);
         match done {
             Err(failed) if is_full(&failed) => {
                 overlay.length = Some(len);
@@ -207,17 +342,44 @@ impl StorageBackend for Handle {
 
     fn sync_data(&self) -> io::Result<()> {
         let file = self.file()?;
-        match self.0.settle() {
-            // The disk keeps its older state, which is whole, and the journal what came after it.
-            Err(failed) if is_full(&failed) => Ok(()),
-            settled => settled.and_then(|()| file.sync_data()),
+        let saved = self.0.settle().and_then(|()| self.0.sums().save());
+        match saved {
+            // The disk keeps its older state, which is whole, and the journal what came after it. Where only the sums found no
+            // room, what is written next must wait for them.
+            Err(failed) if is_full(&failed) => {
+                let mut overlay = self.0.overlay();
+                if overlay.length.is_none() {
+                    overlay.length = Some(file.len()?);
+                }
+                Ok(())
+            }
+            saved => saved.and_then(|()| self.0.sync()),
         }
     }
 
     fn write(&self, offset: u64, data: &[u8]) -> io::Result<()> {
         let file = self.file()?;
+        let header = match offset {
+            0..PAGE_BYTES => {
+                let mut first = self.first()?;
+                let start = offset as usize;
+                let length = data.len().min(BLOCK_BYTES - start);
+                first[start..start + length].copy_from_slice(&data[..length]);
+                Some(first)
+            }
+            _ => None,
+        };
         let mut overlay = self.0.overlay();
-        let done = if overlay.is_empty() { file.write_all_at(data, offset) } else { Err(full()) };
+        let announced = match &header {
+            Some(header) if overlay.is_empty() => self.0.announce(header),
+            Some(header) => {
+                self.0.sums().set(0, header);
+                Ok(())
+            }
+            None => Ok(()),
+        };
+        let written = |()| if overlay.is_empty() { file.write_all_at(data, offset) } else { Err(full()) };
+        let done = announced.and_then(written);
         match done {
             Err(failed) if is_full(&failed) => {
                 for (page, within, of_page) in pages(offset, data.len()) {
@@ -228,11 +390,32 @@ impl StorageBackend for Handle {
                     bytes[of_page].copy_from_slice(&data[within]);
                     overlay.pages.insert(page, bytes);
                 }
-                Ok(())
             }
-            done => done,
+            done => done?,
         }
+        drop(overlay);
+        // The database writes whole blocks, but for its header.
+        let mut partial = vec![0; BLOCK_BYTES];
+        for (page, within, of_page) in pages(offset, data.len()) {
+            let block = usize::try_from(page).map_err(io::Error::other)?;
+            if block > 0 && of_page.len() == BLOCK_BYTES {
+                self.0.sums().set(block, &data[within]);
+            } else if block > 0 {
+                partial.fill(0);
+                let length = self.len()?.saturating_sub(page * PAGE_BYTES).min(PAGE_BYTES) as usize;
+                self.view(page * PAGE_BYTES, &mut partial[..length])?;
+                self.0.sums().set(block, &partial);
+            }
+        }
+        Ok(())
     }
+}
+
+/// The whole blocks in a range of bytes. The database reads no other ones, but for its header in the first.
+fn blocks(offset: u64, bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
+    let first = usize::try_from(offset.div_ceil(BLOCK_BYTES as u64)).unwrap_or(usize::MAX);
+    let skipped = (first as u64 * BLOCK_BYTES as u64 - offset) as usize;
+    (first..).zip(bytes.get(skipped..).unwrap_or_default().chunks_exact(BLOCK_BYTES))
 }
 
 /// The pages that a range of bytes touches: each with its bytes in the range, and those of the page.
@@ -247,21 +430,6 @@ fn pages(offset: u64, length: usize) -> impl Iterator<Item = (u64, Range<usize>,
     })
 }
 
-/// Reads; what lies beyond the file's end is zeros.
-fn read_padded(file: &File, out: &mut [u8], offset: u64) -> io::Result<()> {
-    let mut done = 0;
-    while done < out.len() {
-        match file.read_at(&mut out[done..], offset + done as u64) {
-            Ok(0) => break,
-            Ok(read) => done += read,
-            Err(again) if again.kind() == io::ErrorKind::Interrupted => {}
-            Err(failed) => return Err(failed),
-        }
-    }
-    out[done..].fill(0);
-    Ok(())
-}
-
 /// Whether there was no room.
 pub(super) fn is_full(error: &io::Error) -> bool {
     use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
@@ -274,14 +442,23 @@ fn full() -> io::Error {
 
 #[cfg(test)]
 mod tests {
+    use std::fs::File;
+    use std::path::Path;
+
+    use super::super::medium::{Files, SystemFiles};
     use super::*;
+
+    fn disk(path: &Path) -> Arc<Disk> {
+        let sums = SystemFiles.open(&path.with_extension("sums")).unwrap();
+        let file = SystemFiles.open(path).unwrap();
+        Disk::new(file.clone(), Sums::compute(sums, &*file).unwrap())
+    }
 
     #[test]
     fn what_finds_no_room_is_read_back_and_written_later() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
-        let file = File::options().read(true).write(true).create(true).truncate(false).open(&path).unwrap();
-        let disk = Disk::new(file);
+        let disk = disk(&path);
         let handle = Handle(disk.clone());
         handle.set_len(8192).unwrap();
         handle.write(0, &[1; 4096]).unwrap();
@@ -311,8 +488,7 @@ mod tests {
     #[test]
     fn what_was_cut_off_on_a_full_disk_does_not_come_back() {
         let folder = tempfile::tempdir().unwrap();
-        let file = File::create_new(folder.path().join("file")).unwrap();
-        let disk = Disk::new(file);
+        let disk = disk(&folder.path().join("file"));
         disk.overlay().length = Some(0);
         let handle = Handle(disk);
         handle.set_len(3 * PAGE_BYTES).unwrap();
@@ -332,8 +508,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         std::fs::write(&path, [0; 8192]).unwrap();
+        let sums = SystemFiles.open(&folder.path().join("sums")).unwrap();
         let file = File::open(&path).unwrap();
-        let disk = Disk::new(file);
+        let sums = Sums::open(sums, &file).unwrap();
+        let disk = Disk::new(Arc::new(file), sums);
         let handle = Handle(disk.clone());
         assert!(handle.write(0, &[1; 10]).is_err(), "the file is open for reading alone");
         assert!(handle.set_len(10).is_err());

@@ -3,20 +3,27 @@
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::bodies::sync_folder;
+use super::medium::{Files, Medium, SystemFiles};
 use crate::{Error, Result, private};
 
-/// The newest format that is read and written here.
-const FORMAT: u32 = 1;
+/// The newest format that is read here, and the one that is written. Format 1 had no sums beside the database, and a journal
+/// without a header.
+const FORMAT: u32 = 2;
 
 /// The file that says that a folder is a bucket's data, and its format.
 const MARKER: &str = "rayfold-bucket";
 
+/// The marker while it is written.
+const NEW_MARKER: &str = "rayfold-bucket.new";
+
 const LOCK: &str = "lock";
 
-/// What may lie in a fresh folder: its lock, and what the store's owner or the file system keeps beside it.
-const HARMLESS: [&str; 3] = [LOCK, "credentials.json", "lost+found"];
+/// What may lie in a fresh folder: its lock, the marker of a start that was killed, and what the store's owner or the file
+/// system keeps beside it.
+const HARMLESS: [&str; 4] = [LOCK, NEW_MARKER, "credentials.json", "lost+found"];
 
 /// Where MinIO keeps its own data, in the folder that it was given.
 const MINIO: [&str; 2] = [".minio.sys", "objects/.minio.sys"];
@@ -25,6 +32,8 @@ const MINIO: [&str; 2] = [".minio.sys", "objects/.minio.sys"];
 #[derive(Debug)]
 pub(super) struct Folder {
     path: PathBuf,
+    files: Arc<dyn Files>,
+    format: u32,
     _lock: File,
 }
 
@@ -34,6 +43,22 @@ impl Folder {
     /// # Errors
     /// [`Error::DataInUse`], [`Error::NotOurs`], [`Error::Newer`], [`Error::File`].
     pub(super) fn take(path: &Path) -> Result<Self> {
+        Self::take_with(path, Arc::new(SystemFiles))
+    }
+
+    /// Takes a folder that a store has used before.
+    ///
+    /// # Errors
+    /// Those of [`Folder::take`]; [`Error::NotOurs`] also for a folder without a store.
+    pub(super) fn take_existing(path: &Path) -> Result<Self> {
+        if recognise(path)? == Found::Nothing {
+            return Err(Error::NotOurs { path: path.to_owned(), what: "nothing of a store".to_owned() });
+        }
+        Self::take(path)
+    }
+
+    /// The same, with other files for the rows.
+    pub(super) fn take_with(path: &Path, files: Arc<dyn Files>) -> Result<Self> {
         let found = recognise(path)?;
         private::make(path).map_err(Error::file(path))?;
         let lock_path = path.join(LOCK);
@@ -49,17 +74,64 @@ impl Folder {
             Err(TryLockError::Error(source)) => return Err(Error::File { path: lock_path, source }),
         }
         private::close(path);
-        let folder = Self { path: path.to_owned(), _lock: lock };
+        let format = match found {
+            Found::Nothing => FORMAT,
+            Found::Ours(format) => format,
+        };
+        let folder = Self { path: path.to_owned(), files, format, _lock: lock };
         let bodies = folder.bodies();
         fs::create_dir_all(&bodies).map_err(Error::file(&bodies))?;
         if found == Found::Nothing {
-            let marker = path.join(MARKER);
-            fs::write(&marker, format!("format {FORMAT}\n"))
-                .and_then(|()| File::open(&marker)?.sync_all())
-                .and_then(|()| sync_folder(path))
-                .map_err(Error::file(&marker))?;
+            folder.mark()?;
         }
         Ok(folder)
+    }
+
+    /// Writes that the folder is ours, and of this format.
+    fn mark(&self) -> Result<()> {
+        let (marker, new) = (self.path.join(MARKER), self.path.join(NEW_MARKER));
+        fs::write(&new, format!("format {FORMAT}\n"))
+            .and_then(|()| File::open(&new)?.sync_all())
+            .and_then(|()| fs::rename(&new, &marker))
+            .and_then(|()| sync_folder(&self.path))
+            .map_err(Error::file(&marker))
+    }
+
+    /// Whether an earlier version wrote it, and it was not brought to this format yet.
+    pub(super) fn is_of_format_1(&self) -> bool {
+        self.format == 1
+    }
+
+    /// All in it is of this format now.
+    pub(super) fn upgraded(&mut self) -> Result<()> {
+        self.mark()?;
+        self.format = FORMAT;
+        Ok(())
+    }
+
+    /// The error that a file of it is damaged.
+    pub(super) fn damaged(&self, file: &Path, offset: Option<u64>, what: impl Into<String>) -> Error {
+        Error::Damaged { folder: self.path.clone(), file: file.to_owned(), offset, what: what.into() }
+    }
+
+    /// Opens a file of rows, made when missing.
+    pub(super) fn open(&self, file: &Path) -> io::Result<Arc<dyn Medium>> {
+        self.files.open(file)
+    }
+
+    /// Gives a file of rows another name, in the place of one that has it; on the disk on return.
+    pub(super) fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.files.rename(from, to)
+    }
+
+    /// Removes a file of rows if it is there.
+    pub(super) fn remove(&self, file: &Path) -> io::Result<()> {
+        self.files.remove(file)
+    }
+
+    /// Whether a file of rows is there.
+    pub(super) fn has(&self, file: &Path) -> bool {
+        self.files.exists(file)
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -68,6 +140,20 @@ impl Folder {
 
     pub(super) fn database(&self) -> PathBuf {
         self.path.join("database")
+    }
+
+    /// A database that is being written, to take the place of the other one.
+    pub(super) fn new_database(&self) -> PathBuf {
+        self.path.join("database.new")
+    }
+
+    /// Its sums.
+    pub(super) fn new_sums(&self) -> PathBuf {
+        self.path.join("database.new.sums")
+    }
+
+    pub(super) fn sums(&self) -> PathBuf {
+        self.path.join("database.sums")
     }
 
     pub(super) fn journal(&self) -> PathBuf {
@@ -82,7 +168,8 @@ impl Folder {
 #[derive(PartialEq, Eq)]
 enum Found {
     Nothing,
-    Ours,
+    /// Of this format.
+    Ours(u32),
 }
 
 /// Looks without touching anything.
@@ -95,7 +182,7 @@ fn recognise(path: &Path) -> Result<Found> {
                 Some(found) if found > FORMAT => {
                     Err(Error::Newer { path: path.to_owned(), found, known: FORMAT })
                 }
-                Some(_) => Ok(Found::Ours),
+                Some(found) => Ok(Found::Ours(found)),
                 // A kill on the very first start leaves the file empty.
                 None if text.is_empty() => Ok(Found::Nothing),
                 None => not_ours(&format!("a file {MARKER} of another kind")),
@@ -179,8 +266,8 @@ mod tests {
     #[test]
     fn a_later_format_is_not_touched() {
         let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join(MARKER), "format 2\n").unwrap();
-        assert!(matches!(Folder::take(folder.path()), Err(Error::Newer { found: 2, known: 1, .. })));
+        fs::write(folder.path().join(MARKER), "format 3\n").unwrap();
+        assert!(matches!(Folder::take(folder.path()), Err(Error::Newer { found: 3, known: 2, .. })));
         for letter in [&b"a letter\n"[..], &[0xff]] {
             fs::write(folder.path().join(MARKER), letter).unwrap();
             assert!(matches!(Folder::take(folder.path()), Err(Error::NotOurs { .. })));
@@ -216,6 +303,6 @@ mod tests {
         drop(Folder::take(folder.path()).unwrap());
         fs::write(folder.path().join(MARKER), "").unwrap();
         drop(Folder::take(folder.path()).unwrap());
-        assert_eq!(fs::read_to_string(folder.path().join(MARKER)).unwrap(), "format 1\n");
+        assert_eq!(fs::read_to_string(folder.path().join(MARKER)).unwrap(), "format 2\n");
     }
 }

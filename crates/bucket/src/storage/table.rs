@@ -3,9 +3,12 @@
 //! Knows no record: what a row means is `records`' business. A batch remembers every row that it changes, so that the
 //! journal can be written before the database.
 
+use std::sync::Arc;
+
 use redb::{ReadOnlyTable, ReadTransaction, ReadableTable, StorageError, TableDefinition, WriteTransaction};
 
 use super::bodies::{BodyId, NewBody};
+use super::database::Open;
 
 /// A row's key and value.
 pub(crate) type Row = (Vec<u8>, Vec<u8>);
@@ -117,6 +120,8 @@ pub(crate) trait View {
 /// The rows as they were at one moment.
 pub(crate) struct Snapshot {
     tables: [Read; Table::ALL.len()],
+    /// Its database: closed, it would answer nothing more.
+    _database: Option<Arc<Open>>,
 }
 
 impl Snapshot {
@@ -124,7 +129,12 @@ impl Snapshot {
         let opened: Result<Vec<_>, _> =
             Table::ALL.iter().map(|table| transaction.open_table(table.definition())).collect();
         let tables = opened?.try_into().map_err(|_| missing_table())?;
-        Ok(Self { tables })
+        Ok(Self { tables, _database: None })
+    }
+
+    /// The same, which can be read also when the database is opened anew.
+    pub(super) fn of_database(database: Arc<Open>) -> Result<Self, redb::Error> {
+        Ok(Self { _database: Some(database.clone()), ..database.snapshot()? })
     }
 }
 
@@ -142,6 +152,7 @@ pub(crate) struct Batch<'t> {
     changes: Vec<u8>,
     adopted: Vec<NewBody>,
     discarded: Vec<BodyId>,
+    removed_bytes: u64,
 }
 
 /// What is left of a batch when all was applied.
@@ -152,6 +163,8 @@ pub(super) struct Applied {
     pub(super) adopted: Vec<NewBody>,
     /// Bodies in files that no row refers to any more.
     pub(super) discarded: Vec<BodyId>,
+    /// Bytes of values that were removed or replaced.
+    pub(super) removed_bytes: u64,
 }
 
 impl<'t> Batch<'t> {
@@ -159,23 +172,26 @@ impl<'t> Batch<'t> {
         let opened: Result<Vec<_>, _> =
             Table::ALL.iter().map(|table| transaction.open_table(table.definition())).collect();
         let tables = opened?.try_into().map_err(|_| missing_table())?;
-        Ok(Self { tables, changes: Vec::new(), adopted: Vec::new(), discarded: Vec::new() })
+        let (changes, adopted, discarded) = (Vec::new(), Vec::new(), Vec::new());
+        Ok(Self { tables, changes, adopted, discarded, removed_bytes: 0 })
     }
 
     /// Sets a row.
     pub(crate) fn put(&mut self, table: Table, key: &[u8], value: &[u8]) -> Result<(), StorageError> {
-        self.tables[table as usize].insert(key, value)?;
+        let replaced = self.tables[table as usize].insert(key, value)?;
+        self.removed_bytes += replaced.map_or(0, |value| value.value().len() as u64);
         note(&mut self.changes, table, key, Some(value));
         Ok(())
     }
 
     /// Removes a row; says whether it was there.
     pub(crate) fn remove(&mut self, table: Table, key: &[u8]) -> Result<bool, StorageError> {
-        let was_there = self.tables[table as usize].remove(key)?.is_some();
-        if was_there {
+        let removed = self.tables[table as usize].remove(key)?.map(|value| value.value().len() as u64);
+        if let Some(bytes) = removed {
+            self.removed_bytes += bytes;
             note(&mut self.changes, table, key, None);
         }
-        Ok(was_there)
+        Ok(removed.is_some())
     }
 
     /// A body's file now belongs to a row of this batch. Were the batch to fail, the file goes.
@@ -193,9 +209,9 @@ impl<'t> Batch<'t> {
     }
 
     pub(super) fn end(self) -> Applied {
-        let Self { tables, changes, adopted, discarded } = self;
+        let Self { tables, changes, adopted, discarded, removed_bytes } = self;
         drop(tables);
-        Applied { changes, adopted, discarded }
+        Applied { changes, adopted, discarded, removed_bytes }
     }
 
     /// Applies rows that a journal kept.

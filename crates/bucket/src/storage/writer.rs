@@ -5,7 +5,7 @@
 //! acknowledged before. When the disk fails, the batch is gone and the database is opened anew from disk and journal.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::sync::{Arc, RwLock};
 use std::time::{Duration, Instant};
 
@@ -14,10 +14,13 @@ use redb::StorageError;
 use tokio::sync::oneshot;
 
 use super::bodies::{Bodies, sync_names};
+use super::compaction;
 use super::database::{Open, is_full};
 use super::folder::Folder;
-use super::journal::{Journal, OpenError};
+use super::journal::Journal;
+use super::opening::open;
 use super::table::{Applied, Batch};
+use crate::Error;
 
 /// Changes of one batch: enough that a sync is shared by all who wait, few enough that none waits long.
 const BATCH_JOBS: usize = 1000;
@@ -70,6 +73,8 @@ pub(super) trait Job: Send {
 pub(super) enum Message {
     /// Do this.
     Change(Box<dyn Job>),
+    /// Open the database anew if damage was found in it, and drop this.
+    Reopen(Sender<()>),
     /// Do what came before this, and no more.
     End,
 }
@@ -114,6 +119,8 @@ pub(super) struct Writer {
     pub(super) bodies: Arc<Bodies>,
     pub(super) current: Current,
     pub(super) journal: Journal,
+    /// Bytes of rows that were removed or replaced since the database was last looked at.
+    pub(super) removed_bytes: u64,
     /// Bytes that are left free.
     pub(super) reserve: u64,
     pub(super) on_commit: Box<dyn Fn() + Send>,
@@ -126,14 +133,24 @@ impl Writer {
         while !ending {
             let first = match messages.recv_timeout(IDLE) {
                 Ok(Message::Change(first)) => first,
+                Ok(Message::Reopen(_asked)) => {
+                    self.reopen_damaged();
+                    continue;
+                }
                 Err(RecvTimeoutError::Timeout) => {
                     self.catch_up_when(!self.journal.is_empty());
+                    self.compact_when_sparse();
                     continue;
                 }
                 Ok(Message::End) | Err(RecvTimeoutError::Disconnected) => break,
             };
+            let mut reopening = Vec::new();
             let more = std::iter::from_fn(|| match messages.try_recv() {
                 Ok(Message::Change(job)) => Some(job),
+                Ok(Message::Reopen(asked)) => {
+                    reopening.push(asked);
+                    None
+                }
                 Ok(Message::End) => {
                     ending = true;
                     None
@@ -141,6 +158,9 @@ impl Writer {
                 Err(TryRecvError::Empty | TryRecvError::Disconnected) => None,
             });
             self.batch(std::iter::once(first).chain(more).take(BATCH_JOBS));
+            if !reopening.is_empty() {
+                self.reopen_damaged();
+            }
             self.catch_up_when(self.journal.is_long());
         }
         self.catch_up_when(!self.journal.is_empty());
@@ -198,7 +218,7 @@ impl Writer {
                 break;
             }
         }
-        let Applied { changes, mut adopted, discarded } = batch.end();
+        let Applied { changes, mut adopted, discarded, removed_bytes } = batch.end();
         if !open.has_room() {
             transaction.abort().map_err(|error| Failure::Database(error.into()))?;
             return Err(Failure::Refused(Unavailable::Full));
@@ -207,13 +227,19 @@ impl Writer {
             return transaction.abort().map_err(|error| Failure::Database(error.into()));
         }
         let is_awaited = is_awaited(run.iter().map(|job| job.kind()));
-        let written = sync_names(&adopted).and_then(|()| self.journal.append(&changes, is_awaited));
+        let written = if is_awaited {
+            sync_names(&adopted).and_then(|()| self.journal.append(&changes))
+        } else {
+            self.journal.defer(&changes);
+            Ok(())
+        };
         if let Err(failed) = written {
             transaction.abort().map_err(|error| Failure::Database(error.into()))?;
             return Err(Failure::Refused(reason(&failed.into())));
         }
         adopted.iter_mut().for_each(super::bodies::NewBody::keep);
         open.commit(transaction).map_err(Failure::Database)?;
+        self.removed_bytes += removed_bytes;
         for id in discarded {
             self.bodies.remove(id);
         }
@@ -238,12 +264,45 @@ impl Writer {
         if let Ok(open) = read(&self.current).as_ref() {
             open.kill();
         }
-        let opened = open(&self.folder).map(|(open, journal)| {
+        let opened = open(&mut self.folder).map(|(open, journal)| {
             self.journal = journal;
             Arc::new(open)
         });
         let mut current = self.current.write().unwrap_or_else(std::sync::PoisonError::into_inner);
-        *current = opened.map_err(|error| reason(&error));
+        *current = opened.map_err(|error| match &error {
+            Error::Storage { source, .. } => reason(source),
+            Error::File { source, .. } if is_full(source) => Unavailable::Full,
+            _ => Unavailable::Failed(error.to_string().into()),
+        });
+    }
+
+    /// Writes the database into a smaller file when it has shrunk by half.
+    fn compact_when_sparse(&mut self) {
+        let Ok(open) = read(&self.current).clone() else { return };
+        let due = |bytes: u64| bytes >= compaction::SMALLEST && self.removed_bytes >= bytes / 2;
+        if !self.journal.is_empty() || !open.file_bytes().is_ok_and(due) {
+            return;
+        }
+        // Where it fails (for want of room, for one), it is tried again when as much has been removed once more.
+        self.removed_bytes = 0;
+        if !open.is_sparse().unwrap_or_default() {
+            return;
+        }
+        let Ok(rows) = open.snapshot() else { return };
+        match compaction::compact(&self.folder, &rows, self.journal.last()) {
+            Ok(compacted) => {
+                let mut current = self.current.write().unwrap_or_else(std::sync::PoisonError::into_inner);
+                *current = Ok(Arc::new(compacted));
+            }
+            // The new database may have taken the place of the one that is open.
+            Err(_) => self.open_anew(),
+        }
+    }
+
+    fn reopen_damaged(&mut self) {
+        if read(&self.current).as_ref().is_ok_and(|open| open.damage().is_some()) {
+            self.open_anew();
+        }
     }
 
     fn catch_up_when(&mut self, due: bool) {
@@ -286,24 +345,6 @@ enum Failure {
     Refused(Unavailable),
     /// The database has to be opened anew.
     Database(redb::Error),
-}
-
-/// Opens database and journal as they are on the disk.
-pub(super) fn open(folder: &Folder) -> Result<(Open, Journal), redb::Error> {
-    let (open, applied) = Open::at(&folder.database())?;
-    let transaction = open.begin()?;
-    let mut batch = Batch::of(&transaction)?;
-    let journal = Journal::open(&folder.journal(), applied, |changes| batch.replay(changes));
-    let journal = journal.map_err(|failed| match failed {
-        OpenError::File(error) => redb::Error::Io(error),
-        OpenError::Replay(error) => error.into(),
-        OpenError::Gap { after, found } => {
-            redb::Error::Corrupted(format!("the journal goes on with entry {found} after entry {after}"))
-        }
-    })?;
-    drop(batch.end());
-    open.commit(transaction)?;
-    Ok((open, journal))
 }
 
 fn reason(error: &redb::Error) -> Unavailable {

@@ -1,0 +1,109 @@
+//! The files that rows are kept in, behind a trait, so that a test can cut the power.
+
+use std::fs::{self, File};
+use std::io;
+use std::os::unix::fs::{FileExt, OpenOptionsExt};
+use std::path::Path;
+use std::sync::Arc;
+
+use super::bodies::sync_folder;
+use crate::private;
+
+/// An open file.
+pub(super) trait Medium: std::fmt::Debug + Send + Sync {
+    /// The length in bytes.
+    fn len(&self) -> io::Result<u64>;
+    /// Reads up to so many bytes at an offset; gives how many. 0 at the end.
+    fn read_at(&self, out: &mut [u8], offset: u64) -> io::Result<usize>;
+    /// Writes all bytes at an offset.
+    fn write_all_at(&self, bytes: &[u8], offset: u64) -> io::Result<()>;
+    /// Cuts the file, or extends it by zeros.
+    fn set_len(&self, length: u64) -> io::Result<()>;
+    /// Returns when all that was written is on the disk.
+    fn sync(&self) -> io::Result<()>;
+
+    /// Fills `out` from an offset on; bytes beyond the end are zeros.
+    fn read_padded(&self, out: &mut [u8], offset: u64) -> io::Result<()> {
+        let mut done = 0;
+        while done < out.len() {
+            match self.read_at(&mut out[done..], offset + done as u64) {
+                Ok(0) => break,
+                Ok(read) => done += read,
+                Err(again) if again.kind() == io::ErrorKind::Interrupted => {}
+                Err(failed) => return Err(failed),
+            }
+        }
+        out[done..].fill(0);
+        Ok(())
+    }
+
+    /// The whole content.
+    fn read_all(&self) -> io::Result<Vec<u8>> {
+        let length = usize::try_from(self.len()?).map_err(io::Error::other)?;
+        let mut bytes = vec![0; length];
+        self.read_padded(&mut bytes, 0)?;
+        Ok(bytes)
+    }
+}
+
+impl Medium for File {
+    fn len(&self) -> io::Result<u64> {
+        Ok(self.metadata()?.len())
+    }
+
+    fn read_at(&self, out: &mut [u8], offset: u64) -> io::Result<usize> {
+        FileExt::read_at(self, out, offset)
+    }
+
+    fn write_all_at(&self, bytes: &[u8], offset: u64) -> io::Result<()> {
+        FileExt::write_all_at(self, bytes, offset)
+    }
+
+    fn set_len(&self, length: u64) -> io::Result<()> {
+        Self::set_len(self, length)
+    }
+
+    fn sync(&self) -> io::Result<()> {
+        self.sync_data()
+    }
+}
+
+/// Opens files by their path.
+pub(super) trait Files: std::fmt::Debug + Send + Sync {
+    /// Opens a file, made when missing.
+    fn open(&self, path: &Path) -> io::Result<Arc<dyn Medium>>;
+    /// Whether there is one.
+    fn exists(&self, path: &Path) -> bool;
+    /// Gives a file another name, in the place of one that has it; on the disk on return.
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
+    /// Removes a file if it is there.
+    fn remove(&self, path: &Path) -> io::Result<()>;
+}
+
+/// The files of the system.
+#[derive(Debug)]
+pub(super) struct SystemFiles;
+
+impl Files for SystemFiles {
+    fn open(&self, path: &Path) -> io::Result<Arc<dyn Medium>> {
+        let mut options = File::options();
+        options.read(true).write(true).create(true).truncate(false).mode(private::FILE);
+        Ok(Arc::new(options.open(path)?))
+    }
+
+    fn exists(&self, path: &Path) -> bool {
+        path.exists()
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        fs::rename(from, to)?;
+        to.parent().map_or(Ok(()), sync_folder)
+    }
+
+    fn remove(&self, path: &Path) -> io::Result<()> {
+        match fs::remove_file(path) {
+            Err(failed) if failed.kind() != io::ErrorKind::NotFound => Err(failed),
+            _ => Ok(()),
+        }
+    }
+}
