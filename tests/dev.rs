@@ -21,6 +21,17 @@ const RAYFOLD: &str = env!("CARGO_BIN_EXE_rayfold");
 /// Longer than anything here takes on a loaded machine, a build of the functions included.
 const PATIENCE: Duration = Duration::from_secs(600);
 
+/// With the functions that were built with this test; without them `rayfold dev` builds them itself.
+fn dev() -> Command {
+    let mut command = Command::new(RAYFOLD);
+    command.arg("dev");
+    let beside = Path::new(RAYFOLD).parent().unwrap();
+    if beside.join("rayfold-render").is_file() && beside.join("rayfold-assemble").is_file() {
+        command.env("RAYFOLD_FUNCTIONS", beside);
+    }
+    command
+}
+
 struct Dev {
     child: Child,
     exports: BTreeMap<String, String>,
@@ -29,18 +40,18 @@ struct Dev {
 
 impl Dev {
     fn start(store: StoreKind, data: &Path) -> Self {
-        let mut command = Command::new(RAYFOLD);
-        command.arg("dev").arg("--data").arg(data).args(["--address", "127.0.0.1:0", "--concurrency", "4"]);
+        let mut command = dev();
+        command.arg("--data").arg(data).args(["--address", "127.0.0.1:0", "--concurrency", "4"]);
         match store {
             // What a user gets who says nothing.
             StoreKind::BuiltIn => {}
             StoreKind::Minio => drop(command.args(["--store", "minio"])),
         }
-        let beside = Path::new(RAYFOLD).parent().unwrap();
-        if beside.join("rayfold-render").is_file() && beside.join("rayfold-assemble").is_file() {
-            // Built with this test; without them `rayfold dev` builds them itself.
-            command.env("RAYFOLD_FUNCTIONS", beside);
-        }
+        Self::of(command)
+    }
+
+    /// Reads what it prints to be set, up to the line that says how to go on.
+    fn of(mut command: Command) -> Self {
         let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
         let mut exports = BTreeMap::new();
@@ -135,4 +146,114 @@ async fn it_goes_on_where_it_was_after_a_kill_and_leaves_nothing_behind() {
         assert!(!answers(&bucket).await, "Ctrl-C stops the S3 server too");
     })
     .await;
+}
+
+/// A folder of scripts, a place for the GIF, and a folder for what is temporary.
+struct Once {
+    folder: tempfile::TempDir,
+}
+
+impl Once {
+    fn new(frames: u32, screen: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["ball", "temporary"] {
+            std::fs::create_dir(folder.path().join(name)).unwrap();
+        }
+        for frame in 1..=frames {
+            let text = format!("Screen {screen}\nSphere 6 {frame} 8 -9 .2 .2 .2 .7 .6 .5\nTrace\n");
+            std::fs::write(folder.path().join(format!("ball/{frame}.txt")), text).unwrap();
+        }
+        Self { folder }
+    }
+
+    fn command(&self) -> Command {
+        let mut command = dev();
+        command.current_dir(self.folder.path()).env("TMPDIR", self.folder.path().join("temporary"));
+        command.args(["ball", "-o", "out.gif"]);
+        command
+    }
+
+    fn names(&self, below: &str) -> Vec<String> {
+        let entries = std::fs::read_dir(self.folder.path().join(below)).unwrap();
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    /// Nothing but what was there and, if there is to be one, the GIF.
+    #[track_caller]
+    fn leaves(&self, has_gif: bool) {
+        assert_eq!(self.names("temporary"), [""; 0]);
+        let expected: &[&str] =
+            if has_gif { &["ball", "out.gif", "temporary"] } else { &["ball", "temporary"] };
+        assert_eq!(self.names(""), expected);
+    }
+}
+
+#[test]
+fn one_command_makes_a_folder_into_its_gif_and_leaves_nothing_else() {
+    let once = Once::new(3, "24 16");
+    let done = once.command().output().unwrap();
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert!(done.status.success(), "{said}");
+    assert!(done.stdout.is_empty() && said.contains("out.gif"), "{said}");
+    once.leaves(true);
+    let made = std::fs::read(once.folder.path().join("out.gif")).unwrap();
+    let by_hand = once.folder.path().join("rendered.gif");
+    let status = Command::new(RAYFOLD)
+        .arg("render")
+        .arg(once.folder.path().join("ball"))
+        .arg("-o")
+        .arg(&by_hand)
+        .status()
+        .unwrap();
+    assert!(status.success());
+    assert!(made == std::fs::read(by_hand).unwrap(), "the GIF is another one than that of `rayfold render`");
+}
+
+/// The functions refuse it, or it is refused before anything starts.
+#[test]
+fn one_command_that_fails_says_why_and_leaves_nothing() {
+    let once = Once::new(2, "24 16");
+    let failed = once.command().env("RAYFOLD_MAX_PIXELS", "100").output().unwrap();
+    let said = String::from_utf8(failed.stderr).unwrap();
+    assert_eq!(failed.status.code(), Some(1), "{said}");
+    assert!(said.contains("ball is failed") && said.contains("1.txt"), "{said}");
+    once.leaves(false);
+    std::fs::write(once.folder.path().join("ball/2.txt"), "Sphere\n").unwrap();
+    let refused = once.command().output().unwrap();
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(refused.status.code() == Some(1) && said.contains("2.txt"), "{said}");
+    once.leaves(false);
+}
+
+#[test]
+fn one_command_that_is_interrupted_leaves_nothing() {
+    let once = Once::new(200, "640 480");
+    let mut child = once.command().stderr(Stdio::null()).spawn().unwrap();
+    let start = Instant::now();
+    while once.names("temporary").is_empty() {
+        assert!(start.elapsed() < PATIENCE, "it does not start");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_secs(1));
+    let status = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(status.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    once.leaves(false);
+}
+
+#[tokio::test]
+async fn one_command_that_is_kept_serves_on_until_it_is_interrupted() {
+    let once = Once::new(2, "24 16");
+    let mut command = once.command();
+    command.arg("--keep");
+    let mut dev = Dev::of(command);
+    assert!(once.names("").contains(&"out.gif".to_owned()), "the GIF comes first");
+    let bucket = dev.store();
+    assert!(bucket.get("animations/ball.gif").await.unwrap().body.starts_with(b"GIF89a"));
+    dev.signal("-INT");
+    assert!(dev.child.wait().unwrap().success());
+    once.leaves(true);
 }

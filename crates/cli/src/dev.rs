@@ -1,23 +1,30 @@
 //! `rayfold dev`: the whole pipeline on this machine, until told to stop.
 //!
 //! An S3 server (the store built in, or MinIO), the bucket, its notifications and the local invoker with the function
-//! binaries. Everything it started ends with it; the data stays, and the next start goes on from there.
+//! binaries. Everything it started ends with it; the data stays, and the next start goes on from there. With a folder it
+//! has its data in a temporary one, submits the scripts, writes the GIF and ends.
 
 mod news;
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
+use std::pin::pin;
 use std::time::Duration;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use rayfold_local::invoker::Settings;
 use rayfold_local::{Error, Functions, Plan, Platform, StoreKind};
+use rayfold_pipeline::SystemClock;
+use rayfold_scene::Limits;
+use tempfile::TempDir;
 use tokio::sync::mpsc::unbounded_channel;
 
+use crate::cloud::submit::Order;
+use crate::cloud::{BucketArgs, Client};
 use crate::console::Console;
 use crate::interrupt;
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, Usage};
 use crate::values;
 use news::News;
 
@@ -39,6 +46,8 @@ const LIMITS: [&str; 7] = [
 ];
 
 /// Run the whole pipeline on this machine: an S3 server, the bucket and the functions
+///
+/// With a folder of scripts it submits them, writes the GIF and stops: all of it in a temporary folder and on free ports.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Nothing has to be installed: the S3 server is part of rayfold. `--store minio` takes MinIO
@@ -50,18 +59,29 @@ names; without it those beside rayfold, or on the PATH, or they are built where 
 They refuse what RAYFOLD_MAX_PIXELS, RAYFOLD_MAX_OBJECTS and the like do not allow, as on AWS.
 
 Stop with Ctrl-C; the data is kept, and the next start goes on where this one was.
+Of what was made for FOLDER nothing is kept but the GIF.
 
 Examples:
+  rayfold dev scenes/hello -o hello.gif
+      scripts in, GIF out, through the bucket
   rayfold dev
       prints what to set in another terminal
   aws s3 sync scenes/hello s3://rayfold/scripts/hello/
       there; the GIF appears below animations/")]
 pub(crate) struct Args {
+    /// A folder of scripts, to be made into a GIF
+    folder: Option<PathBuf>,
+    /// Where to write the GIF of FOLDER [default: the folder's name with .gif, in the current folder]
+    #[arg(long, short, value_name = "OUT.gif", requires = "folder")]
+    output: Option<PathBuf>,
+    /// Run on when the GIF of FOLDER is written
+    #[arg(long, requires = "folder")]
+    keep: bool,
     /// What keeps the bucket
     #[arg(long, value_name = "STORE", default_value = StoreKind::BuiltIn.name(), value_parser = stores())]
     store: StoreKind,
     /// Where objects and credentials are kept [default: rayfold/dev in the user's data folder]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with = "folder")]
     data: Option<PathBuf>,
     /// How many processes of a function run at once [default: one a core, two at least]
     #[arg(long, value_name = "N", value_parser = values::count::<u16>)]
@@ -81,23 +101,50 @@ fn stores() -> impl TypedValueParser<Value = StoreKind> {
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
+    let order = args.folder.as_ref().map(|folder| order(folder, args, console)).transpose()?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
         .build()
         .context("cannot start")?;
-    runtime.block_on(serve(args, console))
+    runtime.block_on(serve(args, order.as_ref(), console))
 }
 
-async fn serve(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
+fn order(folder: &PathBuf, args: &Args, console: &Console) -> anyhow::Result<Order> {
+    ensure!(
+        folder.is_dir() || !folder.exists(),
+        Usage(format!("{} is a file: expected a folder of scripts", folder.display()))
+    );
+    Order::new(folder, None, args.output.as_deref(), true, &Limits::default(), console)
+}
+
+/// A folder that goes with the run, also when a second signal ends that at once.
+struct Scratch {
+    folder: TempDir,
+    _protected: interrupt::Protected,
+}
+
+impl Scratch {
+    fn new() -> anyhow::Result<Self> {
+        let folder = tempfile::Builder::new().prefix("rayfold-dev-").tempdir();
+        let folder = folder.context("cannot make a temporary folder")?;
+        let protected = interrupt::protect(folder.path());
+        Ok(Self { folder, _protected: protected })
+    }
+}
+
+async fn serve(args: &Args, order: Option<&Order>, console: &Console) -> anyhow::Result<Outcome> {
     let mut say = |line: &str| console.note(line);
     let functions = Functions::locate(&mut say)?;
-    let data = match &args.data {
-        Some(data) => data.clone(),
-        None => default_data()?,
+    let scratch = order.map(|_| Scratch::new()).transpose()?;
+    let data = match (&scratch, &args.data) {
+        (Some(scratch), _) => scratch.folder.path().to_path_buf(),
+        (None, Some(data)) => data.clone(),
+        (None, None) => default_data()?,
     };
     let address = match args.address {
         Some(address) => address,
+        None if order.is_some() => rayfold_local::any_port(),
         None => usual_address(),
     };
     let plan =
@@ -121,15 +168,49 @@ async fn serve(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         },
         () = told_to_stop() => return Ok(Outcome::Interrupted),
     };
+    let ended = attend(args, order, &mut platform, (&data, console)).await;
+    // Else whatever is still written comes back into a folder that is being removed.
+    platform.stop().await;
+    ended
+}
+
+/// Does what is to be done on a running platform, until told to stop.
+async fn attend(
+    args: &Args,
+    order: Option<&Order>,
+    platform: &mut Platform,
+    (data, console): (&Path, &Console),
+) -> anyhow::Result<Outcome> {
     let (sender, mut seen) = unbounded_channel();
     let invoker = platform.start_invoker(Some(sender)).await?;
     // So that the sweep that catches up does not meet what is uploaded next.
     let _ = tokio::time::timeout(CATCH_UP, invoker.idle()).await;
-    console.print(exports(&platform))?;
-    console.note(format_args!("data in {}; Ctrl-C stops everything", data.display()));
-    for other in StoreKind::ALL.into_iter().filter(|kind| *kind != args.store && kind.objects(&data).exists())
+    if let Some(order) = order {
+        let bucket = BucketArgs { bucket: args.bucket.clone() };
+        let client = Client::new(platform.store(), &SystemClock);
+        let mut delivery = pin!(order.deliver(client, &bucket, console));
+        let mut news = News::brief(console, platform.store());
+        loop {
+            tokio::select! {
+                delivered = &mut delivery => break delivered?,
+                observation = seen.recv() => match observation {
+                    Some(observation) => news.hear(&observation),
+                    None => bail!("the invoker has ended"),
+                },
+                status = platform.server().ended() => bail!("MinIO has ended ({status})"),
+                () = told_to_stop() => return Ok(Outcome::Interrupted),
+            }
+        }
+        if !args.keep {
+            return Ok(Outcome::Done);
+        }
+    }
+    console.print(exports(platform))?;
+    let end = if order.is_some() { "stops everything and removes it" } else { "stops everything" };
+    console.note(format_args!("data in {}; Ctrl-C {end}", data.display()));
+    for other in StoreKind::ALL.into_iter().filter(|kind| *kind != args.store && kind.objects(data).exists())
     {
-        console.note(format_args!("{}", left_alone(other, &data)));
+        console.note(format_args!("{}", left_alone(other, data)));
     }
     console.print(format!("aws s3 sync scenes/hello s3://{0}/scripts/hello/\n", args.bucket))?;
     let mut news = News::new(console, platform.store());
@@ -147,7 +228,6 @@ async fn serve(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         }
     }
     console.note("stopping");
-    platform.stop().await;
     Ok(Outcome::Done)
 }
 

@@ -24,7 +24,7 @@ pub(crate) fn listen() -> std::io::Result<()> {
         for signal in signals.forever().filter(|signal| *signal != SIGXFSZ) {
             if SIGNAL.swap(signal, Ordering::SeqCst) != 0 {
                 for path in &*temporary() {
-                    let _ = std::fs::remove_file(path);
+                    let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
                 }
                 std::process::exit(exit_code());
             }
@@ -73,7 +73,7 @@ pub(crate) fn exit_code() -> i32 {
     128 + SIGNAL.load(Ordering::SeqCst)
 }
 
-/// A file that must not outlive the run, until this guard is dropped.
+/// A file or a folder that must not outlive the run, until this guard is dropped.
 #[derive(Debug)]
 pub(crate) struct Protected(PathBuf);
 

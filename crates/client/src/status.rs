@@ -58,7 +58,10 @@ impl<'a, S: Store, C: Clock> Client<'a, S, C> {
         let manifests = self.list(ListRequest::all(MANIFESTS)).await?.objects;
         let mut names: Vec<Animation> = manifests
             .iter()
-            .filter_map(|object| Some(object.key.parse::<Key>().ok()?.animation().clone()))
+            .filter_map(|object| match object.key.parse() {
+                Ok(Key::Manifest { animation }) => Some(animation),
+                _ => None,
+            })
             .collect();
         for folder in self.list(ListRequest::level(SCRIPTS)).await?.prefixes {
             let name = folder.trim_start_matches(SCRIPTS).trim_end_matches('/');
@@ -112,6 +115,21 @@ mod tests {
         let looks = world.client().look(&names).await.unwrap();
         let seen: Vec<_> = looks.iter().map(|watch| (watch.is_settled(), watch.is_current())).collect();
         assert_eq!(seen, [(true, true), (true, true), (false, false)]);
+    }
+
+    /// Each manifest that was set aside was one animation more: four times `film`.
+    #[tokio::test]
+    async fn an_animation_whose_manifests_were_set_aside_is_named_once() {
+        let world = World::new();
+        world.put("scripts/film/1.txt", "frame").await;
+        for garbage in ["one", "two", "three"] {
+            world.put("manifests/film.json", garbage).await;
+            world.functions().await;
+            world.put("scripts/film/1.txt", garbage).await;
+            world.functions().await;
+        }
+        assert_eq!(world.keys("manifests/film.json~").await.len(), 3);
+        assert_eq!(world.client().animations().await.unwrap(), [world.film()]);
     }
 
     /// "Done, GIF current" stood there while the functions could not read what had been uploaded.

@@ -88,7 +88,7 @@ pub(crate) fn due(head: &Head, gif: Option<&ObjectInfo>) -> Due {
 }
 
 /// The version of this set's GIF, if nobody has written it down.
-fn new_gif(head: &Head, gif: Option<&ObjectInfo>) -> Option<ETag> {
+pub(crate) fn new_gif(head: &Head, gif: Option<&ObjectInfo>) -> Option<ETag> {
     let is_new = head.status == Status::Done && head.gif_version().is_none() && is_current(head, gif);
     gif.filter(|_| is_new).map(|gif| gif.etag.clone())
 }

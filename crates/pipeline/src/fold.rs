@@ -2,25 +2,37 @@
 //! that it commits.
 //!
 //! 1. Read the manifest, of a large one the beginning; leave if it covers the fact and is someone else's.
-//! 2. Pause, the longer the more frames are to come, and look again, until a pause has passed in which no one wrote: with
-//!    many finishers one listing serves all. A large animation's listing is many requests, so of those who have seen no one
-//!    write few list, by lot; the others pause anew, and are the likelier to list the longer that goes on (`chance`).
-//! 3. List, reconcile, and where the manifest differs put it on the condition that it is still the one that was read.
-//! 4. **List again**, and commit again until a listing agrees with what was committed: the first listing may be older
-//!    than a quick change and change back.
+//! 2. Whoever has put a result takes a frame by lot that the manifest shows to come, and leaves if it still is: its script
+//!    has that version, and there is no result. Whoever draws that one folds later (below).
+//! 3. Pause a few times as long as a look at the manifest takes, and look again, until a pause has passed in which no one
+//!    wrote: with many finishers at once one listing serves all.
+//! 4. List, reconcile, and where the manifest differs put it on the condition that it is still the one that was read.
+//! 5. Leave as in 2, or **list again**, and commit again until a listing agrees with what was committed: the first listing
+//!    may be older than a quick change and change back.
 //!    Where there is neither a manifest nor anything uploaded, nothing is put: an animation that was removed stays so.
-//! 5. If nothing is left to come, put the claim of that revision, whose name is new because only its writer claims.
+//! 6. If nothing is left to come, put the claim of that revision, whose name is new because only its writer claims.
+//!
+//! Who leaves for a frame to come is covered: when that frame's result comes, or its script changes, the manifest does not
+//! show that, whichever it is by then; so the invocation of that event lists, and then it sees both, or leaves for a frame
+//! that is still to come after it. The last one finds none and lists. As most frames that a fresh manifest shows to come
+//! are, few list; the older the manifest, the more do.
 //!
 //! A manifest covers a fact if it shows it, or if it is at least the second revision after one that was read when the
 //! fact held already: each revision is put on the condition that its predecessor is still there, and its listing starts
 //! after the predecessor was read. So the listing of the second one started after the first was put, hence after the
 //! fact; it has seen the fact, or what came later.
 //!
-//! Invariant: whoever finds its own commit, as after a crash or a lost answer, still owes the claim and does not leave.
+//! Invariant: whoever finds its own commit, as after a crash or a lost answer, still owes the claim, and leaves only for a
+//! frame to come.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::time::Duration;
+
+use futures_util::future::try_join;
 
 use crate::invocation::{Glimpse, Invocation, Known, Mutation};
 use crate::keys::{Animation, Key};
-use crate::manifest::{Fact, Gif, Head, Manifest};
+use crate::manifest::{Fact, Frame, FrameState, Gif, Manifest};
 use crate::store::{ETag, PAGE, PutOptions, Store};
 use crate::{Clock, Error, Result, invariants};
 
@@ -31,6 +43,8 @@ pub enum Folded {
     Untouched,
     /// The manifest, someone else's, showed the fact: nothing was listed.
     Covered,
+    /// Another frame is to come, and whoever draws it folds: nothing was listed.
+    Awaited,
     /// The manifest agreed with the listing.
     Agreed,
     /// This invocation's revision is the manifest, and frames are still to come.
@@ -41,20 +55,6 @@ pub enum Folded {
 
 /// How often an invocation commits, one listing after the other, before it lets others do so.
 const MOST_COMMITS: u32 = 16;
-
-/// How much likelier whoever has seen no one write lists after each further pause.
-const LIKELIER: u64 = 4;
-
-/// Of how many frames on one in one more lists: a quarter of a listing's page.
-const FRAMES_A_LOT: u64 = PAGE as u64 / 4;
-
-/// One in how many lists, of those who have seen no one write in `quiet` pauses before this one: of a small animation
-/// everyone; of a large one at first one in four times as many as its listing has pages, or as frames are to come.
-fn chance(head: Option<&Head>, quiet: u32) -> u64 {
-    let Some(head) = head else { return 1 };
-    let lots = head.total / FRAMES_A_LOT;
-    lots.min(head.missing()).checked_div(LIKELIER.saturating_pow(quiet)).unwrap_or(0).max(1)
-}
 
 /// How long a fact has held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,17 +69,18 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     /// Sees to it that the manifest shows `fact`. What an invocation does after it depends on nothing from before it.
     pub(crate) async fn fold(&self, animation: &Animation, fact: &Fact, age: Age) -> Result<Folded> {
         self.goes_on_with(&(animation, fact, age));
+        let start = self.clock.now();
         let glimpse = self.glimpse(animation).await?;
-        self.fold_from(animation, fact, age, glimpse).await
+        self.fold_from(animation, fact, age, (glimpse, self.clock.now().since(start))).await
     }
 
-    /// The same from a look at the manifest that was taken when the fact held already.
+    /// The same from a look at the manifest that was taken when the fact held already, and took so long.
     pub(crate) async fn fold_from(
         &self,
         animation: &Animation,
         fact: &Fact,
         age: Age,
-        mut glimpse: Glimpse,
+        (mut glimpse, look): (Glimpse, Duration),
     ) -> Result<Folded> {
         let first = glimpse.revision();
         // Of a large manifest that would be one more request, mostly in vain.
@@ -87,23 +88,22 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         if is_worth_it && self.may_leave(&glimpse) && self.shows(animation, &glimpse, fact).await? {
             return Ok(Folded::Covered);
         }
-        let mut quiet = 0;
         loop {
-            self.goes_on_with(&(animation, fact, first, quiet, &glimpse));
+            self.goes_on_with(&(animation, fact, first, look, &glimpse));
+            let is_due = self.is_due(&glimpse, fact);
+            if !is_due
+                && self.is_another_awaited(animation, fact, glimpse.revision(), glimpse.frames()).await?
+            {
+                return Ok(Folded::Awaited);
+            }
             let before = glimpse.revision();
-            self.pause(glimpse.head()).await;
+            self.goes_on_with(&(animation, fact, first, look, before));
+            self.pause(look).await;
             glimpse = self.glimpse(animation).await?;
-            if glimpse.revision() != before && self.may_leave(&glimpse) {
+            if glimpse.revision() != before {
                 if self.is_covered(animation, &glimpse, fact, first).await? {
                     return Ok(Folded::Covered);
                 }
-                // Whoever wrote this lists once more, and will see what it has missed.
-                quiet = 0;
-                continue;
-            }
-            let chance = chance(glimpse.head(), quiet);
-            if chance > 1 && !self.random.one_in(chance) {
-                quiet += 1;
                 continue;
             }
             let mut known = match glimpse {
@@ -111,12 +111,54 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 Glimpse::Unreadable(known) | Glimpse::Whole(known) => Some(known),
                 Glimpse::Start { .. } => self.manifest(animation).await?,
             };
-            self.goes_on_with(&(animation, fact, first, quiet, &known));
-            if let Some(folded) = self.commit_until_agreed(animation, &mut known).await? {
+            self.goes_on_with(&(animation, fact, first, look, &known));
+            if let Some(folded) = self.commit_until_agreed(animation, fact, &mut known).await? {
                 return Ok(folded);
             }
-            glimpse = known.into();
+            self.goes_on_with(&(animation, fact, first, look));
+            glimpse = self.glimpse(animation).await?;
+            if self.is_covered(animation, &glimpse, fact, first).await? {
+                return Ok(Folded::Covered);
+            }
         }
+    }
+
+    /// Whether the manifest is to be written in any case: to show what is no frame's result, or because people have waited
+    /// for long to see how far it is, the longer the dearer a listing is.
+    fn is_due(&self, glimpse: &Glimpse, fact: &Fact) -> bool {
+        let Some(head) = glimpse.head() else { return true };
+        let pages = u32::try_from(head.total / PAGE as u64).unwrap_or(u32::MAX).saturating_add(1);
+        let age = self.clock.now().since(glimpse.modified());
+        head.is_terminal()
+            || !matches!(fact, Fact::Drawn(..) | Fact::Faulty(..))
+            || age >= self.policy.fresh.saturating_mul(pages)
+    }
+
+    /// Whether one of the frames, another than the fact's, is still to come: one that is taken by lot of those that the
+    /// manifest shows pending.
+    async fn is_another_awaited(
+        &self,
+        animation: &Animation,
+        fact: &Fact,
+        revision: u64,
+        frames: &[Frame],
+    ) -> Result<bool> {
+        let is_other = |frame: &&Frame| {
+            frame.state == FrameState::Pending && fact.subject() != Some((&frame.script, frame.part))
+        };
+        let others: Vec<&Frame> = frames.iter().filter(is_other).collect();
+        let mut lot = DefaultHasher::new();
+        (self.request_id(), revision).hash(&mut lot);
+        let place =
+            lot.finish().checked_rem(others.len() as u64).and_then(|place| usize::try_from(place).ok());
+        let Some(frame) = place.and_then(|place| others.get(place)) else { return Ok(false) };
+        if self.breaks(Mutation::LeaveForAnyFrame) {
+            return Ok(true);
+        }
+        let key = animation.script(&frame.script);
+        let result = self.has_result(animation, &frame.script, &frame.version, frame.part);
+        let (script, has_result) = try_join(self.head(&key), result).await?;
+        Ok(!has_result && script.is_some_and(|script| script.etag == frame.version))
     }
 
     /// Whether whoever wrote the manifest will see to its claim: this invocation and earlier attempts at its event have
@@ -125,7 +167,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         glimpse.head().is_some_and(|head| !self.is_own(head) || self.breaks(Mutation::LeaveOwnCommit))
     }
 
-    /// Whether the manifest shows the fact, or follows late enough on the revision that was read when it held.
+    /// Whether someone else's manifest shows the fact, or follows late enough on the revision that was read when it held.
     async fn is_covered(
         &self,
         animation: &Animation,
@@ -133,17 +175,26 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         fact: &Fact,
         first: u64,
     ) -> Result<bool> {
+        if !self.may_leave(glimpse) {
+            return Ok(false);
+        }
         if *fact != Fact::Fold && glimpse.revision() >= first + 2 {
             return Ok(true);
         }
-        self.shows(animation, glimpse, fact).await
+        // Of a large manifest the lines are one more request, in vain while most frames are to come.
+        let is_worth_it = match glimpse {
+            Glimpse::Start { beginning, .. } => beginning.head.done > beginning.head.pending,
+            _ => true,
+        };
+        Ok(is_worth_it && self.shows(animation, glimpse, fact).await?)
     }
 
-    /// Lists and commits until a listing agrees; `None` when someone else's commit came first, or when frames come as fast as
-    /// they are written down and it is others' turn to do that.
+    /// Lists and commits until a listing agrees, or until whoever draws a frame to come will list; `None` when someone
+    /// else's commit came first, or when frames come as fast as they are written down and it is others' turn to do that.
     async fn commit_until_agreed(
         &self,
         animation: &Animation,
+        fact: &Fact,
         known: &mut Option<Known>,
     ) -> Result<Option<Folded>> {
         for _ in 0..MOST_COMMITS {
@@ -162,7 +213,14 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 Some(committed) if self.breaks(Mutation::SkipSecondListing) => {
                     return self.end(&committed).await.map(Some);
                 }
-                Some(committed) => *known = Some(committed),
+                Some(committed) => {
+                    let Manifest { head, frames } = &committed.manifest;
+                    let may_leave = !head.is_terminal() && *fact != Fact::Fold;
+                    if may_leave && self.is_another_awaited(animation, fact, head.revision, frames).await? {
+                        return Ok(Some(Folded::Committed));
+                    }
+                    *known = Some(committed);
+                }
                 None => return Ok(None),
             }
         }
@@ -223,7 +281,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     async fn put_manifest(&self, manifest: Manifest, options: PutOptions) -> Result<Option<Known>> {
         let (key, body) = (manifest.head.animation.manifest(), manifest.encode(self.policy.glimpse)?);
         match self.store.put(&key, body, options).await {
-            Ok(etag) => Ok(Some(Known { manifest, etag, unreadable: None })),
+            Ok(etag) => Ok(Some(Known { manifest, etag, modified: self.clock.now(), unreadable: None })),
             Err(error) if error.is_conflict() || error.is_retryable() || error.is_not_found() => Ok(None),
             Err(error) => Err(error),
         }
@@ -252,29 +310,4 @@ pub async fn fold<S: Store, C: Clock>(
     animation: &Animation,
 ) -> Result<Folded, Error> {
     invocation.fold(animation, &Fact::Fold, Age::Old).await
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::manifest::Settings;
-    use crate::reconcile::{Results, Scripts, reconcile};
-
-    fn head(total: u64, pending: u64) -> Head {
-        let animation = Animation::new("film").unwrap();
-        let manifest = reconcile(&animation, &Scripts::default(), &Results::default(), &Settings::absent());
-        Head { total, pending, ..manifest.head }
-    }
-
-    #[test]
-    fn everyone_lists_what_is_small_and_few_what_is_large_until_nobody_writes() {
-        let lots = |head: &Head| (0..7).map(|quiet| chance(Some(head), quiet)).collect::<Vec<_>>();
-        assert_eq!(chance(None, 0), 1, "whoever finds no manifest lists");
-        assert_eq!(lots(&head(499, 400)), [1; 7]);
-        assert_eq!(lots(&head(100_000, 50_000)), [400, 100, 25, 6, 1, 1, 1]);
-        // Those who could list, too, are no more than the frames to come: the last one never waits for others.
-        assert_eq!(lots(&head(100_000, 20)), [20, 5, 1, 1, 1, 1, 1]);
-        assert_eq!(lots(&head(100_000, 1)), [1; 7]);
-        assert_eq!(lots(&head(100_000, 0)), [1; 7]);
-    }
 }

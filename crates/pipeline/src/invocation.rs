@@ -10,7 +10,7 @@ use std::time::Duration;
 use bytes::Bytes;
 
 use crate::keys::{Animation, Generation};
-use crate::manifest::{Beginning, Fact, Head, Manifest, Settings, frames_of};
+use crate::manifest::{Beginning, Fact, Frame, Head, Manifest, Settings, frames_of};
 use crate::reconcile::{Results, Scripts, reconcile};
 use crate::store::{ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store};
 use crate::{Clock, Error, Randomness, Result, Timestamp, found};
@@ -23,11 +23,13 @@ pub struct Policy {
     /// How old the newest script must be before a GIF is made, when `animation.json` does not say how many frames to
     /// wait for. 5 s: longer than the gaps of an upload, short enough to wait for.
     pub quiet: Duration,
-    /// Pause before folding, for each frame that the manifest shows not done: with many to come another finisher
-    /// will list anyway.
-    pub pause_per_frame: Duration,
-    /// The longest such pause; with it the last finisher still claims within a second.
+    /// The longest pause before a listing, as so many times what a look at the manifest takes: with many finishers at once
+    /// one listing serves them all, and where requests are fast it is made soon.
+    pub pause_looks: u32,
+    /// The longest pause whatever a look takes; with it the last finisher still claims within a second.
     pub pause_cap: Duration,
+    /// How old a manifest of one page of frames may be before it is written anew though nobody needs that but people.
+    pub fresh: Duration,
     /// How many bytes of a manifest are read to see whether it covers a result. 32 KiB: all of it up to some 300 frames.
     pub glimpse: u64,
     /// The most frames that an animation may have; with `None` any number. With more it is failed, and no more of them
@@ -67,8 +69,9 @@ impl Policy {
         Policy {
             pixels,
             quiet: Duration::from_secs(5),
-            pause_per_frame: Duration::from_millis(3),
+            pause_looks: 8,
             pause_cap: Duration::from_millis(500),
+            fresh: Duration::from_secs(10),
             glimpse: 32 * 1024,
             most_frames: None,
             stuck_after: Duration::from_secs(15 * 60),
@@ -137,11 +140,13 @@ pub enum Mutation {
     JoinTooEarly,
     /// An unfinished GIF is gone on with, whatever set it is of.
     TakeUpAnyCheckpoint,
+    /// A finisher leaves for any frame that the manifest shows to come, without a look whether it still is.
+    LeaveForAnyFrame,
 }
 
 impl Mutation {
     /// All of them.
-    pub const ALL: [Mutation; 10] = [
+    pub const ALL: [Mutation; 11] = [
         Mutation::SkipSecondListing,
         Mutation::ClaimBeforeCommit,
         Mutation::DropIfMatch,
@@ -152,6 +157,7 @@ impl Mutation {
         Mutation::DropGifCondition,
         Mutation::JoinTooEarly,
         Mutation::TakeUpAnyCheckpoint,
+        Mutation::LeaveForAnyFrame,
     ];
 }
 
@@ -161,16 +167,18 @@ pub(crate) struct Known {
     /// Of one that cannot be read, a blank one, which agrees with none.
     pub(crate) manifest: Manifest,
     pub(crate) etag: ETag,
+    /// When it was written.
+    pub(crate) modified: Timestamp,
     /// The document, if it cannot be read: to be set aside when it is made anew.
     pub(crate) unreadable: Option<Bytes>,
 }
 
 impl Known {
     fn of(animation: &Animation, object: Object) -> Self {
-        let Object { info, body } = object;
+        let Object { info: ObjectInfo { etag, modified, .. }, body } = object;
         match Manifest::decode(animation, &body) {
-            Ok(manifest) => Known { manifest, etag: info.etag, unreadable: None },
-            Err(_) => Known { manifest: blank(animation), etag: info.etag, unreadable: Some(body) },
+            Ok(manifest) => Known { manifest, etag, modified, unreadable: None },
+            Err(_) => Known { manifest: blank(animation), etag, modified, unreadable: Some(body) },
         }
     }
 }
@@ -194,7 +202,7 @@ pub(crate) enum Glimpse {
     /// All of it.
     Whole(Known),
     /// Its beginning; it is larger.
-    Start { beginning: Beginning, etag: ETag, size: u64 },
+    Start { beginning: Beginning, info: ObjectInfo },
 }
 
 impl From<Option<Known>> for Glimpse {
@@ -213,6 +221,24 @@ impl Glimpse {
             Glimpse::Nothing | Glimpse::Unreadable(_) => None,
             Glimpse::Whole(known) => Some(&known.manifest.head),
             Glimpse::Start { beginning, .. } => Some(&beginning.head),
+        }
+    }
+
+    /// The manifest's frames, or some of those to come.
+    pub(crate) fn frames(&self) -> &[Frame] {
+        match self {
+            Glimpse::Nothing | Glimpse::Unreadable(_) => &[],
+            Glimpse::Whole(known) => &known.manifest.frames,
+            Glimpse::Start { beginning, .. } => &beginning.awaited,
+        }
+    }
+
+    /// When the manifest was written.
+    pub(crate) fn modified(&self) -> Timestamp {
+        match self {
+            Glimpse::Nothing => Timestamp::default(),
+            Glimpse::Unreadable(known) | Glimpse::Whole(known) => known.modified,
+            Glimpse::Start { info, .. } => info.modified,
         }
     }
 
@@ -362,9 +388,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             return Ok(Some(Known::of(animation, object)).into());
         }
         match Beginning::decode(animation, &object.body) {
-            Ok(Some(beginning)) => {
-                Ok(Glimpse::Start { beginning, etag: object.info.etag, size: object.info.size })
-            }
+            Ok(Some(beginning)) => Ok(Glimpse::Start { beginning, info: object.info }),
             Ok(None) | Err(_) => Ok(self.manifest(animation).await?.into()),
         }
     }
@@ -372,21 +396,21 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     /// Whether the manifest shows the fact. Of a large one the lines are read that would; if it has been replaced since,
     /// it does not.
     pub(crate) async fn shows(&self, animation: &Animation, glimpse: &Glimpse, fact: &Fact) -> Result<bool> {
-        let (beginning, etag, size) = match glimpse {
+        let (beginning, info) = match glimpse {
             Glimpse::Nothing | Glimpse::Unreadable(_) => return Ok(false),
             Glimpse::Whole(known) => return Ok(known.manifest.shows(fact)),
-            Glimpse::Start { beginning, etag, size } => (beginning, etag, *size),
+            Glimpse::Start { beginning, info } => (beginning, info),
         };
         let Some((name, part)) = fact.subject() else {
             return Ok(fact.is_shown_by(&beginning.head, &[]));
         };
-        let (key, range) = (animation.manifest(), beginning.lines_of(name, part, size));
+        let (key, range) = (animation.manifest(), beginning.lines_of(name, part, info.size));
         let Some(lines) = found(self.persist(|| self.store.get_range(&key, range.clone())).await)? else {
             return Ok(false);
         };
         // Lines that cannot be read show nothing.
         let frames = frames_of(animation, &lines.body).unwrap_or_default();
-        Ok(lines.info.etag == *etag && fact.is_shown_by(&beginning.head, &frames))
+        Ok(lines.info.etag == info.etag && fact.is_shown_by(&beginning.head, &frames))
     }
 
     /// Whether this invocation, or an earlier attempt at the same event, wrote the manifest.
@@ -394,12 +418,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         head.writer == self.request_id
     }
 
-    /// Waits a random time that is the longer the more frames are to come.
-    pub(crate) async fn pause(&self, head: Option<&Head>) {
-        let most = head.map_or(self.policy.pause_cap, |head| {
-            let missing = u32::try_from(head.missing()).unwrap_or(u32::MAX);
-            self.policy.pause_per_frame.saturating_mul(missing).min(self.policy.pause_cap)
-        });
+    /// Waits a random time that is the longer the longer a look at the manifest takes.
+    pub(crate) async fn pause(&self, look: Duration) {
+        let most = look.saturating_mul(self.policy.pause_looks).min(self.policy.pause_cap);
         self.clock.sleep(self.random.up_to(most)).await;
     }
 

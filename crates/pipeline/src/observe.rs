@@ -346,6 +346,31 @@ pub(crate) enum Standing {
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
+    /// Whether there is a frame of a script's version, or of a part of it, an error, or a split.
+    pub(crate) async fn has_result(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        version: &ETag,
+        part: Part,
+    ) -> Result<bool> {
+        let has_receipt = async {
+            let receipts = self.receipts_of(animation, name, version, part).await?;
+            Ok(standing(&receipts, part).is_some())
+        };
+        if part.is_none() {
+            return has_receipt.await;
+        }
+        // Of parts only those of this renderer's pixels are looked for; where another one has drawn some it may be among them.
+        let frames = animation.frames();
+        let own = Tag { version: version.clone(), pixels: self.policy.pixels };
+        let own = format!("{frames}{name}@{own}/");
+        let level = ListRequest::level(format!("{frames}{}", Tag::receipts_of(name, version)));
+        let level = Listing::read(level, None, |request| self.list(request));
+        let (has_receipt, level) = try_join(has_receipt, level).await?;
+        Ok(has_receipt || level.prefixes.iter().any(|folder| *folder != own))
+    }
+
     /// What there is of a script's version, or of a part of it: one request, unless it is cut into very many bands.
     pub(crate) async fn receipts_of(
         &self,

@@ -505,13 +505,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let Subject { animation, name, .. } = subject;
         let start = self.clock.now();
         let known = self.manifest(&animation).await?;
+        let look = self.clock.now().since(start);
         let pending = known.as_ref().and_then(|known| known.manifest.pending_parts(&name, &tag.version));
         if !pending.is_some_and(|pending| pending.is_empty()) {
             self.wake_lost_parts(&animation, &name, &tag, count, uploaded).await?;
         }
         let fact = Fact::Split(name.clone(), tag.version);
-        let glimpse = Glimpse::from(known);
-        let folded = self.fold_from(&animation, &fact, Age::Old, glimpse).await?;
+        let folded = self.fold_from(&animation, &fact, Age::Old, (Glimpse::from(known), look)).await?;
         stages.fold = self.clock.now().since(start);
         Ok(Rendered { animation, script: Some(name), outcome: Outcome::Present, folded, stages })
     }

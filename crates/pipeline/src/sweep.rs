@@ -4,14 +4,14 @@
 //! It visits every animation that has a script or a manifest, finished or not, and compares the manifest and the GIF
 //! with a listing. It wakes pending frames of an animation in which nothing has happened for a while, by objects below
 //! `retries/`, gives a frame up with an error receipt after a bounded number of wakings, claims wherever manifest or
-//! GIF differ from the listing, and deletes what has long been superseded. It never writes below `scripts/`.
+//! GIF differ from the listing, and deletes what has long been superseded or set aside. It never writes below `scripts/`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroU64;
 
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 
-use crate::assemble::{Due, due};
+use crate::assemble::{Due, due, new_gif};
 use crate::invocation::{Invocation, Known};
 use crate::keys::{Animation, Key, MANIFESTS, Part, Receipt, SCRIPTS, ScriptName, Tag};
 use crate::manifest::{Fault, Frame, FrameState, Manifest, Reason, Status};
@@ -31,6 +31,8 @@ pub struct Swept {
     pub visits: Vec<(Animation, Result<Visit>)>,
     /// Keys below `scripts/` that are meant as scripts but belong to no animation, with what is wrong with them.
     pub rejected: Vec<(String, &'static str)>,
+    /// Old manifests, set aside because they could not be read, that were deleted.
+    pub cleared: u64,
     /// Animations that there was no time left for.
     pub unvisited: usize,
 }
@@ -76,6 +78,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     async fn sweep(&self) -> Result<Swept> {
         let mut swept = Swept::default();
         let mut animations = BTreeSet::new();
+        let mut set_aside = Vec::new();
         for prefix in [SCRIPTS, MANIFESTS] {
             for listed in self.list_ranges(ListRequest::all(prefix), Vec::new()).await? {
                 match listed.key.parse::<Key>() {
@@ -86,6 +89,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                     ) => {
                         animations.insert(animation);
                     }
+                    Ok(Key::SetAside { .. }) if self.is_old(listed.modified) => set_aside.push(listed.key),
                     Err(Error::Key { problem, .. }) if listed.key.ends_with(".txt") => {
                         match listed.key[prefix.len()..]
                             .rsplit_once('/')
@@ -99,6 +103,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 }
             }
         }
+        let deletions: Vec<_> = set_aside.iter().map(|key| self.delete(key)).collect();
+        swept.cleared = deletions.len() as u64;
+        stream::iter(deletions).buffer_unordered(self.policy.concurrency).try_collect::<Vec<()>>().await?;
         let mut animations: Vec<Animation> = animations.into_iter().collect();
         // If the time is too short for all, it is not always the same ones that wait.
         let start = self.random.below(animations.len() as u64);
@@ -132,7 +139,10 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let is_healed = self.heal_receipts(animation, &observation, &mut visit).await?;
         let head = &observation.manifest.head;
         let stands = known.as_ref().filter(|known| known.manifest.agrees_with(&observation.manifest));
-        let is_right = stands.is_some_and(|known| due(&known.manifest.head, gif.as_ref()) == Due::Nothing);
+        // A GIF that nobody has named could be cut off unnoticed.
+        let is_right = stands.map(|known| &known.manifest.head).is_some_and(|head| {
+            due(head, gif.as_ref()) == Due::Nothing && new_gif(head, gif.as_ref()).is_none()
+        });
         let nothing_at_all = known.is_none() && head.status == Status::Empty && gif.is_none();
         if (!is_right || is_healed || visit.given_up > 0) && !nothing_at_all {
             self.claim(&claimable(&observation.manifest, known.as_ref())).await?;
@@ -140,6 +150,11 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
         self.tidy(animation, &observation, &mut visit).await?;
         Ok(visit)
+    }
+
+    /// Whether what nobody needs any more is old enough to go.
+    fn is_old(&self, modified: Timestamp) -> bool {
+        self.clock.now().since(modified) >= self.policy.superseded_after
     }
 
     /// Wakes what is pending, or gives it up.
@@ -272,7 +287,6 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
 
     /// Deletes results of versions that are no longer current, once they are old, and the parts that led to them.
     async fn tidy(&self, animation: &Animation, observation: &Observation, visit: &mut Visit) -> Result<()> {
-        let now = self.clock.now();
         let current: BTreeMap<&ScriptName, &ETag> =
             observation.scripts.found.iter().map(|script| (&script.name, &script.version)).collect();
         let used = used_pixels(&observation.manifest);
@@ -290,7 +304,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 None => false,
             },
         };
-        let old = |modified: Timestamp| now.since(modified) >= self.policy.superseded_after;
+        let old = |modified: Timestamp| self.is_old(modified);
         let mut doomed: Vec<Key> = Vec::new();
         let mut split_before = false;
         // Bands have done what they were for once their frame is there.

@@ -78,26 +78,13 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         args.folder.is_dir() || !args.folder.exists(),
         Usage(format!("{} is a file: expected a folder of scripts", args.folder.display()))
     );
-    let animation = match &args.name {
-        Some(name) => name.clone(),
-        None => name_of(&args.folder)?,
-    };
-    let last = animation.as_str().rsplit('/').next().unwrap_or_default();
-    let output = args.output.clone().unwrap_or_else(|| format!("{last}.gif").into());
-    if !args.no_wait && !args.dry_run {
-        must_be_gif(&output)?;
-        probe(&output)?;
-    }
     let limits = Limits { max_pixels: args.max_pixels, ..Limits::default() };
-    let input = Input::animation(std::slice::from_ref(&args.folder), &limits)?;
-    let plan = match Plan::new(&input, &limits, &Wishes::default(), console)? {
-        Ok(plan) => plan,
-        Err(faults) => anyhow::bail!("nothing was uploaded: {}", faults.count()),
-    };
-    plan.one_size().map_err(|error| anyhow::anyhow!("{error}: give their scripts the same Screen"))?;
-    let mut submission = submission(&input, &plan, &animation, console)?;
+    let is_fetched = !args.no_wait && !args.dry_run;
+    let order =
+        Order::new(&args.folder, args.name.as_ref(), args.output.as_deref(), is_fetched, &limits, console)?;
     with_bucket(&args.bucket, async |client| {
         let bucket = &args.bucket.bucket;
+        let Order { animation, mut submission, output } = order;
         if args.dry_run {
             return preview(client, &submission, bucket, console).await;
         }
@@ -119,17 +106,68 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
             ));
             return Ok(Outcome::Done);
         }
-        if let Ended::Failed(manifest) = wait(client, &animation, &submitted, console).await? {
-            report::show_faults(&manifest, console);
-            anyhow::bail!(
-                "{animation} is {} ({}); rayfold retry {animation} tries again what is not the scripts' fault",
-                manifest.head.status,
-                report::count(&manifest)
-            );
+        if let Some(why) = wait(client, &animation, &submitted, console).await? {
+            anyhow::bail!("{why}; rayfold retry {animation} tries again what is not the scripts' fault");
         }
         fetch::gif(client, &animation, &output, &args.bucket, console).await?;
         Ok(Outcome::Done)
     })
+}
+
+/// A folder that is to become an animation in a bucket, read and checked.
+pub(crate) struct Order {
+    animation: Animation,
+    submission: Submission,
+    /// Where the GIF goes.
+    output: PathBuf,
+}
+
+impl Order {
+    /// Without a name it has the folder's, without an output the name with .gif; the output is probed if it `is_fetched`.
+    ///
+    /// # Errors
+    /// When a script is faulty, the frames are of unlike sizes, or the GIF cannot be written there.
+    pub(crate) fn new(
+        folder: &PathBuf,
+        name: Option<&Animation>,
+        output: Option<&Path>,
+        is_fetched: bool,
+        limits: &Limits,
+        console: &Console,
+    ) -> anyhow::Result<Self> {
+        let animation = name.cloned().map_or_else(|| name_of(folder), Ok)?;
+        let last = animation.as_str().rsplit('/').next().unwrap_or_default();
+        let output = output.map_or_else(|| format!("{last}.gif").into(), Path::to_path_buf);
+        if is_fetched {
+            must_be_gif(&output)?;
+            probe(&output)?;
+        }
+        let input = Input::animation(std::slice::from_ref(folder), limits)?;
+        let plan = match Plan::new(&input, limits, &Wishes::default(), console)? {
+            Ok(plan) => plan,
+            Err(faults) => anyhow::bail!("nothing was uploaded: {}", faults.count()),
+        };
+        plan.one_size().map_err(|error| anyhow::anyhow!("{error}: give their scripts the same Screen"))?;
+        let submission = submission(&input, &plan, &animation, console)?;
+        Ok(Self { animation, submission, output })
+    }
+
+    /// Sends it to a bucket that has nothing yet, waits, and downloads the GIF.
+    ///
+    /// # Errors
+    /// When there is no GIF of it, or the bucket cannot be used.
+    pub(crate) async fn deliver(
+        &self,
+        client: Client<'_>,
+        bucket: &BucketArgs,
+        console: &Console,
+    ) -> anyhow::Result<()> {
+        let submitted = send(client, &self.submission, &bucket.bucket, console).await?;
+        if let Some(why) = wait(client, &self.animation, &submitted, console).await? {
+            anyhow::bail!("{why}");
+        }
+        fetch::gif(client, &self.animation, &self.output, bucket, console).await
+    }
 }
 
 fn name_of(folder: &Path) -> anyhow::Result<Animation> {
@@ -249,13 +287,13 @@ async fn send(
     client.submit(submission, told).await
 }
 
-/// Waits until what was uploaded has become a GIF or cannot, and tells how far that is.
+/// Waits until what was uploaded has become a GIF or cannot, and tells how far that is; says why if there is none.
 async fn wait(
     client: Client<'_>,
     animation: &Animation,
     submitted: &Submitted,
     console: &Console,
-) -> anyhow::Result<Ended> {
+) -> anyhow::Result<Option<String>> {
     let mut progress: Option<Progress> = None;
     let told = |waiting| match waiting {
         Waiting::Frames { done, total } => {
@@ -268,5 +306,7 @@ async fn wait(
             quiet.as_secs()
         )),
     };
-    Ok(client.wait(animation, submitted, told).await?)
+    let Ended::Failed(manifest) = client.wait(animation, submitted, told).await? else { return Ok(None) };
+    report::show_faults(&manifest, console);
+    Ok(Some(format!("{animation} is {} ({})", manifest.head.status, report::count(&manifest))))
 }

@@ -22,11 +22,19 @@ pub(crate) struct News<'a> {
     changed: BTreeSet<Animation>,
     told: Vec<(Animation, String)>,
     next: Instant,
+    /// Whether only what goes wrong is told.
+    is_brief: bool,
 }
 
 impl<'a> News<'a> {
     pub(crate) fn new(console: &'a Console, store: &'a S3Store) -> Self {
-        Self { console, store, changed: BTreeSet::new(), told: Vec::new(), next: Instant::now() }
+        let (changed, told, next) = (BTreeSet::new(), Vec::new(), Instant::now());
+        Self { console, store, changed, told, next, is_brief: false }
+    }
+
+    /// Tells only what goes wrong: how far an animation is somebody else tells.
+    pub(crate) fn brief(console: &'a Console, store: &'a S3Store) -> Self {
+        Self { is_brief: true, ..Self::new(console, store) }
     }
 
     /// Returns when it is time to look at what has changed; never while nothing has.
@@ -69,6 +77,7 @@ impl<'a> News<'a> {
             self.changed.insert(animation);
         }
         match text("message") {
+            "rendered" | "assembled" if self.is_brief => {}
             "rendered" => {
                 let frame = if text("frame").is_empty() { SETTINGS_FILE } else { text("frame") };
                 let took = line["draw_ms"].as_u64().filter(|_| text("outcome") == "drawn");

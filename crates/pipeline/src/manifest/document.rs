@@ -9,12 +9,16 @@ use std::ops::Range;
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 
-use super::{Frame, Head, Manifest, SCHEMA};
+use super::{Frame, FrameState, Head, Manifest, SCHEMA};
 use crate::keys::{Animation, Part, ScriptName};
 use crate::{Error, Result};
 
 /// The second line, after which the frames follow.
 const FRAMES: &str = "\"frames\":[\n";
+
+/// The most frames to come that a large manifest tells at its beginning, if they take no more than an eighth of what a
+/// reader begins with.
+const MOST_AWAITED: usize = 32;
 
 /// The most places that a manifest tells: with them its head does not grow with the number of frames.
 const MOST_PLACES: usize = 200;
@@ -37,6 +41,8 @@ pub(crate) struct Beginning {
     /// All but the frames.
     pub(crate) head: Head,
     places: Vec<Place>,
+    /// Some of the frames to come.
+    pub(crate) awaited: Vec<Frame>,
     frames_at: u64,
 }
 
@@ -46,6 +52,8 @@ struct FirstLine<'a> {
     head: &'a Head,
     #[serde(skip_serializing_if = "<[Place]>::is_empty")]
     places: &'a [Place],
+    #[serde(skip_serializing_if = "<[&Frame]>::is_empty")]
+    awaited: &'a [&'a Frame],
 }
 
 #[derive(Deserialize)]
@@ -53,11 +61,13 @@ struct Places {
     schema: u32,
     #[serde(default)]
     places: Vec<Place>,
+    #[serde(default)]
+    awaited: Vec<Frame>,
 }
 
 impl Manifest {
     /// The document. If its frames take more than half of `glimpse`, the bytes that a reader begins with, the head tells
-    /// places, at least an eighth of it apart.
+    /// places, at least an eighth of it apart, and some frames to come.
     ///
     /// # Errors
     ///
@@ -74,15 +84,25 @@ impl Manifest {
         }
         let length = lines.len() as u64;
         let apart = (glimpse / 8).max(length / MOST_PLACES as u64 + 1);
-        let mut places: Vec<Place> = Vec::new();
+        let (mut places, mut awaited): (Vec<Place>, Vec<&Frame>) = Default::default();
         if length > glimpse / 2 {
+            let ends = starts.iter().skip(1).chain([&length]);
+            let lines = self.frames.iter().zip(starts.iter().zip(ends));
+            let pending: Vec<_> = lines.filter(|(frame, _)| frame.state == FrameState::Pending).collect();
+            let (step, mut bytes) = (pending.len().div_ceil(MOST_AWAITED).max(1), 0);
+            for (frame, (start, end)) in pending.into_iter().step_by(step) {
+                bytes += end - start;
+                if bytes <= glimpse / 8 {
+                    awaited.push(frame);
+                }
+            }
             for (frame, &at) in self.frames.iter().zip(&starts) {
                 if places.last().is_none_or(|last| at >= last.at + apart) {
                     places.push(Place { script: frame.script.clone(), part: frame.part, at });
                 }
             }
         }
-        let first = FirstLine { head: &self.head, places: &places };
+        let first = FirstLine { head: &self.head, places: &places, awaited: &awaited };
         let mut text = serde_json::to_string(&first).map_err(malformed)?;
         text.pop();
         text.push_str(",\n");
@@ -130,7 +150,7 @@ impl Beginning {
             return Err(malformed("the first line is not a manifest's".into()));
         };
         let line = [line, b"}"].concat();
-        let Places { schema, places } =
+        let Places { schema, places, awaited } =
             serde_json::from_slice(&line).map_err(|source| malformed(source.into()))?;
         if schema > SCHEMA {
             return Err(malformed(format!("schema {schema} is newer than {SCHEMA}").into()));
@@ -142,7 +162,7 @@ impl Beginning {
         if head.revision > LAST_REVISION {
             return Err(malformed(format!("revision {} is beyond {LAST_REVISION}", head.revision).into()));
         }
-        Ok(Some(Beginning { head, places, frames_at: frames_at as u64 }))
+        Ok(Some(Beginning { head, places, awaited, frames_at: frames_at as u64 }))
     }
 
     /// The bytes in which the lines about a script's frame are, if there are any, in a document of `size` bytes; without a
@@ -180,7 +200,7 @@ pub(crate) fn frames_of(animation: &Animation, lines: &[u8]) -> Result<Vec<Frame
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::manifest::{FrameState, Settings, part};
+    use crate::manifest::{Settings, part};
     use crate::reconcile::{Results, ScriptFound, Scripts, reconcile};
     use crate::store::ETag;
 
@@ -214,6 +234,26 @@ mod tests {
                 serde_json::from_slice::<serde_json::Value>(&body).expect("the whole is one JSON document");
             }
         }
+    }
+
+    /// Spread over all of them, and never so many that the head does not fit what is read at first.
+    #[test]
+    fn the_beginning_of_a_large_document_tells_some_frames_to_come() {
+        let manifest = manifest(60);
+        let animation = &manifest.head.animation;
+        let pending = manifest.frames.len();
+        for (glimpse, told) in [(1, 0..=0), (2_000, 2..=5), (16_000, 18..=30), (1 << 20, 0..=0)] {
+            let body = manifest.encode(glimpse).unwrap();
+            let awaited = Beginning::decode(animation, &body).unwrap().unwrap().awaited;
+            assert!(told.contains(&awaited.len()), "{glimpse}: {} of {pending}", awaited.len());
+            assert!(awaited.iter().all(|frame| manifest.frames.contains(frame)), "{glimpse}");
+        }
+        let mut manifest = manifest;
+        for frame in &mut manifest.frames {
+            frame.state = FrameState::Done { pixels: 1 };
+        }
+        let body = manifest.encode(16_000).unwrap();
+        assert!(Beginning::decode(&manifest.head.animation, &body).unwrap().unwrap().awaited.is_empty());
     }
 
     #[test]

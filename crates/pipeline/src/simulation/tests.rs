@@ -35,6 +35,7 @@ fn broken_rules_are_noticed_by_seeds() {
         (Mutation::NeverClaim, 20),
         (Mutation::JoinTooEarly, 20),
         (Mutation::TakeUpAnyCheckpoint, 300),
+        (Mutation::LeaveForAnyFrame, 300),
     ] {
         let noticed = (0..seeds).find_map(|seed| run(seed, Some(rule)).err());
         println!("{rule:?}: {}", noticed.unwrap_or_else(|| panic!("{rule:?}")));
@@ -73,7 +74,7 @@ fn functions_do_only_what_their_permissions_say() {
     seen.retain(|permission| !permission.starts_with("User"));
     let table = "
         Render: scripts/ List Get, parts/ List Get Put, frames/ List Get Put, manifests/ Get Put, assemblies/ Put
-        Assemble: scripts/ List Get, parts/ List Delete, frames/ List Get Put Delete, manifests/ List Get Put,
+        Assemble: scripts/ List Get, parts/ List Delete, frames/ List Get Put Delete, manifests/ List Get Put Delete,
             assemblies/ Put, retries/ List Put, animations/ Get Put Delete, checkpoints/ Get Put Delete";
     let mut expected = std::collections::BTreeSet::new();
     for function in ["Render", "Assemble"] {
@@ -206,4 +207,18 @@ fn many_frames_on_as_many_invocations() {
 #[test]
 fn more_frames_than_a_page_on_fewer_invocations() {
     scaled(1_100, 150, 12.0);
+}
+
+/// 299 frames of 8 x 8 pixels took 33 s on two places, for finishers paused on them, and 2,000 took 17 requests each.
+#[test]
+fn on_few_places_nobody_waits_for_a_crowd() {
+    for (frames, places) in [(50, 1), (300, 1), (300, 2), (1_000, 4), (1_000, 16)] {
+        let scale = Scale { draw_ms: (1, 5), ..Scale::unlimited(frames, places, 1) };
+        let report = measure(scale).unwrap();
+        println!("{frames} frames, {places} at once: {report:?}");
+        assert!(report.requests_a_frame <= 8.0, "{report:?}");
+        // Six requests one after the other, of which two go side by side.
+        assert!(report.beyond_drawing <= Duration::from_millis(180), "{report:?}");
+        assert!(report.tail <= Duration::from_secs(1) && report.idle <= 4, "{report:?}");
+    }
 }

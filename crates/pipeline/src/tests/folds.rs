@@ -1,7 +1,7 @@
 //! When a fold leaves, waits, lists, writes and claims, by the requests that it sends.
 
 use super::*;
-use crate::fold::{Age, Folded, fold};
+use crate::fold::{Age, Folded};
 use crate::manifest::Fact;
 
 const MANIFEST: &str = "manifests/film.json";
@@ -217,56 +217,153 @@ async fn a_manifest_that_somebody_else_has_just_written_is_not_written_over() {
     assert_eq!((head.total, head.revision), (2, 3));
 }
 
-/// Of 1,000 frames: one in four of those who have seen nobody write, and after one more pause everyone.
+/// What a finisher does of whom another frame's result is `to come`: its fold, and its requests.
+async fn finishes(world: &World) -> (Folded, Vec<String>) {
+    let requests = Arc::new(Mutex::new(Vec::new()));
+    let noted = requests.clone();
+    world.refuse(move |asked| {
+        noted.lock().unwrap().push(asked.to_owned());
+        None
+    });
+    let folded = world.try_render("scripts/film/2.txt").await.unwrap().folded;
+    world.refuse(|_| None);
+    let requests = std::mem::take(&mut *requests.lock().unwrap());
+    (folded, requests)
+}
+
+/// Three scripts; the manifest shows that the first is drawn.
+async fn one_of_three() -> World {
+    let world = World::new();
+    for number in 1..=3 {
+        world.put(&format!("scripts/film/{number}.txt"), &format!("frame {number}"));
+    }
+    assert_eq!(world.try_render(SCRIPT).await.unwrap().folded, Folded::Committed);
+    assert_eq!(world.manifest().head.done, 1);
+    world
+}
+
+/// Each wrote a manifest, and listed all for it: 15 to 17 requests a frame with two places.
 #[tokio::test]
-async fn where_a_listing_is_dear_few_list_at_first_and_all_soon() {
-    let mut world = World::new();
-    for number in 0..1_000 {
-        world.put(&format!("scripts/film/{number}.txt"), "hang 1");
+async fn a_finisher_leaves_while_another_frame_is_to_come_and_the_last_one_lists() {
+    let world = one_of_three().await;
+    let version = world.put("scripts/film/3.txt", "frame 3");
+    let (folded, requests) = finishes(&world).await;
+    assert_eq!(folded, Folded::Awaited);
+    let looks = [
+        "get manifests/film.json".to_owned(),
+        "head scripts/film/3.txt".to_owned(),
+        format!("list frames/film/3@{version}-p"),
+    ];
+    assert_eq!(requests[3..], looks);
+    assert_eq!((world.manifest().head.done, world.manifest().head.revision), (1, 1));
+    assert_eq!(world.try_render("scripts/film/3.txt").await.unwrap().folded, Folded::Claimed);
+    assert_eq!((world.manifest().head.done, world.manifest().head.revision), (3, 2));
+}
+
+/// Whoever draws it has looked already, or draws another version, or nobody does.
+#[tokio::test]
+async fn a_frame_that_is_there_or_is_no_longer_current_is_left_for_by_nobody() {
+    for (key, text) in [
+        ("frames/film/3@{}-p1.png", Some("drawn")),
+        ("frames/film/3@{}-p2.png", Some("drawn by another renderer")),
+        ("frames/film/3@{}-p1.error.json", Some("{\"message\":\"why\"}")),
+        ("frames/film/3@{}-p1.split-2", Some("")),
+        ("scripts/film/3.txt", Some("frame 4")),
+        ("scripts/film/3.txt", None),
+    ] {
+        let world = one_of_three().await;
+        let version = world.put("scripts/film/3.txt", "frame 3");
+        let key = key.replace("{}", version.as_str());
+        match text {
+            Some(text) => drop(world.put(&key, text)),
+            None => drop(world.store.bucket.lock().unwrap().delete(&key)),
+        }
+        assert_ne!(finishes(&world).await.0, Folded::Awaited, "{key} {text:?}");
+        let manifest = world.manifest();
+        let is_done = manifest
+            .frames
+            .iter()
+            .any(|frame| frame.script.as_str() == "2" && matches!(frame.state, FrameState::Done { .. }));
+        assert!(is_done, "{key} {text:?}");
     }
-    world.fold(&Fact::Fold, Age::Old).await;
-    let mut pauses = [0; 4];
-    for seed in 0..32 {
-        world.random = Randomness::seeded(seed);
-        let looks = Arc::new(AtomicU64::new(0));
-        let counter = looks.clone();
-        world.refuse(move |asked| {
-            counter.fetch_add(u64::from(asked == "get manifests/film.json"), Ordering::Relaxed);
-            asked.starts_with("list ").then(|| Error::Refused { key: "k".into(), source: "no".into() })
-        });
-        let folded = world.with(async |invocation| fold(invocation, &World::film()).await).await;
-        assert!(matches!(folded, Err(Error::Refused { .. })), "{folded:?}");
-        // The first look is before the first pause; a large manifest is read whole at last.
-        pauses[looks.load(Ordering::Relaxed) as usize - 2] += 1;
+}
+
+/// A part's receipts are looked for with this renderer's pixels alone: another one may have drawn it.
+#[tokio::test]
+async fn a_part_that_another_renderer_may_have_drawn_is_left_for_by_nobody() {
+    for (other, folded) in
+        [(None, Folded::Awaited), (Some("p1"), Folded::Awaited), (Some("p2"), Folded::Committed)]
+    {
+        let world = World::new();
+        world.upload("1.txt", "split 3 1").await;
+        let version = world.store.bucket.lock().unwrap().head(SCRIPT).unwrap().etag;
+        if let Some(pixels) = other {
+            world.put(&format!("frames/film/1@{version}-{pixels}/1.png"), "drawn");
+        }
+        let part = format!("parts/film/1@{version}-p1/2.json");
+        let seen = world.try_render(&part).await.unwrap().folded;
+        // With the first one there the lot may fall on that.
+        assert!(seen == folded || other == Some("p1"), "{other:?}: {seen:?}");
     }
-    // 8 and 24 are to be expected, and whether the manifest is read whole is the same for all.
-    let seen: Vec<u32> = pauses.into_iter().filter(|count| *count > 0).collect();
-    assert!(seen.len() == 2 && (3..14).contains(&seen[0]), "{pauses:?}");
+}
+
+/// Settings, deletions and splits change what people wait for.
+#[tokio::test]
+async fn what_is_no_frames_result_is_written_down_whatever_is_to_come() {
+    for (key, text) in [
+        ("scripts/film/animation.json", Some("{\"fps\": 20}")),
+        ("scripts/film/2.txt", None),
+        ("scripts/film/2.txt", Some("split 2 1")),
+    ] {
+        let world = one_of_three().await;
+        match text {
+            Some(text) => drop(world.put(key, text)),
+            None => drop(world.store.bucket.lock().unwrap().delete(key)),
+        }
+        assert_eq!(world.try_render(key).await.unwrap().folded, Folded::Committed, "{key} {text:?}");
+        assert_eq!(world.manifest().head.revision, 2);
+    }
+}
+
+/// People want to see how far it is.
+#[tokio::test]
+async fn a_manifest_that_is_old_is_written_anew_whatever_is_to_come() {
+    for (seconds, folded) in [(9, Folded::Awaited), (10, Folded::Committed)] {
+        let world = one_of_three().await;
+        world.later(Duration::from_secs(seconds)).await;
+        assert_eq!(finishes(&world).await.0, folded, "{seconds} s");
+    }
+}
+
+/// The manifest's first bytes do for that.
+#[tokio::test]
+async fn a_finisher_of_a_large_animation_sends_six_requests() {
+    let world = World::new();
+    for number in 1..=1_000 {
+        world.put(&format!("scripts/film/{number}.txt"), "frame 1");
+    }
+    world.render(SCRIPT).await;
+    let (folded, requests) = finishes(&world).await;
+    assert_eq!((folded, requests.len()), (Folded::Awaited, 6), "{requests:?}");
 }
 
 #[tokio::test]
-async fn the_pause_is_the_longer_the_more_frames_are_to_come() {
+async fn the_pause_is_the_longer_the_longer_a_look_takes() {
     let mut world = World::new();
-    world.put("scripts/film/animation.json", r#"{"frames": 10}"#);
-    for (file, text, most) in [("1.txt", "frame 1", 500), ("2.txt", "frame 2", 27), ("3.txt", "frame 3", 24)]
-    {
+    for (look, most) in [(0, 0), (3, 24), (20, 160), (1_000, 500)] {
         let mut longest = Duration::ZERO;
-        let key = format!("scripts/film/{file}");
-        world.put(&key, text);
         for seed in 0..30 {
             world.random = Randomness::seeded(seed);
             world
                 .with(async |invocation| {
-                    let known = invocation.manifest(&World::film()).await.unwrap();
                     let before = world.store.clock.now();
-                    invocation.pause(known.as_ref().map(|known| &known.manifest.head)).await;
+                    invocation.pause(Duration::from_millis(look)).await;
                     longest = longest.max(world.store.clock.now().since(before));
                 })
                 .await;
         }
         let most = Duration::from_millis(most);
-        assert!(longest > most / 2 && longest <= most, "{file}: {longest:?}");
-        world.render(&key).await;
+        assert!(longest >= most / 2 && longest <= most, "{look}: {longest:?}");
     }
 }
 

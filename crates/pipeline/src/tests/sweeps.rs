@@ -75,7 +75,10 @@ async fn a_claim_is_put_where_manifest_or_gif_are_not_as_they_should_be() {
     assert!(claimed(&world).await, "no GIF");
     world.put_gif("another");
     assert!(claimed(&world).await, "another set's GIF");
-    world.put_gif(world.manifest().head.generation.as_str());
+    let (generation, claim) = (world.manifest().head.generation, world.keys("assemblies/").remove(0));
+    world.put_gif(generation.as_str());
+    assert!(claimed(&world).await, "a GIF of this set that nobody has named");
+    assert_eq!(world.assemble(&world.joiner(), &claim).await.unwrap().built, 0);
     assert_eq!(world.visit().await, Visit::default(), "all is right");
     world.put("scripts/film/2.txt", "frame 2");
     assert!(claimed(&world).await, "a script that the manifest does not show");
@@ -475,6 +478,40 @@ async fn a_claim_is_put_where_the_gif_is_not_the_one_that_was_built() {
     assert_eq!(world.visit().await, Visit::default());
     world.put_gif(world.manifest().head.generation.as_str());
     assert!(world.visit().await.claimed);
+}
+
+/// Its assembler died when it had put it; the manifest named that of an older set, and what was cut off later stayed.
+#[tokio::test]
+async fn a_gif_that_a_dead_assembler_has_put_is_named_so_that_one_in_its_place_is_noticed() {
+    let world = World::new();
+    let claim = world.announced(1).await;
+    world.assemble(&world.joiner(), &claim).await.unwrap();
+    world.upload("1.txt", "another frame").await;
+    world.put_gif(world.manifest().head.generation.as_str());
+    assert_ne!(world.manifest().head.gif.unwrap().generation, world.manifest().head.generation);
+    assert!(world.visit().await.claimed);
+    world.assemble(&world.joiner(), &claim).await.unwrap();
+    assert_eq!(world.visit().await, Visit::default());
+    let cut_off = world.manifest().head.generation;
+    world.put_gif(cut_off.as_str());
+    world.put("animations/film.gif", "");
+    assert!(world.visit().await.claimed);
+}
+
+/// They stayed for ever.
+#[tokio::test]
+async fn a_manifest_that_was_set_aside_goes_after_a_week() {
+    let world = World::new();
+    world.put(SCRIPT, "frame 1");
+    world.put("manifests/film.json", "garbage");
+    world.render(SCRIPT).await;
+    let [aside] = world.keys("manifests/film.json~").try_into().unwrap();
+    for (age, left) in [(DAY * 7 - MOMENT, 1), (DAY * 7, 0)] {
+        world.until(&aside, age).await;
+        assert_eq!(world.sweep().await.cleared, 1 - left as u64);
+        assert_eq!(world.keys("manifests/film.json~").len(), left);
+    }
+    assert_eq!(world.manifest().head.total, 1);
 }
 
 /// A refusal does not change the set.

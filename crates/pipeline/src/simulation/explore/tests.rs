@@ -88,6 +88,12 @@ fn frames_put_together_too_early_are_noticed() {
     notices(Mutation::JoinTooEarly, "a frame in bands", 20_000);
 }
 
+/// Two whose frames the manifest shows to come left for each other.
+#[test]
+fn leaving_for_a_frame_that_is_there_is_noticed() {
+    notices(Mutation::LeaveForAnyFrame, "two frames, announced last", 20_000);
+}
+
 /// The GIF of an assembler that was killed landed on that of its successor, which knew newer scripts.
 #[test]
 fn unconditional_gifs_are_noticed() {
@@ -123,7 +129,7 @@ fn schedules_find_nothing_where_all_rules_hold() {
 #[test]
 fn rules_that_few_schedules_notice_are_noticed() {
     let worlds = provoking();
-    for (rule, seed) in [(Mutation::ClaimBeforeCommit, 32), (Mutation::DropGifCondition, 13)] {
+    for (rule, seed) in [(Mutation::ClaimBeforeCommit, 16), (Mutation::DropGifCondition, 119)] {
         let found = provoke(&worlds, seed, Some(rule)).expect_err("a broken rule is noticed");
         println!("{rule:?}: {found}");
         provoke(&worlds, seed, None).unwrap_or_else(|found| panic!("seed {seed}: {found}"));

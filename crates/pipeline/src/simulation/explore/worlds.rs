@@ -92,6 +92,9 @@ pub fn worlds() -> Vec<World> {
     let refilled = [("1.txt", A), ("1.txt", GONE), ("1.txt", B)];
     let joined = [("1.txt", A), ("2.txt", A), ("1.txt", B)];
     let announced = [("animation.json", Some("{\"frames\": 2}")), ("1.txt", A), ("2.txt", A)];
+    let announced_last = [("1.txt", A), ("2.txt", A), ("animation.json", Some("{\"frames\": 2}"))];
+    let returning_early = [("1.txt", A), ("2.txt", A), ("2.txt", B), ("2.txt", A)];
+    let deleted_early = [("1.txt", A), ("2.txt", A), ("3.txt", A), ("3.txt", GONE)];
     vec![
         world("one frame, a kill", 0, kill, &one),
         world("one frame, a kill and a late write", 0, late, &one),
@@ -130,6 +133,13 @@ pub fn worlds() -> Vec<World> {
         world("one frame, deleted and uploaded again when done", 1, CALM, &refilled),
         world("three frames, the last one new", 2, kill, &three),
         world("three frames", 1, CALM, &three),
+        world("three frames at once", 0, CALM, &three),
+        world("three frames at once, a kill", 0, kill, &three),
+        world("two frames, announced last", 0, CALM, &announced_last),
+        world("two frames, announced last, a kill", 0, kill, &announced_last),
+        world("two frames, announced last, a lost answer", 0, loss, &announced_last),
+        world("two frames, one changed and changed back", 0, CALM, &returning_early),
+        world("three frames, one deleted before it is drawn", 0, CALM, &deleted_early),
         world("a frame in bands", 0, CALM, &big),
         world("a frame in bands, a kill", 0, kill, &big),
         world("a frame in bands, a kill and a late write", 0, late, &big),
