@@ -235,3 +235,50 @@ fn height(&[a, b, c]: &[DVec3; 3]) -> f64 {
     let twice = (b - a).cross(c - a).length();
     if 4.0 * twice < longest * longest { twice / longest } else { f64::INFINITY }
 }
+
+#[cfg(test)]
+mod tests {
+    use rayfold_scene::{Limits, parse};
+
+    use super::*;
+
+    /// The width of the first object of a scene.
+    fn width(lines: &str) -> Width {
+        // A pixel is .01 at a distance of 1.
+        let camera = "Screen 200 200\nCamera 0 0 0  0 0 -1  0 1 0  1  -.995 -.995 .995 .995\nSamples 16\n";
+        let parsed = parse("a.txt", format!("{camera}{lines}\nTrace\n").as_bytes(), &Limits::default());
+        let scene = parsed.script.unwrap().frame(0).unwrap();
+        Gauge::new(&scene).width(&hull(&scene.objects[0]).unwrap())
+    }
+
+    #[test]
+    fn objects_are_as_wide_as_they_are_seen() {
+        let paint = "1 1 1 0 0 0";
+        for (object, expected) in [
+            ("Sphere .05 0 0 -10", 1.0),
+            ("Cylinder .05 -5 0 -10 5 0 -10", 1.0),
+            ("Cone .05 .02 -5 0 -10 5 0 -10", 1.0),
+            ("Torus 3 .05 0 0 -10 0 0 1", 1.0),
+            ("Box -5 -.05 -10.1 5 .05 -10", 1.0),
+            ("Triangle -5 0 -10 5 0 -10 5 .1 -10", 1.0),
+            ("Disc 1 0 0 -10 0 1 .05", 1.0),
+            ("Disc 1 0 0 -10 0 0 1", 20.0),
+            // As wide as where it is farthest.
+            ("Cylinder .05 0 -1 5 0 -1 -40", 0.25),
+        ] {
+            let Width { seen, least } = width(&format!("{object} {paint}"));
+            assert!((0.85..1.2).contains(&(seen / expected)) && least == seen, "{object}: {seen} {least}");
+        }
+    }
+
+    #[test]
+    fn what_a_light_sees_from_its_edge_is_narrow() {
+        let disc = |light: &str| width(&format!("{light}\nDisc 1 0 0 -10 0 0 1 1 1 1 0 0 0"));
+        for light in ["Ilight 1 1 1 0 -1 -.05", "Plight 1 1 1 0 20 -9"] {
+            let Width { seen, least } = disc(light);
+            assert!(seen > 15.0 && (0.5..2.0).contains(&least), "{light}: {seen} {least}");
+        }
+        // What is quite flat throws no shadow then.
+        assert!(disc("Ilight 1 1 1 0 -1 0").least > 15.0);
+    }
+}

@@ -278,9 +278,9 @@ fn join_triangles(objects: &[Object], gauge: &Gauge, widths: &mut [Width]) {
         .into_iter()
         .map(|(of, points)| (of, gauge.width(&Hull { points, girth: f64::INFINITY, is_flat: false })))
         .collect();
-    for at in 0..widths.len() {
-        if let Some(width) = of_joined.get(&root(&mut belongs, at)) {
-            widths[at] = *width;
+    for (at, width) in widths.iter_mut().enumerate() {
+        if let Some(joined) = of_joined.get(&root(&mut belongs, at)) {
+            *width = *joined;
         }
     }
 }
