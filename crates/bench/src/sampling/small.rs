@@ -16,9 +16,6 @@ const WIDTHS: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
 const COUNTS: [u32; 3] = [64, 256, 1024];
 const ERRORS: [f64; 4] = [4.0, 1.0, 0.5, 0.25];
 
-/// Samples of the truth of wires and their like.
-const MANY: u32 = 16_384;
-
 /// Columns and rows of pictures that are drawn at random.
 const SIZE: (u32, u32) = (120, 90);
 
@@ -33,14 +30,14 @@ pub(super) fn run(args: &Args) -> Result<()> {
                     narrower than a pixel they may miss altogether, and a floor whose cells are smaller than a pixel they may take \
                     for even. Here stands what of that is left.\n\n"
         .to_owned();
-    wires(&mut page)?;
-    others(&mut page)?;
+    wires(&mut page, args.truth)?;
+    others(&mut page, args.truth)?;
     at_random(&mut page, args)?;
-    print!("{page}");
-    if !args.check {
-        std::fs::write(args.output.join("sampling-small.md"), page.trim_end().to_owned() + "\n")?;
+    if args.check {
+        eprint!("{page}");
+        return Ok(());
     }
-    Ok(())
+    Ok(std::fs::write(args.output.join("sampling-small.md"), page.trim_end().to_owned() + "\n")?)
 }
 
 fn script(text: &str) -> Result<Script> {
@@ -66,20 +63,21 @@ fn rays(means: &Means) -> f64 {
 }
 
 /// A wire across the picture.
-fn wires(page: &mut String) -> Result<()> {
-    page.push_str(
+fn wires(page: &mut String, truth: u32) -> Result<()> {
+    write!(
+        page,
         "## Wires\n\nA white wire on black, 640 x 240 (`Cylinder r -5 .35 0 5 -.35 0`), at most *n* rays a pixel and an error of *e*: \
-         its light, as a share of the truth (16,384 rays in every pixel); the same with n rays in every pixel, whose error is that \
+         its light, as a share of the truth ({truth} rays in every pixel); the same with n rays in every pixel, whose error is that \
          of the samples themselves; columns without any light, of those that have some in truth; rays a pixel.\n\n\
          | width | n | e | light | with n everywhere | empty columns | rays a pixel |\n| --- | --- | --- | --- | --- | --- | --- |\n",
-    );
+    )?;
     for width in WIDTHS {
         let radius = 0.5 * width / 120.0 * 5.0 * 22.5f64.to_radians().tan();
         let text = format!(
             "Screen 640 240\nLook 0 0 5 0 0 0 45\nCylinder {radius} -5 .35 0 5 -.35 0 1 1 1 0 0 0\nTrace\n"
         );
         let script = script(&text)?;
-        let truth = means(&script, 0, Samples::new(MANY, 0.0)?)?;
+        let truth = means(&script, 0, Samples::new(truth, 0.0)?)?;
         let lit = |means: &Means, column: usize| {
             (0..240).any(|row| means.means[row * 640 + column].max_element() > 0.0)
         };
@@ -146,15 +144,16 @@ fn pictures() -> Vec<(&'static str, String)> {
     ]
 }
 
-fn others(page: &mut String) -> Result<()> {
-    page.push_str(
-        "## Other things that are small\n\nAt most 256 rays a pixel. The error is that of the picture, in levels from one of 4096 rays in \
+fn others(page: &mut String, truth: u32) -> Result<()> {
+    write!(
+        page,
+        "## Other things that are small\n\nAt most 256 rays a pixel. The error is that of the picture, in levels from one of {truth} rays in \
          every pixel; the mean is that of the difference, and of it the worst block of 10 x 10 pixels.\n\n\
          | picture | e | error | with 256 everywhere | mean | worst block | rays a pixel |\n| --- | --- | --- | --- | --- | --- | --- |\n",
-    );
+    )?;
     for (name, text) in pictures() {
         let script = script(&format!("{text}Trace\n"))?;
-        let truth = means(&script, 0, Samples::new(4096, 0.0)?)?;
+        let truth = means(&script, 0, Samples::new(truth, 0.0)?)?;
         let all = Compared::new(&script, &means(&script, 0, Samples::new(256, 0.0)?)?, &truth)?;
         for error in [4.0, 1.0, 0.25] {
             let drawn = means(&script, 0, Samples::new(256, error)?)?;

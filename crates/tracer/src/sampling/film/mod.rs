@@ -322,7 +322,7 @@ mod tests {
             first
         };
         let mut floors = Floors::new((2, 2), &[8, 16]).unwrap();
-        let (a, b) = (look([0, 1, 1, 1], [900; 4]), look([0, 1, 7, 1], [900, 1000, 900, 2000]));
+        let (a, b) = (look([0, 1, 1, 1], [900; 4]), look([0, 1, 7, 1], [900, 910, 900, 920]));
         floors.add(&a, &b, |difference| Some(usize::from(difference == Difference::Color)));
         let of = |set: usize| [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| floors.sets[set].1.has(x, y));
         assert_eq!((of(0), of(1)), ([false, false, true, false], [false, false, false, true]));
