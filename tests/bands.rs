@@ -89,6 +89,12 @@ impl Dice {
         for _ in 0..count {
             writeln!(text, "{}", self.object(is_moving)).unwrap();
         }
+        // What is narrower than a pixel.
+        for _ in 0..self.0.u8(0..3) {
+            let (a, b, c) = (self.point(3.0), self.point(3.0), self.point(2.0));
+            writeln!(text, "Cylinder .002{}{}{}", triple(a), triple(b), self.paint()).unwrap();
+            writeln!(text, "Sphere .005{}{}", triple(c), self.paint()).unwrap();
+        }
         text.push_str("Frames 2 2\nTrace\n");
         text
     }

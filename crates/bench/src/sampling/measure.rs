@@ -28,6 +28,12 @@ pub struct Args {
     /// The scene of the report on speed instead: the time to an error, at the sizes of the targets
     #[arg(long)]
     pub(super) targets: bool,
+    /// What is smaller than a pixel, patterned floors and random scenes instead: sampling-small.md
+    #[arg(long)]
+    pub(super) small: bool,
+    /// How many floors and how many scenes those are
+    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..))]
+    pub(super) scenes: u64,
     /// Only this effect
     #[arg(long)]
     pub(super) only: Option<String>,

@@ -4,10 +4,12 @@
 //! samples of the plain tracer, which share nothing with them but the words of the language.
 
 mod curve;
+mod drawn_at_random;
 mod measure;
 mod mitsuba;
 mod report;
 mod scenes;
+mod small;
 mod targets;
 mod targets_page;
 mod works;
@@ -35,6 +37,9 @@ const ERRORS: [(u32, f64); 6] = [(16, 4.0), (64, 2.0), (64, 1.0), (256, 1.0), (2
 pub fn run(args: &Args) -> Result<()> {
     if args.targets {
         return targets::run(args);
+    }
+    if args.small {
+        return small::run(args);
     }
     let size = (args.width, args.width * 3 / 4);
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;

@@ -54,7 +54,8 @@ pub(super) fn write(
          thread, processor time of preparing and drawing, the shortest of three runs. An error is the root mean square over pixels \
          and channels, in levels (0..255) before rounding, from the truth: the same picture in `f64` with {truth} samples in every \
          pixel. Pairs of dimensions and independent samples are there for their errors: their points are worked out one by one, so \
-         that their times say little.\n\n"
+         that their times say little. What is smaller than a pixel, and whether the error that is asked for is met on patterned floors \
+         and random scenes, stands in [a report of its own](sampling-small.md).\n\n"
     );
     page.push_str(&slopes(drawn));
     page.push_str(&rays_saved(drawn));

@@ -201,7 +201,8 @@ fn middle(screen: Screen) -> DVec3 {
     DVec3::new(f64::from(screen.width()), f64::from(screen.height()), 0.0) / 2.0
 }
 
-fn view(scene: &Scene, scale: f64) -> View {
+/// Where the rays of a scene's pixels come from, in lengths of `scale`.
+pub(super) fn view(scene: &Scene, scale: f64) -> View {
     match &scene.camera {
         Camera::Orthographic => View::Parallel { corner: -middle(scene.screen) * scale, pixel: scale },
         Camera::Pinhole(pinhole) => {

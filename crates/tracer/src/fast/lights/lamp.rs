@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use crate::fast::packet::Ray;
 use crate::fast::real::{Lanes, Real, Vec3, constant, splat};
+use crate::scale::below_inverse;
 
 /// A lamp in the kernels' coordinates.
 #[derive(Clone, Copy, Debug)]
@@ -22,9 +23,28 @@ impl Place {
     /// Moved so that `center` is the origin, and then scaled.
     pub(in crate::fast) fn new(lamp: &rayfold_scene::Lamp, center: DVec3, scale: f64) -> Self {
         let position = (lamp.position() - center) * scale;
-        Self { position, color: lamp.color(), radius: lamp.radius() * scale, reach: lamp.reach() * scale }
+        let (color, reach) = balanced(lamp.color(), lamp.reach() * scale);
+        Self { position, color, radius: lamp.radius() * scale, reach }
     }
 }
+
+/// Reaches whose squares are as large as numbers of the kernels may be, and as small.
+const REACHES: core::ops::Range<f64> = 1e-60..1e60;
+
+/// A colour and a reach that light alike, such that the square of the reach is not beyond all numbers: by a power of two, without
+/// rounding.
+fn balanced(color: DVec3, reach: f64) -> (DVec3, f64) {
+    if reach == 0.0 || REACHES.contains(&reach) {
+        return (color, reach);
+    }
+    let part = below_inverse(reach);
+    // In two steps: the square of the part may be beyond all numbers itself.
+    let color = (color / part / part).clamp(DVec3::splat(-BRIGHTEST), DVec3::splat(BRIGHTEST));
+    (color, reach * part)
+}
+
+/// Whatever is brighter is as bright; products of it with what arrives are numbers.
+const BRIGHTEST: f64 = 1e120;
 
 /// How near the lamp, in roundoffs of its distance, a surface is taken for one that it lies in, which does not hide it.
 ///

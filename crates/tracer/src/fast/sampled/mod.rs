@@ -4,11 +4,15 @@
 //! samples are sorted by moment, and drawn as many at a time as a tile's memory holds, by the steps that draw single rays;
 //! `light` is the one step that knows lights with an extent.
 
+mod gauge;
 mod hulls;
 pub(super) mod light;
+mod scouts;
+mod stand_ins;
 mod tile;
 
 use core::ops::Range;
+use std::borrow::Cow;
 
 use fearless_simd::{Level, Simd};
 use image::RgbImage;
@@ -17,6 +21,7 @@ use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 
 use self::light::Extents;
+use self::scouts::Scouts;
 use self::tile::{Pass, SampledTile, Workspace};
 use super::dispatch::on;
 #[cfg(all(target_arch = "x86_64", feature = "narrow"))]
@@ -30,7 +35,7 @@ use super::shape::Robust;
 use super::shapes::Shape;
 use super::window::{Grid, Window};
 use crate::parallel::{CHANNELS, image, whole_bands};
-use crate::sampling::film::{self, Band, Film, Wanted};
+use crate::sampling::film::{self, Band, Film, First, Wanted};
 use crate::sampling::{Dimensions, Points};
 use crate::{RenderError, RenderOptions};
 
@@ -61,11 +66,12 @@ struct Moment<E> {
 #[derive(Debug)]
 pub(super) struct Sampled<'a, E> {
     /// In the middle.
-    scene: &'a Scene,
-    options: &'a RenderOptions<'a>,
+    scene: Cow<'a, Scene>,
+    options: RenderOptions<'a>,
     dimensions: Dimensions,
     moments: Vec<Moment<E>>,
     side: (u32, u32),
+    scouts: Scouts<'a>,
 }
 
 impl<'a, E: Real> Sampled<'a, E> {
@@ -77,14 +83,25 @@ impl<'a, E: Real> Sampled<'a, E> {
         geometries: &[Geometry],
         options: &'a RenderOptions<'a>,
     ) -> Result<Self, RenderError> {
+        let scouts = Scouts::new(moments, options)?;
+        Ok(Self { scouts, ..Self::of_one_look(Cow::Borrowed(scene), moments, geometries, *options)? })
+    }
+
+    /// The same for [`Self::first_look`] alone.
+    fn of_one_look(
+        scene: Cow<'a, Scene>,
+        moments: &[Scene],
+        geometries: &[Geometry],
+        options: RenderOptions<'a>,
+    ) -> Result<Self, RenderError> {
         let side = options.tile.unwrap_or(if moments.len() > 1 { MOVING_SIDE } else { SIDE });
         let dimensions = Dimensions::new(moments);
         let moments = moments
             .par_iter()
             .zip(geometries)
-            .map(|(scene, geometry)| Moment::new(scene, geometry, options, side, &dimensions))
+            .map(|(scene, geometry)| Moment::new(scene, geometry, &options, side, &dimensions))
             .collect::<Result<_, _>>()?;
-        Ok(Self { scene, options, dimensions, moments, side })
+        Ok(Self { scene, options, dimensions, moments, side, scouts: Scouts::default() })
     }
 
     /// Draws all passes; `each` sees the picture so far after each but the last.
@@ -108,8 +125,8 @@ impl<'a, E: Real> Sampled<'a, E> {
     }
 
     /// In the middle of its exposure.
-    pub(super) fn scene(&self) -> &'a Scene {
-        self.scene
+    pub(super) fn scene(&self) -> &Scene {
+        &self.scene
     }
 
     /// How many rows beside it have a say in what a row shows.
@@ -123,10 +140,10 @@ impl<'a, E: Real> Sampled<'a, E> {
         rows: Range<u32>,
         mut each: impl FnMut(&Film) -> Result<(), RenderError>,
     ) -> Result<Film, RenderError> {
-        let scene = self.scene;
-        let size = (scene.screen.width(), rows.end - rows.start);
-        let too_large = || RenderError::TooLarge { width: size.0, height: size.1 };
-        let mut film = Film::new(size, self.side, scene.samples, scene.tone, PASS).ok_or_else(too_large)?;
+        let mut film = self.film(&rows)?;
+        if let Some(floors) = self.scouts.floors(rows.clone())? {
+            film.raise(floors);
+        }
         let mut passes = 0;
         while let Some(span) = film.plan() {
             if passes > 0 {
@@ -136,6 +153,23 @@ impl<'a, E: Real> Sampled<'a, E> {
             self.pass(&mut film, rows.start, span)?;
         }
         Ok(film)
+    }
+
+    /// Nothing yet of some rows.
+    fn film(&self, rows: &Range<u32>) -> Result<Film, RenderError> {
+        let scene = &self.scene;
+        let size = (scene.screen.width(), rows.end - rows.start);
+        let too_large = || RenderError::TooLarge { width: size.0, height: size.1 };
+        Film::new(size, self.side, scene.samples, scene.tone, PASS).ok_or_else(too_large)
+    }
+
+    /// The first samples of the pixels of some rows, which are whole rows of tiles.
+    fn first_look(&self, rows: Range<u32>) -> Result<Option<First>, RenderError> {
+        let mut film = self.film(&rows)?;
+        if let Some(span) = film.plan() {
+            self.pass(&mut film, rows.start, span)?;
+        }
+        Ok(film.into_first())
     }
 
     /// Gives each pixel the samples that it lacks.

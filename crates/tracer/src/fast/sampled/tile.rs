@@ -160,8 +160,9 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     workspace.items = items;
     if first.is_some() && !pass.wanted.is_first_look {
         tile.each_wanted_pixel(pass.wanted, |at| {
-            let is_unsettled = pass.wanted.is_unsettled(&pixels[tile.in_tile(at)]);
-            unsettled.set(tile.left + at.0 as usize, at.1 as usize, is_unsettled);
+            let (column, row) = (tile.left + at.0 as usize, at.1 as usize);
+            let is_unsettled = pass.wanted.is_unsettled(&pixels[tile.in_tile(at)], (column, tile.top + row));
+            unsettled.set(column, row, is_unsettled);
         });
     }
 }

@@ -31,6 +31,13 @@ impl Bits {
         Some(Self { words: zeroed(self.words.len())?, ..*self })
     }
 
+    /// The same pixels once more.
+    pub(super) fn copied(&self) -> Option<Self> {
+        let mut copy = self.empty()?;
+        copy.add(self);
+        Some(copy)
+    }
+
     pub(crate) fn rows(&self) -> usize {
         self.words.len() / self.stride
     }
@@ -60,6 +67,11 @@ impl Bits {
         for (word, other) in self.words.iter_mut().zip(&other.words) {
             *word |= other;
         }
+    }
+
+    /// Puts a pixel in.
+    pub(super) fn put(&mut self, column: usize, row: usize) {
+        self.words[row * self.stride + column / WORD] |= 1 << (column % WORD);
     }
 
     /// In bands of so many rows.

@@ -13,8 +13,9 @@ const SECOND: u32 = 4;
 /// samples, and less steep than what edges and penumbrae have (docs/reports/sampling.md).
 pub(super) const SLOPE: f64 = -0.65;
 
-/// So many times the error that is asked for a pixel may have: most others have less.
-pub(super) const SPARED: f64 = 3.0;
+/// So many times the error that is asked for a pixel may have: most others have less. The more of the pixels around it vary
+/// ([`super::density`]), the fewer others there are that have less.
+pub(super) const SPARED: [f64; 3] = [3.0, 1.6, 1.0];
 
 /// Moments of the first samples.
 const FEW_MOMENTS: u32 = 16;
@@ -25,15 +26,18 @@ pub(super) struct Chain {
     /// No pass adds more samples to a pixel.
     pub(super) step: u32,
     tone: Tone,
-    /// The largest variance of the samples of a settled pixel, by the logarithm of their number to the base 2.
-    limits: [f64; u32::BITS as usize],
+    /// The largest variance of the samples of a settled pixel, by how much varies around it and by the logarithm of their
+    /// number to the base 2.
+    limits: [[f64; u32::BITS as usize]; SPARED.len()],
 }
 
 impl Chain {
     pub(super) fn new(samples: Samples, tone: Tone, step: u32) -> Self {
-        let limits = core::array::from_fn(|at| {
-            let limit = SPARED * samples.error() * libm::pow(f64::from(1_u32 << at), -SLOPE);
-            limit * limit
+        let limits = SPARED.map(|spared| {
+            core::array::from_fn(|at| {
+                let limit = spared * samples.error() * libm::pow(f64::from(1_u32 << at), -SLOPE);
+                limit * limit
+            })
         });
         Self { samples, step, tone, limits }
     }
@@ -88,12 +92,13 @@ impl Chain {
         }
     }
 
-    /// Whether a pixel needs more samples, by its own; nothing is said of what is under way between two numbers.
+    /// Whether a pixel needs more samples, by its own, where so much varies around it; nothing is said of what is under way
+    /// between two numbers.
     #[inline(never)]
-    pub(super) fn is_unsettled(&self, pixel: &Pixel) -> bool {
+    pub(super) fn is_unsettled(&self, pixel: &Pixel, density: usize) -> bool {
         let count = pixel.count();
         count < self.most()
             && count.is_power_of_two()
-            && pixel.variance(self.tone) > self.limits[count.trailing_zeros() as usize]
+            && pixel.variance(self.tone) > self.limits[density][count.trailing_zeros() as usize]
     }
 }

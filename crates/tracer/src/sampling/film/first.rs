@@ -15,7 +15,7 @@ pub(crate) struct First {
     /// [`quantised`].
     pub(super) colors: [Vec<u16>; CHANNELS],
     /// Equal numbers for equal objects; among more than 65,535 a few share one.
-    objects: Vec<u16>,
+    pub(super) objects: Vec<u16>,
 }
 
 /// The same of some rows of the image.

@@ -8,7 +8,9 @@
 
 mod bits;
 mod chain;
+mod density;
 mod first;
+mod floors;
 mod pixel;
 mod plan;
 
@@ -17,8 +19,8 @@ use rayfold_scene::{Samples, Tone};
 
 pub(crate) use self::bits::BitRows;
 use self::chain::Chain;
-use self::first::First;
-pub(crate) use self::first::FirstRows;
+pub(crate) use self::first::{First, FirstRows};
+pub(crate) use self::floors::{Difference, Floors};
 use self::pixel::ONE;
 pub(crate) use self::pixel::{Pixel, quantised};
 use self::plan::Plan;
@@ -26,8 +28,8 @@ pub(crate) use self::plan::Wanted;
 use crate::parallel::CHANNELS;
 
 /// Of a picture with an error to be reached, as many rows above and below a band have a say in what it shows: those beside
-/// it in the first look, and one more for each time that it is decided who goes on.
-pub(crate) const MARGIN: u32 = 1 + plan::MOST_ROUNDS;
+/// it in the first look, one more for each time that it is decided who goes on, and those in which it is counted what varies.
+pub(crate) const MARGIN: u32 = 1 + plan::MOST_ROUNDS + density::ROWS as u32;
 
 /// An image of samples, or a band of one, its first row at the top.
 #[derive(Debug)]
@@ -75,6 +77,16 @@ impl Film {
         };
         let plan = Plan::new(size, Chain::new(samples, tone, step))?;
         Some(Self { size, side, first, tiles, plan })
+    }
+
+    /// Gives pixels some number of samples in any case.
+    pub(crate) fn raise(&mut self, floors: Floors) {
+        self.plan.floors = floors;
+    }
+
+    /// The first samples of its pixels.
+    pub(crate) fn into_first(self) -> Option<First> {
+        self.first
     }
 
     /// Plans the next pass; `None` once all pixels have what they need. Gives the least and the largest number of samples
@@ -221,7 +233,7 @@ mod tests {
                             let level = [draw(sample)];
                             pixel.add([&level; 3]);
                         }
-                        let is_unsettled = wanted.is_unsettled(pixel);
+                        let is_unsettled = wanted.is_unsettled(pixel, (column, row));
                         of_band.unsettled.set(at.0, at.1, is_unsettled);
                     }
                 }
@@ -279,6 +291,43 @@ mod tests {
         assert!(counts[..64].iter().all(|&count| count < 32));
     }
 
+    /// What no first sample shows is found where it is known to be, and its pixels have no say in how often.
+    #[test]
+    fn pixels_that_are_raised_get_what_they_are_raised_to() {
+        for (floor, given) in [(16, 16), (100, 64), (1, 1)] {
+            let mut film =
+                Film::new((70, 9), (16, 16), Samples::new(64, 1.0).unwrap(), Tone::Plain, 10).unwrap();
+            let mut floors = Floors::new((70, 9), &[floor]).unwrap();
+            floors.sets[0].1.put(66, 4);
+            film.raise(floors);
+            expose(&mut film, |_, _| 0.5);
+            let counts = counts(&film);
+            assert_eq!(counts[4 * 70 + 66], given);
+            assert_eq!(counts[4 * 70 + 60], 1);
+            assert!(
+                counts
+                    .iter()
+                    .enumerate()
+                    .all(|(place, &count)| count < given || place == 4 * 70 + 66 || given == 1)
+            );
+        }
+    }
+
+    #[test]
+    fn pictures_are_told_apart_by_objects_and_by_colours() {
+        let look = |objects: [u32; 4], colors: [u32; 4]| {
+            let mut first = First::new(4).unwrap();
+            let mut rows = first.bands(4).next().unwrap();
+            (0..4).for_each(|k| rows.put(k, [colors[k]; 3], objects[k]));
+            first
+        };
+        let mut floors = Floors::new((2, 2), &[8, 16]).unwrap();
+        let (a, b) = (look([0, 1, 1, 1], [900; 4]), look([0, 1, 7, 1], [900, 910, 900, 920]));
+        floors.add(&a, &b, |difference| Some(usize::from(difference == Difference::Color)));
+        let of = |set: usize| [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| floors.sets[set].1.has(x, y));
+        assert_eq!((of(0), of(1)), ([false, false, true, false], [false, false, false, true]));
+    }
+
     /// The words are held against the rule, said pixel by pixel.
     #[test]
     fn who_goes_on_is_as_the_rule_says() {
@@ -290,8 +339,9 @@ mod tests {
             let samples = Samples::new(most, 1.0).unwrap();
             let mut film = Film::new(size, side, samples, tone, 256).unwrap();
             let width = size.0 as usize;
+            let share = [5, 120, 230][dice.usize(..3)];
             let lively: Vec<f64> =
-                (0..size.0 * size.1).map(|_| if dice.u8(..) < 5 { 0.4 } else { 0.0 }).collect();
+                (0..size.0 * size.1).map(|_| if dice.u8(..) < share { 0.4 } else { 0.0 }).collect();
             let drawn = |place: usize, sample: u32| {
                 0.3 + lively[place] * f64::from(sobol_like(sample.wrapping_add(17 * place as u32)) % 5) / 5.0
             };
@@ -319,10 +369,27 @@ mod tests {
                     around(place).any(|other| (shown(other) - shown(place)).abs() > CONTRAST / 255.0)
                 })
                 .collect();
-            for _ in 0..MOST_ROUNDS {
+            // Of columns in halves of words, and of as many rows above and below.
+            let share = |varying: &[bool], place: usize| {
+                let (left, row) = (place % width / 32 * 32, place / width);
+                let rows = row.saturating_sub(16)..(row + 17).min(size.1 as usize);
+                let around =
+                    rows.flat_map(|row| (left..(left + 32).min(width)).map(move |x| row * width + x));
+                let (varying, all) =
+                    around.fold((0, 0), |(v, all), at| (v + u32::from(varying[at]), all + 1));
+                usize::from(3 * varying >= all) * usize::from(varying > 0)
+                    + usize::from(3 * varying >= 2 * all)
+            };
+            let mut density = vec![0; counts.len()];
+            for round in 0..MOST_ROUNDS {
+                if round == 1 {
+                    density = (0..counts.len()).map(|place| share(&unsettled, place)).collect();
+                }
                 let next: Vec<u32> = (0..counts.len())
                     .map(|place| {
+                        let is_given = [1, 4, 8][density[place]];
                         let goes_on = unsettled[place]
+                            || counts[place] < is_given
                             || around(place).any(|other| {
                                 unsettled[other] && counts[other] >= counts[place]
                                     || counts[other] > 2 * counts[place].max(2)
@@ -340,7 +407,7 @@ mod tests {
                 for place in 0..counts.len() {
                     if next[place] > counts[place] {
                         let count = next[place];
-                        let limit = SPARED * f64::from(count).powf(-SLOPE);
+                        let limit = SPARED[density[place]] * f64::from(count).powf(-SLOPE);
                         unsettled[place] = count < most && pixel(place, count).variance(tone) > limit * limit;
                     }
                 }

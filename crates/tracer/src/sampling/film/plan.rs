@@ -4,12 +4,17 @@
 //! be too large, if that of a neighbour with at least as many samples is, or if a neighbour is two or more ahead on the chain.
 //! Slivers thinner than a pixel, of which some pixels see nothing at first, are found along their length in this way, and the
 //! bias of asking a pixel about itself shrinks to that of asking many.
+//!
+//! What is smaller than a pixel may be missed by all first samples of all pixels that it is in. Where it can be is known
+//! beforehand ([`Floors`]): those pixels go on to a number that does not depend on what their samples show.
 
 use rayon::prelude::*;
 
 use super::bits::{BitRows, Bits, widened};
 use super::chain::Chain;
+use super::density::Density;
 use super::first::First;
+use super::floors::Floors;
 use super::pixel::{ONE, Pixel};
 
 /// So many times the error that is asked for, two neighbours with a sample each may differ by.
@@ -26,6 +31,7 @@ const BAND: usize = 16;
 #[derive(Clone, Copy)]
 pub(crate) struct Wanted<'a> {
     chain: &'a Chain,
+    density: Option<&'a Density>,
     /// Who gets something.
     pub(crate) pixels: &'a Bits,
     /// Whether it is the first sample of pixels that may get no other.
@@ -46,11 +52,11 @@ impl Wanted<'_> {
         self.chain.moments(sample, all)
     }
 
-    /// Whether a pixel needs more samples once it has got what it is given, by its own; of no consequence between two numbers
-    /// of the chain.
+    /// Whether the pixel of a column and row needs more samples once it has got what it is given, by its own; of no
+    /// consequence between two numbers of the chain.
     #[inline(always)]
-    pub(crate) fn is_unsettled(&self, pixel: &Pixel) -> bool {
-        self.chain.is_unsettled(pixel)
+    pub(crate) fn is_unsettled(&self, pixel: &Pixel, (column, row): (usize, usize)) -> bool {
+        self.chain.is_unsettled(pixel, self.density.map_or(0, |density| density.at(column, row)))
     }
 }
 
@@ -59,6 +65,10 @@ pub(super) struct Plan {
     chain: Chain,
     /// Whose error is too large.
     unsettled: Bits,
+    /// Who gets some number of samples in any case.
+    pub(super) floors: Floors,
+    /// How much varies around each pixel, once those that differ from a neighbour have the second number of the chain.
+    density: Option<Density>,
     /// Those that have at least the second number of the chain, the third, and so on.
     at_least: Vec<Bits>,
     /// Those that go on to the second number of the chain, the third, and so on, until all have come there.
@@ -87,6 +97,8 @@ impl Plan {
         Some(Self {
             chain,
             unsettled: none()?,
+            floors: Floors::default(),
+            density: None,
             at_least: vec![],
             going: vec![],
             done: 0,
@@ -105,7 +117,8 @@ impl Plan {
     /// Before each pass: what it gives to whom, and in bands of so many rows who needs more after it.
     pub(super) fn split(&mut self, rows: usize) -> (Wanted<'_>, impl Iterator<Item = BitRows<'_>>) {
         let is_first_look = self.stage == Stage::First && self.chain.has_error();
-        let wanted = Wanted { chain: &self.chain, pixels: &self.wanted, is_first_look };
+        let density = self.density.as_ref();
+        let wanted = Wanted { chain: &self.chain, density, pixels: &self.wanted, is_first_look };
         (wanted, self.unsettled.bands(rows))
     }
 
@@ -158,6 +171,9 @@ impl Plan {
             self.judge_first(first);
         } else {
             self.count()?;
+            if self.density.is_none() {
+                self.density = Some(Density::of(self.unsettled.copied()?, &self.floors)?);
+            }
         }
         self.stage = Stage::Later;
         if self.rounds == MOST_ROUNDS {
@@ -196,7 +212,10 @@ impl Plan {
             if at == self.going.len() {
                 self.going.push(self.wanted.empty()?);
             }
-            let ends = self.chain.number(at) == self.chain.most();
+            let number = self.chain.number(at);
+            let ends = number == self.chain.most();
+            let always: Vec<&Bits> =
+                self.floors.above(number).chain(self.density.iter().flat_map(|d| d.above(number))).collect();
             let (unsettled, at_least) = (&self.unsettled, &self.at_least);
             let have = at.checked_sub(1).map(|before| &at_least[before]);
             let (further, ahead) = (at_least.get(at), at_least.get(at + 1));
@@ -208,7 +227,7 @@ impl Plan {
                 }
                 // Whoever may make others go on, in three rows.
                 let mut active = [(); 3].map(|()| vec![0; stride]);
-                let mut near = vec![0; stride];
+                let (mut near, mut bound) = (vec![0; stride], vec![0; stride]);
                 let look = |active: &mut Vec<u64>, row: Option<usize>| match row
                     .filter(|&row| row < unsettled.rows())
                 {
@@ -238,13 +257,17 @@ impl Plan {
                         *near = above | here | below;
                         any |= *near;
                     }
-                    if any == 0 {
+                    bound.fill(0);
+                    for bits in &always {
+                        bound.iter_mut().zip(bits.row(row)).for_each(|(bound, bits)| *bound |= bits);
+                    }
+                    if any == 0 && bound.iter().all(|&word| word == 0) {
                         continue;
                     }
                     for (word, going) in words.iter_mut().enumerate() {
                         let have = have.map_or(unsettled.inside(word), |have| have.row(row)[word]);
                         let further = further.map_or(0, |further| further.row(row)[word]);
-                        *going = widened(&near, word) & have & !further;
+                        *going = (widened(&near, word) | bound[word]) & have & !further;
                     }
                 }
             });

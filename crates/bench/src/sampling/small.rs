@@ -1,0 +1,286 @@
+//! What is smaller than a pixel, patterned floors and random scenes: the light and the error of adaptive pictures.
+
+use std::fmt::Write as _;
+
+use anyhow::{Context, Result};
+use glam::DVec3;
+use rayfold_scene::{Limits, Samples, Scene, Script, Tone, parse};
+use rayfold_tracer::{Drawing, Exposure, Means, RenderOptions};
+
+use super::drawn_at_random::{floor, scene};
+use super::measure::{Args, root_mean_square};
+
+/// Widths of a wire, in pixels.
+const WIDTHS: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
+
+const COUNTS: [u32; 3] = [64, 256, 1024];
+const ERRORS: [f64; 4] = [4.0, 1.0, 0.5, 0.25];
+
+/// Columns and rows of pictures that are drawn at random.
+const SIZE: (u32, u32) = (120, 90);
+
+/// What those may have in a pixel, and are asked for.
+const MOST: u32 = 1024;
+const ASKED: [f64; 2] = [4.0, 1.0];
+
+/// Measures, and writes sampling-small.md.
+pub(super) fn run(args: &Args) -> Result<()> {
+    let mut page = "# Sampling: what is small, and whether the error is met\n\n\
+                    Written by `rayfold-bench sampling --small`. An adaptive picture asks few samples who needs more. What is \
+                    narrower than a pixel they may miss altogether, and a floor whose cells are smaller than a pixel they may take \
+                    for even. Here stands what of that is left.\n\n"
+        .to_owned();
+    wires(&mut page, args.truth)?;
+    others(&mut page, args.truth)?;
+    at_random(&mut page, args)?;
+    if args.check {
+        eprint!("{page}");
+        return Ok(());
+    }
+    Ok(std::fs::write(args.output.join("sampling-small.md"), page.trim_end().to_owned() + "\n")?)
+}
+
+fn script(text: &str) -> Result<Script> {
+    let parsed = parse("a picture", text.as_bytes(), &Limits::default());
+    parsed.script.with_context(|| format!("{:?} in\n{text}", parsed.diagnostics))
+}
+
+/// Frame `k` of a script before it becomes levels.
+fn means(script: &Script, k: usize, samples: Samples) -> Result<Means> {
+    let scene = Scene { samples, ..script.frame(k).context("no such frame")? };
+    let after = |frames| script.frame_after(k, frames).unwrap_or_else(|| scene.clone());
+    let options = RenderOptions::default();
+    let drawing = Drawing::exposed(Exposure::moving(&scene, &after), &options)?;
+    drawing.draw_means()?.context("no kernels for this picture")
+}
+
+fn light(means: &Means) -> f64 {
+    means.means.iter().map(|mean| mean.element_sum()).sum()
+}
+
+fn rays(means: &Means) -> f64 {
+    means.counts.iter().map(|&count| f64::from(count)).sum::<f64>() / means.counts.len() as f64
+}
+
+/// A wire across the picture.
+fn wires(page: &mut String, truth: u32) -> Result<()> {
+    write!(
+        page,
+        "## Wires\n\nA white wire on black, 640 x 240 (`Cylinder r -5 .35 0 5 -.35 0`), at most *n* rays a pixel and an error of *e*: \
+         its light, as a share of the truth ({truth} rays in every pixel); the same with n rays in every pixel, whose error is that \
+         of the samples themselves; columns without any light, of those that have some in truth; rays a pixel.\n\n\
+         | width | n | e | light | with n everywhere | empty columns | rays a pixel |\n| --- | --- | --- | --- | --- | --- | --- |\n",
+    )?;
+    for width in WIDTHS {
+        let radius = 0.5 * width / 120.0 * 5.0 * 22.5f64.to_radians().tan();
+        let text = format!(
+            "Screen 640 240\nLook 0 0 5 0 0 0 45\nCylinder {radius} -5 .35 0 5 -.35 0 1 1 1 0 0 0\nTrace\n"
+        );
+        let script = script(&text)?;
+        let truth = means(&script, 0, Samples::new(truth, 0.0)?)?;
+        let lit = |means: &Means, column: usize| {
+            (0..240).any(|row| means.means[row * 640 + column].max_element() > 0.0)
+        };
+        let columns: Vec<usize> = (0..640).filter(|&column| lit(&truth, column)).collect();
+        for count in COUNTS {
+            let all = light(&means(&script, 0, Samples::new(count, 0.0)?)?) / light(&truth);
+            for error in ERRORS {
+                let drawn = means(&script, 0, Samples::new(count, error)?)?;
+                let empty = columns.iter().filter(|&&column| !lit(&drawn, column)).count();
+                let share = light(&drawn) / light(&truth);
+                writeln!(
+                    page,
+                    "| {width} | {count} | {error} | {share:.3} | {all:.3} | {empty} of {} | {:.2} |",
+                    columns.len(),
+                    rays(&drawn)
+                )?;
+            }
+        }
+    }
+    page.push('\n');
+    Ok(())
+}
+
+/// A picture of something small, by its name.
+fn pictures() -> Vec<(&'static str, String)> {
+    let mut fence =
+        "Screen 320 200\nBackground .7 .8 .9\nLook 0 1.6 6 0 .9 0 40\nIlight .8 .8 .8 -.4 -1 -.5\n\
+                     Plane 0 0 0 0 1 0 .1 .1 .1 .4 .5 .3\n"
+            .to_owned();
+    for k in 0..200 {
+        let x = -30.0 + 0.3 * f64::from(k);
+        let _ = writeln!(fence, "Box {x:.2} 0 -40 {:.2} 1 -39.98 .9 .9 .9 .1 .1 .1", x + 0.02);
+    }
+    let mut sparks = "Screen 320 200\nLook 0 0 5 0 0 0 40\n".to_owned();
+    let mut dice = fastrand::Rng::with_seed(5);
+    for _ in 0..60 {
+        let (x, y) = (5.0 * dice.f64() - 2.5, 3.2 * dice.f64() - 1.6);
+        let _ = writeln!(sparks, "Sphere .00091 {x:.4} {y:.4} 0 1 1 1 0 0 0");
+    }
+    let mut beads =
+        "Screen 320 200\nLook 0 0 5 0 0 0 40\nIlight 1 1 1 -.5 -1 -1\nMaterial bead shine 1 1 1 1000\n"
+            .to_owned();
+    for k in 0..60 {
+        let (x, y) = (0.47 * f64::from(k % 10) - 2.1, 0.47 * f64::from(k / 10) - 1.2);
+        let _ = writeln!(beads, "Sphere .07 {x:.2} {y:.2} 0 bead");
+    }
+    let shadow = "Screen 320 200\nLook 0 2 5 0 .4 0 33\nIlight 1 1 1 .1 -1 -.3\nPlane 0 0 0 0 1 0 .1 .1 .1 .8 .8 .8\n\
+                  Plane 0 0 -2 0 0 1 .1 .1 .1 .8 .8 .8\nCylinder .001 -4 2.9 .3 4 2.4 .3 0 0 0 0 0 0\n";
+    let mirror = "Screen 320 200\nLook 0 1 5 0 .7 0 33\nPlane 0 0 0 0 1 0 0 0 0 0 0 0 1 1 1\nPlane 0 0 -3 0 0 1 0 0 0 0 0 0\n\
+                  Cylinder .001 -3 .95 -1 3 .85 -1 1 1 1 0 0 0\n";
+    let pane = "Screen 320 200\nLook 0 0 5 0 0 0 33\nMaterial pane glass .9 .9 .9 1.5\nBox -1 -1 1 1 1 1.1 pane\n\
+                Cylinder .001 -3 -.5 -1 3 .6 -1 1 1 1 0 0 0\n";
+    let ball = "Screen 320 200\nLook 0 0 5 0 0 0 33\nSphere 1 0 0 0 0 0 0 0 0 0 .9 .9 .9\n\
+                Cylinder .02 -8 1.5 4 8 2.5 4 1 1 1 0 0 0\n";
+    vec![
+        ("a fence of 200 posts, .2 pixels each", fence),
+        ("60 sparks of .1 pixels", sparks),
+        ("narrow highlights of 60 balls", beads),
+        ("the shadow of a wire of .2 pixels", shadow.to_owned()),
+        ("such a wire in a plane mirror", mirror.to_owned()),
+        ("such a wire behind a pane", pane.to_owned()),
+        ("a wire in a mirror ball", ball.to_owned()),
+        ("one pixel", "Screen 1 1\nLook 0 0 5 0 0 0 20\nSphere .5 0 0 0 1 0 0 0 0 0\n".to_owned()),
+    ]
+}
+
+fn others(page: &mut String, truth: u32) -> Result<()> {
+    write!(
+        page,
+        "## Other things that are small\n\nAt most 256 rays a pixel. The error is that of the picture, in levels from one of {truth} rays in \
+         every pixel; the mean is that of the difference, and of it the worst block of 10 x 10 pixels.\n\n\
+         | picture | e | error | with 256 everywhere | mean | worst block | rays a pixel |\n| --- | --- | --- | --- | --- | --- | --- |\n",
+    )?;
+    for (name, text) in pictures() {
+        let script = script(&format!("{text}Trace\n"))?;
+        let truth = means(&script, 0, Samples::new(truth, 0.0)?)?;
+        let all = Compared::new(&script, &means(&script, 0, Samples::new(256, 0.0)?)?, &truth)?;
+        for error in [4.0, 1.0, 0.25] {
+            let drawn = means(&script, 0, Samples::new(256, error)?)?;
+            let row = Compared::new(&script, &drawn, &truth)?;
+            writeln!(
+                page,
+                "| {name} | {error} | {:.3} | {:.3} | {:.4} | {:.3} | {:.2} |",
+                row.error,
+                all.error,
+                row.mean,
+                row.worst,
+                rays(&drawn)
+            )?;
+        }
+    }
+    let drifts =
+        "Screen 24 24\nSphere .3 (1:8 41:13.48) (1:10.37 41:12.37) -50 1 1 1 0 0 0\nFrames 40\nTrace\n";
+    let script = script(drifts)?;
+    let mut sums = vec![];
+    for k in 0..40 {
+        sums.push(255.0 / 3.0 * light(&means(&script, k, Samples::new(256, 1.0)?)?));
+    }
+    let (least, most) = sums.iter().fold((f64::INFINITY, 0.0f64), |(a, b), &x| (a.min(x), b.max(x)));
+    writeln!(
+        page,
+        "\nA star of .3 pixels' radius drifts through 40 frames (`Samples 256`): it has {least:.1} to {most:.1} levels in each; its area \
+         says {:.1}.\n",
+        255.0 * core::f64::consts::PI * 0.09
+    )?;
+    Ok(())
+}
+
+/// A picture beside the truth.
+struct Compared {
+    error: f64,
+    mean: f64,
+    /// Of blocks of 10 x 10 pixels: the root mean square, and the worst channel.
+    of_blocks: f64,
+    worst: f64,
+}
+
+impl Compared {
+    fn new(script: &Script, drawn: &Means, truth: &Means) -> Result<Self> {
+        let scene = script.frame(0).context("no frame")?;
+        let shown = |mean: DVec3| match scene.tone {
+            Tone::Plain => mean,
+            Tone::Srgb => DVec3::from_array(mean.to_array().map(encoded)),
+        };
+        let pairs = drawn.means.iter().zip(&truth.means);
+        let errors: Vec<DVec3> = pairs.map(|(a, b)| 255.0 * (shown(*a) - shown(*b))).collect();
+        let (width, height) = (scene.screen.width() as usize, scene.screen.height() as usize);
+        let mut blocks = vec![];
+        for top in (0..height / 10).map(|k| 10 * k) {
+            for left in (0..width / 10).map(|k| 10 * k) {
+                let rows =
+                    (top..top + 10).flat_map(|row| &errors[row * width + left..row * width + left + 10]);
+                blocks.push(rows.sum::<DVec3>() / 100.0);
+            }
+        }
+        Ok(Self {
+            error: root_mean_square(&errors),
+            mean: errors.iter().sum::<DVec3>().element_sum() / (3 * errors.len()) as f64,
+            of_blocks: if blocks.is_empty() { 0.0 } else { root_mean_square(&blocks) },
+            worst: blocks.iter().map(|block| block.abs().max_element()).fold(0.0, f64::max),
+        })
+    }
+}
+
+fn encoded(light: f64) -> f64 {
+    if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Floors and scenes whose numbers come from seeds.
+fn at_random(page: &mut String, args: &Args) -> Result<()> {
+    let (width, height) = SIZE;
+    writeln!(
+        page,
+        "## Patterned floors and random scenes\n\n{} of each, {width} x {height}, at most {MOST} rays a pixel: checkered and striped floors to \
+         the horizon under `Tone srgb`, with lenses and soft light; and scenes of all that the language has. The error is given as a \
+         part of what was asked for, or of the error of {MOST} rays in every pixel where that is larger; the truth has {} rays in every \
+         pixel, whose own error is in it. Blocks are of 10 x 10 pixels.\n\n\
+         | pictures | e | error / e: mean | worst | over 1.15 | mean off by, at most | blocks / e: root mean square, worst picture | worst block | rays a pixel |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        args.scenes, args.truth
+    )?;
+    type Draw = fn(&mut fastrand::Rng, (u32, u32)) -> String;
+    for (name, draw) in [("floors", floor as Draw), ("scenes", scene as Draw)] {
+        let mut found = vec![];
+        for seed in 0..args.scenes {
+            let text = draw(&mut fastrand::Rng::with_seed(seed), SIZE);
+            let script = script(&text)?;
+            let truth = means(&script, 0, Samples::new(args.truth, 0.0)?)?;
+            let all = Compared::new(&script, &means(&script, 0, Samples::new(MOST, 0.0)?)?, &truth)?;
+            for asked in ASKED {
+                let drawn = means(&script, 0, Samples::new(MOST, asked)?)?;
+                let row = Compared::new(&script, &drawn, &truth)?;
+                eprintln!(
+                    "{name} {seed}, an error of {asked}: {:.3} (everywhere {:.3}), mean {:.3}, blocks {:.3}, worst {:.3}, {:.1} rays",
+                    row.error,
+                    all.error,
+                    row.mean,
+                    row.of_blocks,
+                    row.worst,
+                    rays(&drawn)
+                );
+                found.push((asked, asked.max(all.error), row, rays(&drawn)));
+            }
+        }
+        for asked in ASKED {
+            let rows: Vec<_> = found.iter().filter(|(of, ..)| *of == asked).collect();
+            let count = rows.len() as f64;
+            let largest =
+                |of: &dyn Fn(&Compared) -> f64| rows.iter().map(|(.., row, _)| of(row)).fold(0.0, f64::max);
+            let parts: Vec<f64> = rows.iter().map(|(_, allowed, row, _)| row.error / allowed).collect();
+            writeln!(
+                page,
+                "| {name} | {asked} | {:.2} | {:.2} | {} | {:.3} | {:.3} | {:.2} | {:.1} |",
+                parts.iter().sum::<f64>() / count,
+                parts.iter().copied().fold(0.0, f64::max),
+                parts.iter().filter(|part| **part > 1.15).count(),
+                largest(&|row| row.mean.abs()),
+                largest(&|row| row.of_blocks) / asked,
+                largest(&|row| row.worst),
+                rows.iter().map(|(.., rays)| rays).sum::<f64>() / count,
+            )?;
+        }
+    }
+    page.push('\n');
+    Ok(())
+}

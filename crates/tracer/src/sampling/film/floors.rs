@@ -1,0 +1,54 @@
+//! Pixels that get some number of samples whatever their first ones show.
+
+use super::bits::Bits;
+use super::first::First;
+use crate::parallel::CHANNELS;
+
+/// Two first samples whose channels differ by no more than this, a sixteenth of a level, show the same.
+const SAME: u16 = 16;
+
+/// Sets of pixels, each with the number of samples that its pixels get at least.
+#[derive(Debug, Default)]
+pub(crate) struct Floors {
+    pub(super) sets: Vec<(u32, Bits)>,
+}
+
+/// What one of two pictures has and the other has not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Difference {
+    /// An object is seen, by its number, or not.
+    Object(u16),
+    /// The same object is seen in another colour.
+    Color,
+}
+
+impl Floors {
+    /// Empty sets for pictures of so many columns and rows; `None` where there is no memory for them.
+    pub(crate) fn new(size: (u32, u32), floors: &[u32]) -> Option<Self> {
+        let size = (size.0 as usize, size.1 as usize);
+        let sets = floors.iter().map(|&floor| Some((floor, Bits::none(size)?)));
+        Some(Self { sets: sets.collect::<Option<_>>()? })
+    }
+
+    /// Puts the pixels in which two pictures differ into the sets that `choose` names.
+    pub(crate) fn add(&mut self, a: &First, b: &First, choose: impl Fn(Difference) -> Option<usize>) {
+        let Some(columns) = self.sets.first().map(|(_, bits)| bits.columns) else { return };
+        for place in 0..a.objects.len() {
+            let difference = if a.objects[place] != b.objects[place] {
+                Difference::Object(b.objects[place])
+            } else if (0..CHANNELS).any(|k| a.colors[k][place].abs_diff(b.colors[k][place]) > SAME) {
+                Difference::Color
+            } else {
+                continue;
+            };
+            if let Some(set) = choose(difference) {
+                self.sets[set].1.put(place % columns, place / columns);
+            }
+        }
+    }
+
+    /// The sets whose pixels go on from so many samples.
+    pub(super) fn above(&self, count: u32) -> impl Iterator<Item = &Bits> {
+        self.sets.iter().filter(move |(floor, _)| *floor > count).map(|(_, bits)| bits)
+    }
+}
