@@ -43,8 +43,8 @@ pub(super) const BOX: f64 = 32.0;
 
 /// The part of a pixel by which tiles are wider than their pixels.
 ///
-/// A pixel's coordinate on the window is `start + i · step`, with 3 roundoffs: in `f32`, in an image of 100,000 columns,
-/// 1/56 of a pixel. What the direction is off besides is in [`BOUNDS`].
+/// A pixel's coordinate on the window is rounded by 2 roundoffs: in `f32`, in an image of 100,000 columns, 1/168 of a pixel.
+/// What the direction is off besides is in [`BOUNDS`].
 pub(super) const MARGIN: f64 = 1.0 / 32.0;
 
 /// Below this many roundoffs the sine of the angle between a ray and a triangle's plane is noise: the ray is in the plane,
