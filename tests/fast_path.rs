@@ -150,6 +150,46 @@ fn the_five_scenes_are_as_in_double_precision_at_any_size() {
 }
 
 #[test]
+fn no_dark_dot_is_seen_at_the_outline_of_a_body() {
+    // The back of the crystal, between its front and the sky.
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/artistic/frame12.txt");
+    let script = parse("frame12", &std::fs::read(path).unwrap(), &Limits::default()).script.unwrap();
+    let scene = script.frame(0).unwrap();
+    let exact = draw(&scene, RenderOptions { precision: Precision::F64, ..Default::default() });
+    let drawn = draw(&scene, RenderOptions { precision: Precision::F32, ..Default::default() });
+    let is_near = |x: u32, y: u32| {
+        let pixel = drawn.get_pixel(297, 167);
+        (0..3).all(|channel| pixel[channel].abs_diff(exact.get_pixel(x, y)[channel]) <= 16)
+    };
+    assert!((296..299).any(|x| (166..169).any(|y| is_near(x, y))), "{:?}", drawn.get_pixel(297, 167));
+}
+
+#[test]
+fn needles_finer_than_pixels_are_told_apart_as_in_double_precision() {
+    let mut dice = Dice::new("needles", SEED);
+    for needles in [300, 3_000, 30_000] {
+        let look = rayfold_scene::Look::new(DVec3::new(0.2, 0.3, 6.0), DVec3::ZERO, 40.0, None).unwrap();
+        let mut scene = Scene::new(Screen::new(160, 120).unwrap(), Camera::Look(look));
+        let rim = |k: u32| {
+            let angle = std::f64::consts::TAU * f64::from(k % needles) / f64::from(needles);
+            DVec3::new(1.9 * angle.cos(), 1.9 * angle.sin(), 0.3 * angle.sin())
+        };
+        scene.objects = (0..needles)
+            .map(|k| {
+                let material = Material::new(dice.color(), DVec3::ZERO, DVec3::ZERO).unwrap();
+                let corners = [DVec3::new(0.1, 0.07, 0.0), rim(k), rim(k + 1)];
+                Object::Triangle(Triangle::new(corners, material).unwrap())
+            })
+            .collect();
+        let exact = draw(&scene, RenderOptions { precision: Precision::F64, ..Default::default() });
+        let drawn = draw(&scene, RenderOptions { precision: Precision::F32, ..Default::default() });
+        let differ = off_by_more_than(2, &exact, &drawn);
+        println!("{needles} needles: {differ} pixels");
+        assert!(differ <= 1, "{needles} needles: {differ} pixels");
+    }
+}
+
+#[test]
 fn a_face_seen_edge_on_is_met_by_the_middle_column_and_a_level_one_by_no_row() {
     let read =
         |text: &str| parse("edge.txt", text.as_bytes(), &Limits::default()).script.unwrap().frame(0).unwrap();

@@ -6,9 +6,11 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::DVec3;
+use rayfold_scene::model::unit;
 
 use super::geometry::View;
 use super::real::{Lanes, Real, Vec3, splat};
+use super::rounding::TURNED;
 use crate::camera::Axis;
 
 /// The rays of a view.
@@ -59,6 +61,36 @@ impl<E: Real> Rays<E> {
                 y: Steps::new(y),
             }),
         }
+    }
+}
+
+/// The rays of an image's pixels from the eye, unrounded.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pixels {
+    right: DVec3,
+    up: DVec3,
+    back: DVec3,
+    x: Axis,
+    y: Axis,
+}
+
+impl Pixels {
+    pub(super) fn of(view: &View) -> Option<Self> {
+        match *view {
+            View::Pinhole { right, up, back, x, y } => Some(Self { right, up, back, x, y }),
+            View::Parallel { .. } => None,
+        }
+    }
+
+    /// The direction of the pixel's ray of which this one is what rounding left; none if it is that of no pixel.
+    pub(super) fn unrounded<E: Real>(&self, direction: DVec3) -> Option<DVec3> {
+        let ahead = -direction.dot(self.back);
+        let nearest =
+            |axis: Axis, at: f64| axis.at(if axis.step == 0.0 { 0.0 } else { axis.index(at).round() });
+        let x = nearest(self.x, direction.dot(self.right) / ahead);
+        let y = nearest(self.y, direction.dot(self.up) / ahead);
+        let exact = unit(x * self.right + (y * self.up - self.back));
+        (ahead > 0.0 && exact.cross(direction).length() <= TURNED * E::ROUNDOFF).then_some(exact)
     }
 }
 

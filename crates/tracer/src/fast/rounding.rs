@@ -78,6 +78,15 @@ pub(super) const LATE_IN_TREE: f64 = 64.0;
 /// One of the constant, four of the sum without fused multiply-add, and what is of second order.
 pub(super) const SIDE: f64 = 5.25;
 
+/// How far rounding turns a ray from the eye, in roundoffs.
+///
+/// A coordinate on the window and the axis that it is along are rounded, 1 each, and the two sums, 1 each; each of these is a part of
+/// the direction's length. A ray that is turned by more counts as one of no pixel.
+pub(super) const TURNED: f64 = 4.0;
+
+/// [`SIDE`] of a ray from the eye, where the ray of the pixel is meant.
+pub(super) const SIDE_OF_PIXEL: f64 = SIDE + TURNED;
+
 /// Rounding errors of the constants of an edge in `f64`, before they are rounded to the kernels' numbers, relative to the
 /// product of the lengths.
 ///
