@@ -150,6 +150,84 @@ fn the_five_scenes_are_as_in_double_precision_at_any_size() {
 }
 
 #[test]
+fn no_dark_dot_is_seen_at_the_outline_of_a_body() {
+    // The back of the crystal, between its front and the sky.
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/artistic/frame12.txt");
+    let script = parse("frame12", &std::fs::read(path).unwrap(), &Limits::default()).script.unwrap();
+    let scene = script.frame(0).unwrap();
+    let exact = draw(&scene, RenderOptions { precision: Precision::F64, ..Default::default() });
+    let drawn = draw(&scene, RenderOptions { precision: Precision::F32, ..Default::default() });
+    let is_near = |x: u32, y: u32| {
+        let pixel = drawn.get_pixel(297, 167);
+        (0..3).all(|channel| pixel[channel].abs_diff(exact.get_pixel(x, y)[channel]) <= 16)
+    };
+    assert!((296..299).any(|x| (166..169).any(|y| is_near(x, y))), "{:?}", drawn.get_pixel(297, 167));
+}
+
+#[test]
+fn needles_finer_than_pixels_are_told_apart_as_in_double_precision() {
+    let mut dice = Dice::new("needles", SEED);
+    for needles in [300, 3_000, 30_000] {
+        let look = rayfold_scene::Look::new(DVec3::new(0.2, 0.3, 6.0), DVec3::ZERO, 40.0, None).unwrap();
+        let mut scene = Scene::new(Screen::new(160, 120).unwrap(), Camera::Look(look));
+        let rim = |k: u32| {
+            let angle = std::f64::consts::TAU * f64::from(k % needles) / f64::from(needles);
+            DVec3::new(1.9 * angle.cos(), 1.9 * angle.sin(), 0.3 * angle.sin())
+        };
+        scene.objects = (0..needles)
+            .map(|k| {
+                let material = Material::new(dice.color(), DVec3::ZERO, DVec3::ZERO).unwrap();
+                let corners = [DVec3::new(0.1, 0.07, 0.0), rim(k), rim(k + 1)];
+                Object::Triangle(Triangle::new(corners, material).unwrap())
+            })
+            .collect();
+        let exact = draw(&scene, RenderOptions { precision: Precision::F64, ..Default::default() });
+        let drawn = draw(&scene, RenderOptions { precision: Precision::F32, ..Default::default() });
+        let differ = off_by_more_than(2, &exact, &drawn);
+        println!("{needles} needles: {differ} pixels");
+        assert!(differ <= 1, "{needles} needles: {differ} pixels");
+    }
+}
+
+#[test]
+fn a_face_seen_edge_on_is_met_by_the_middle_column_and_a_level_one_by_no_row() {
+    let read =
+        |text: &str| parse("edge.txt", text.as_bytes(), &Limits::default()).script.unwrap().frame(0).unwrap();
+    let each = |text: &str, pixel: (u32, u32), is_met: bool| {
+        let scene = read(text);
+        for precision in [Precision::F32, Precision::F64] {
+            let drawn = draw(&scene, RenderOptions { precision, ..Default::default() });
+            assert_eq!(drawn.get_pixel(pixel.0, pixel.1)[0] == 255, is_met, "{precision:?} {text}");
+        }
+        let plain = reference::render(&scene, &RenderOptions::default()).unwrap();
+        assert_eq!(plain.get_pixel(pixel.0, pixel.1)[0] == 255, is_met, "{text}");
+    };
+    for width in (3..120).step_by(2) {
+        let middle = width / 2;
+        // A box without thickness in the plane of the eye, along the gaze: its face is met edge-on.
+        let face = "Box 0 -1 -3  0 1 3  1 0 0  0 0 0";
+        for camera in [
+            "Camera 0 0.2 6  0 -0.1 -1  0 1 0  1  -0.3 -0.225  0.3 0.225",
+            "Camera 0 0.2 6  0 0 -1  0 1 0  1.7  -0.41 -0.3  0.41 0.3",
+            "Look 0 0.2 6  0 0 0  37",
+        ] {
+            each(&format!("Screen {width} 21\n{camera}\n{face}\nTrace"), (middle, 10), true);
+        }
+        // A level gaze, not along an axis, above and below planes that are parallel to it.
+        for level in [
+            "Plane 0 0 0  0 1 0  1 0 0  0 0 0",
+            "Box -90 -1 -90  90 0 90  1 0 0  0 0 0",
+            "Triangle -900 0 -90  900 0 -90  0 0 900  1 0 0  0 0 0",
+        ] {
+            let camera = "Look 1.3 0.7 4.1  -0.4 0.7 -0.9  40";
+            for i in [0, 3, middle] {
+                each(&format!("Screen 101 {width}\n{camera}\n{level}\nTrace"), (i, middle), false);
+            }
+        }
+    }
+}
+
+#[test]
 fn surfaces_that_single_precision_cannot_tell_apart_are_drawn_in_double() {
     const NOTE: &str = "-1 -1 {z} 1 -1 {z} 0 1 {z}";
     const SLANT: &str = "-1 -1 {x} 1 -1 {z} 0 1 {y}";

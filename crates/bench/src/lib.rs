@@ -23,6 +23,7 @@ pub mod measure;
 pub mod metamorphic;
 pub mod needs;
 pub mod oracle;
+pub mod outlines;
 pub mod parsing;
 #[cfg(feature = "bucket")]
 pub mod pipeline;

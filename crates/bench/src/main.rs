@@ -2,7 +2,8 @@
 
 use clap::{Parser, Subcommand};
 use rayfold_bench::{
-    accuracy, coincident, fingerprints, gif, measure, metamorphic, needs, parsing, sampling, speed, studio,
+    accuracy, coincident, fingerprints, gif, measure, metamorphic, needs, outlines, parsing, sampling, speed,
+    studio,
 };
 #[cfg(feature = "bucket")]
 use rayfold_bench::{cold_start, explore, footprint, pipeline, scale, simulate};
@@ -48,6 +49,8 @@ enum Measurement {
     Metamorphic(metamorphic::Args),
     /// Instructions that scenes execute for parts of the tracer that they do not use (needs valgrind)
     Needs(needs::Args),
+    /// Dots at the outlines of bodies of triangles, and pixels off at needles and planes seen from the side
+    Outlines(outlines::Args),
     /// Animations of 10 to 100,000 frames, and many at once, in a simulated world with the limits of AWS
     #[cfg(feature = "bucket")]
     Scale(scale::Args),
@@ -81,6 +84,7 @@ fn main() -> anyhow::Result<()> {
         Measurement::Measure(args) => measure::run(&args),
         Measurement::Metamorphic(args) => metamorphic::run(&args),
         Measurement::Needs(args) => needs::run(&args),
+        Measurement::Outlines(args) => outlines::run(&args),
         #[cfg(feature = "bucket")]
         Measurement::Scale(args) => scale::run(&args),
         Measurement::Sampling(args) => sampling::run(&args),

@@ -92,12 +92,7 @@ impl Row {
                 let gaze = [0, 1, 2].map(|i| minus(half(field(to)[i]), half(field(from)[i])));
                 let is_left_out =
                     form.span(up).start >= self.len() && form.fields[up].presence != Presence::Required;
-                if !is_left_out {
-                    return surely_cross(&gaze, field(up));
-                }
-                // Straight up or down another direction is taken, and nearly so is a fault.
-                surely_cross(&gaze, &[(0.0, 0.0), (1.0, 1.0), (0.0, 0.0)])
-                    || gaze[0] == (0.0, 0.0) && gaze[2] == (0.0, 0.0)
+                is_left_out || surely_cross(&gaze, field(up))
             }
             Together::Greater(a, b) => field(a)[0].0 > field(b)[0].1,
             Together::NotBothZero(a, b) => field(a)[0].0 > 0.0 || field(b)[0].0 > 0.0,

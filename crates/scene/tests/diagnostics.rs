@@ -344,6 +344,25 @@ fn a_gaze_along_the_view_up() {
 }
 
 #[test]
+fn an_orbit_s_eye_above_the_target_but_for_rounding() {
+    // cos 90° as programs write it.
+    for eye in ["3.06e-16 5 0", "0 -5 3.06e-16"] {
+        let script = format!("Screen 4 3\nLook {eye} 0 0 0 40\nTrace");
+        let parsed = rayfold_scene::parse("a.txt", script.as_bytes(), &rayfold_scene::Limits::default());
+        assert!(parsed.script.is_some(), "{eye}: {:?}", parsed.diagnostics);
+    }
+    check(
+        "Screen 4 3\nLook 3.06e-16 5 0  0 0 0  40  0 1 0\nTrace",
+        expect![[r#"
+            error: the gaze and the view-up must not be parallel
+             --> a.txt:2:31
+              |
+            2 | Look 3.06e-16 5 0  0 0 0  40  0 1 0
+              |                               ^^^^^ expected two directions that span a plane"#]],
+    );
+}
+
+#[test]
 fn a_light_that_travels_nowhere() {
     check(
         "Screen 4 3\nIlight 1 1 1 0 0 -0\nTrace",

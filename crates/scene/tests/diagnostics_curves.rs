@@ -80,6 +80,26 @@ fn gaze_and_view_up_that_meet_at_a_frame() {
 }
 
 #[test]
+fn an_eye_that_passes_over_the_target() {
+    let look = "Look (1:-1 3:1) 5 (1:3e-16 3:-3e-16)  0 0 0  40";
+    let read = |line: &str| {
+        let script = format!("Screen 4 3\nFrames 3\n{line}\nTrace");
+        rayfold_scene::parse("a.txt", script.as_bytes(), &rayfold_scene::Limits::default()).script
+    };
+    let script = read(look).expect("a script");
+    let camera = |frame: usize| script.frame(frame).expect("a frame").camera;
+    let rayfold_scene::Camera::Look(middle) = camera(1) else { panic!("a look") };
+    let (right, up, _) = middle.basis();
+    assert_eq!((right.to_array(), up.to_array()), ([1.0, 0.0, 0.0], [0.0, 0.0, -1.0]));
+    // Before and behind it y is up, as anywhere on the way.
+    for (frame, side) in [(0, 1.0), (2, -1.0)] {
+        let rayfold_scene::Camera::Look(look) = camera(frame) else { panic!("a look") };
+        assert!((look.basis().1.x - side).abs() < 0.1, "{frame}");
+    }
+    assert!(read(&format!("{look} 0 1 0")).is_none());
+}
+
+#[test]
 fn a_target_that_the_eye_passes() {
     check(
         "Screen 4 3\nLook 0 0 (1:0 11:10) 0 0 4 40\nFrames 11\nTrace",

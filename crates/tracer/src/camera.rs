@@ -18,14 +18,27 @@ pub(crate) struct Ray {
 }
 
 /// Where the samples of an image lie along one of its axes.
+///
+/// They are counted from the one, or the middle between two, that is nearest to zero: what lies straight ahead is met
+/// straight ahead, and what is rounded is as small as what comes of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Axis {
-    pub(crate) start: f64,
+    /// The sample that the others are counted from, a whole number or one and a half.
+    pub(crate) anchor: f64,
+    /// Where that lies.
+    pub(crate) at_anchor: f64,
     /// From one sample to the next; 0 if there is only one, and its pixel is a point.
     pub(crate) step: f64,
+    /// What rounding takes from the step.
+    pub(crate) rest: f64,
 }
 
 impl Axis {
+    /// Samples that lie at `start + index · step`.
+    pub(crate) fn along(start: f64, step: f64) -> Self {
+        Self { anchor: 0.0, at_anchor: start, step, rest: 0.0 }
+    }
+
     /// From the first of so many pixels to the last; a single one lies in the middle.
     fn between(from: f64, to: f64, pixels: u32, single: Single) -> Self {
         if pixels == 1 {
@@ -33,21 +46,57 @@ impl Axis {
                 Single::IsAPoint => 0.0,
                 Single::IsAll => to - from,
             };
-            Self { start: 0.5 * from + 0.5 * to, step }
-        } else {
-            Self { start: from, step: (to - from) / f64::from(pixels - 1) }
+            return Self::along(0.5 * from + 0.5 * to, step);
         }
+        let last = f64::from(pixels - 1);
+        // Half a sample is near enough; the middle of a window that is symmetric is one.
+        let twice = (2.0 * last * (-from / (to - from))).round().clamp(0.0, 2.0 * last);
+        let (step, rest) = quotient(sum(to, -from), last);
+        let (high, low) = quotient(add(product(from, 2.0 * last - twice), product(to, twice)), 2.0 * last);
+        Self { anchor: 0.5 * twice, at_anchor: high + low, step, rest }
     }
 
     /// Where a sample lies; `index` counts from the first and may be a fraction.
     pub(crate) fn at(self, index: f64) -> f64 {
-        self.start + self.step * index
+        let index = index - self.anchor;
+        index.mul_add(self.step, index.mul_add(self.rest, self.at_anchor))
+    }
+
+    /// The sample that lies there, nearly.
+    pub(crate) fn index(self, at: f64) -> f64 {
+        (at - self.at_anchor) / self.step + self.anchor
     }
 
     /// The same counted from the other end of so many samples.
     pub(crate) fn reversed(self, samples: u32) -> Self {
-        Self { start: self.at(f64::from(samples - 1)), step: -self.step }
+        let anchor = f64::from(samples - 1) - self.anchor;
+        Self { anchor, step: -self.step, rest: -self.rest, ..self }
     }
+}
+
+/// A number and what rounding has taken from it.
+type Twofold = (f64, f64);
+
+/// Knuth's sum.
+fn sum(a: f64, b: f64) -> Twofold {
+    let sum = a + b;
+    let of_b = sum - a;
+    (sum, (a - (sum - of_b)) + (b - of_b))
+}
+
+fn product(a: f64, b: f64) -> Twofold {
+    let product = a * b;
+    (product, a.mul_add(b, -product))
+}
+
+fn add(a: Twofold, b: Twofold) -> Twofold {
+    let (high, low) = sum(a.0, b.0);
+    (high, low + a.1 + b.1)
+}
+
+fn quotient((high, low): Twofold, by: f64) -> Twofold {
+    let quotient = high / by;
+    (quotient, ((-quotient).mul_add(by, high) + low) / by)
 }
 
 /// What a pixel is that is the only one of its row or column: where pixels are points, the middle; where they have an
@@ -78,11 +127,8 @@ pub(crate) fn grid(lower_left: DVec2, upper_right: DVec2, screen: Screen, single
 /// tan(fov/2)·(2j + 1 - ny)/ny.
 pub(crate) fn look_grid(look: &Look, screen: Screen) -> (Axis, Axis) {
     let slope = half_angle_slope(look.field_of_view());
-    let step = 2.0 * slope / f64::from(screen.height());
-    // Rounded so that its multiples up to the middle are exact: what lies straight ahead is met straight ahead.
-    let unused = (1u64 << (u32::BITS - screen.width().max(screen.height()).leading_zeros())) - 1;
-    let step = f64::from_bits(step.to_bits() & !unused);
-    let axis = |samples: u32| Axis { start: 0.5 * (1.0 - f64::from(samples)) * step, step };
+    let (step, rest) = quotient((2.0 * slope, 0.0), f64::from(screen.height()));
+    let axis = |samples: u32| Axis { anchor: 0.5 * f64::from(samples - 1), at_anchor: 0.0, step, rest };
     (axis(screen.width()), axis(screen.height()))
 }
 
@@ -103,12 +149,14 @@ pub fn pixel_ray(scene: &Scene, i: f64, j: f64) -> (DVec3, DVec3) {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Rays {
     Parallel,
-    /// `direction = corner + i·right + j·up`, not of unit length.
+    /// `direction = x.at(i)·right + y.at(j)·up - back`, not of unit length.
     Pinhole {
         eye: DVec3,
-        corner: DVec3,
         right: DVec3,
         up: DVec3,
+        back: DVec3,
+        x: Axis,
+        y: Axis,
     },
 }
 
@@ -117,25 +165,19 @@ impl Rays {
         let pinhole = match camera {
             Camera::Orthographic => return Self::Parallel,
             Camera::Look(look) => {
-                let (u, v, w) = look.basis();
+                let (right, up, back) = look.basis();
                 let (x, y) = look_grid(look, screen);
-                let corner = x.start * u + y.start * v - w;
-                return Self::Pinhole { eye: look.eye(), corner, right: x.step * u, up: y.step * v };
+                return Self::Pinhole { eye: look.eye(), right, up, back, x, y };
             }
             Camera::Pinhole(pinhole) => pinhole,
         };
-        let (u, v, w) = pinhole.basis();
+        let (right, up, back) = pinhole.basis();
         // Only the window's shape matters, so it is scaled until no product can overflow.
         let (a, b, distance) = (pinhole.lower_left(), pinhole.upper_right(), pinhole.distance());
         let scale = below_inverse(a.abs().max(b.abs()).max_element().max(distance));
         let (a, b, distance) = (a * scale, b * scale, (distance * scale).max(f64::MIN_POSITIVE));
         let (x, y) = grid(a, b, screen, single);
-        Self::Pinhole {
-            eye: pinhole.eye(),
-            corner: x.start * u + y.start * v - distance * w,
-            right: x.step * u,
-            up: y.step * v,
-        }
+        Self::Pinhole { eye: pinhole.eye(), right, up, back: distance * back, x, y }
     }
 
     /// The same in coordinates whose origin is the eye.
@@ -151,8 +193,8 @@ impl Rays {
     pub(crate) fn ray(&self, i: f64, j: f64) -> Ray {
         match *self {
             Self::Parallel => Ray { origin: DVec3::new(i, j, 0.0), direction: DVec3::NEG_Z },
-            Self::Pinhole { eye, corner, right, up } => {
-                Ray { origin: eye, direction: unit(corner + i * right + j * up) }
+            Self::Pinhole { eye, right, up, back, x, y } => {
+                Ray { origin: eye, direction: unit(x.at(i) * right + (y.at(j) * up - back)) }
             }
         }
     }
@@ -238,5 +280,84 @@ mod tests {
         let rays =
             Rays::new(&pinhole(DVec2::new(1.0, -1.0), DVec2::new(-1.0, 1.0)), screen, Single::IsAPoint);
         assert!(rays.ray(0.0, 0.0).direction.x > 0.0 && rays.ray(1.0, 0.0).direction.x < 0.0);
+    }
+
+    /// au + (bu - au)·i/(nx - 1) to 100 bits and more, from whole numbers: the window's corners are `a` and `b` parts of 2^40.
+    fn formula(a: i64, b: i64, i: u32, pixels: u32) -> f64 {
+        let (a, b, i, last) = (i128::from(a), i128::from(b), i128::from(i), i128::from(pixels - 1));
+        let numerator = (a * (last - i) + b * i) << 40;
+        let (whole, rest) = (numerator / last, numerator % last);
+        // Below 2^100, cut off at 2^-40: the rest decides nothing but ties, which it breaks.
+        let sticky = i128::from(rest != 0);
+        ((whole << 1) + whole.signum() * sticky) as f64 / 2f64.powi(81)
+    }
+
+    #[test]
+    fn the_columns_of_a_camera_are_those_of_the_formula_rounded_once() {
+        let mut rng = fastrand::Rng::with_seed(35);
+        let unit = 2f64.powi(-40);
+        for round in 0..2000 {
+            let a = rng.i64(-(1 << 40)..1 << 40);
+            let b = if round % 2 == 0 { -a } else { rng.i64(-(1 << 40)..1 << 40) };
+            if a == b {
+                continue;
+            }
+            let pixels = rng.u32(2..3000);
+            let axis = Axis::between(a as f64 * unit, b as f64 * unit, pixels, Single::IsAPoint);
+            for i in [0, pixels - 1, pixels / 2, rng.u32(0..pixels)] {
+                let (ours, right) = (axis.at(f64::from(i)), formula(a, b, i, pixels));
+                // Where the middle of the view is no sample, or far off, two roundings may not be one.
+                let slack = match () {
+                    () if a == -b => 0.0,
+                    () if a.signum() == b.signum() => 2.0 * f64::EPSILON,
+                    () => f64::EPSILON,
+                };
+                assert!(
+                    (ours - right).abs() <= slack * right.abs(),
+                    "{a} {b}, {i} of {pixels}: {ours:e} {right:e}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_middle_of_an_odd_width_lies_straight_ahead() {
+        for pixels in (1..400).step_by(2) {
+            let screen = Screen::new(pixels, pixels).unwrap();
+            let middle = f64::from(pixels / 2);
+            for half in [0.1, 0.6, 0.414_213_562_373, 7e-3] {
+                let half = DVec2::new(half, 0.75 * half);
+                let rays = Rays::new(&pinhole(-half, half), screen, Single::IsAPoint);
+                assert_eq!(rays.ray(middle, middle).direction, DVec3::NEG_Z, "{pixels}");
+            }
+            for degrees in [20.0, 40.0, 77.7] {
+                let look =
+                    Look::new(DVec3::new(0.3, 1.0, 2.9), DVec3::new(-1.1, 1.0, 0.2), degrees, None).unwrap();
+                let rays = Rays::new(&Camera::Look(look), screen, Single::IsAPoint);
+                for i in [0.0, middle, 0.3 * middle] {
+                    assert_eq!(rays.ray(i, middle).direction.y, 0.0, "{pixels}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_window_s_corner_as_high_as_it_is_far_is_met_at_half_a_right_angle() {
+        // The gaze goes down by 45 degrees: the rays of the top row are horizontal.
+        for pixels in 2..300 {
+            let camera = Pinhole::new(
+                DVec3::ZERO,
+                DVec3::new(0.0, -1.0, -1.0),
+                DVec3::Y,
+                0.7,
+                -0.7 * DVec2::ONE,
+                0.7 * DVec2::ONE,
+            );
+            let screen = Screen::new(pixels, pixels).unwrap();
+            let rays = Rays::new(&Camera::Pinhole(camera.unwrap()), screen, Single::IsAPoint);
+            for i in 0..pixels {
+                assert_eq!(rays.ray(f64::from(i), f64::from(pixels - 1)).direction.y, 0.0, "{pixels}");
+            }
+        }
     }
 }

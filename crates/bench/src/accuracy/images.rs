@@ -12,6 +12,7 @@ use super::rays;
 use crate::backends::{self, Backend, packets};
 use crate::cpu_time;
 use crate::oracle;
+use crate::outlines::dots;
 
 /// The deepest recursion that is measured: what the error of stopping early is taken against.
 pub(crate) const DEEPEST: u32 = 16;
@@ -53,6 +54,8 @@ pub(crate) struct Error {
     pub(crate) largest: u8,
     /// Pixels off by more than 2 levels in a channel.
     pub(crate) off: usize,
+    /// Pixels unlike all those around them in the truth.
+    pub(crate) dots: usize,
     pub(crate) flip: f64,
     /// Channels that were not a number before they became a level.
     pub(crate) nans: u64,
@@ -179,7 +182,7 @@ fn error(image: &RgbImage, truth: &RgbImage) -> Error {
         off += usize::from(worst > 2);
     }
     let flip = if largest == 0 { 0.0 } else { flip(image, truth) };
-    Error { rmse: rmse(image, truth), largest, off, flip, nans: 0 }
+    Error { rmse: rmse(image, truth), largest, off, dots: dots(image, truth).len(), flip, nans: 0 }
 }
 
 fn rmse(image: &RgbImage, truth: &RgbImage) -> f64 {

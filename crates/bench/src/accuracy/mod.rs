@@ -92,7 +92,9 @@ fn introduction(quick: bool) -> String {
          language's; up to {DEEPEST} are drawn, those that add rays. *Unfinished* is the root mean square of the difference \
          from the truth at the greatest depth, rounding and stopping early together. *Front*: no other backend and depth is both as fast and as close to that truth.\n\n\
          RMSE and the largest error are in levels (0 to 255) over the three channels; FLIP is the mean of LDR-FLIP \
-         (Andersson et al. 2020) at 67 pixels a degree; NaN counts channels that were not a number before they became \
+         (Andersson et al. 2020) at 67 pixels a degree; *dots* are pixels more than 16 levels from each of the nine pixels around \
+         them in the truth, which is what is seen of an error at an outline ([outlines.md](outlines.md) looks for them at \
+         length); NaN counts channels that were not a number before they became \
          a level. Rays are those that the language asks for: from the camera, to each light that a surface faces, from \
          mirrors. One sample a pixel; of several \
          samples, [sampling.md](sampling.md).\n\n"
@@ -165,15 +167,15 @@ fn tables(comparisons: &[Comparison]) -> Result<String> {
             text,
             "\n### {}\n\n{} objects, {} x {} pixels. The truth is drawn by `{}`; its own error at {} pixels: largest \
              {:.1e} levels, {} see something else than the oracle.\n\n\
-             | backend | depth | CPU ms | rays | Mrays/s | RMSE | largest | off by > 2 | FLIP | NaN | unfinished | front |\n\
-             | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+             | backend | depth | CPU ms | rays | Mrays/s | RMSE | largest | off by > 2 | dots | FLIP | NaN | unfinished | front |\n\
+             | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
             c.scene, c.objects, c.size.0, c.size.1, truth.backend, truth.samples, truth.largest, truth.off
         )?;
         for m in &c.measurements {
             let e = &m.error;
             writeln!(
                 text,
-                "| {} | {} | {:.2} | {} | {:.2} | {:.4} | {} | {} ({:.4} %) | {:.5} | {} | {:.4} | {} |",
+                "| {} | {} | {:.2} | {} | {:.2} | {:.4} | {} | {} ({:.4} %) | {} | {:.5} | {} | {:.4} | {} |",
                 m.backend,
                 m.bounces,
                 1e3 * m.seconds,
@@ -183,6 +185,7 @@ fn tables(comparisons: &[Comparison]) -> Result<String> {
                 e.largest,
                 e.off,
                 100.0 * e.off as f64 / c.pixels() as f64,
+                e.dots,
                 e.flip,
                 e.nans,
                 m.unfinished,

@@ -170,7 +170,7 @@ pub enum Together {
     DifferEverywhere(usize, usize),
     /// Two directions are not parallel.
     NotParallel(usize, usize),
-    /// From the first position to the second is not parallel to the third, a direction (y where it is left out).
+    /// From the first position to the second is not parallel to the third, a direction, where that is given.
     LooksAside(usize, usize, usize),
     /// The first number is greater than the second.
     Greater(usize, usize),
@@ -453,7 +453,7 @@ impl Together {
             Self::DifferEverywhere(a, b) => format!("{} and {} differ in every number", names(a), names(b)),
             Self::NotParallel(a, b) => format!("{} and {} are not parallel", names(a), names(b)),
             Self::LooksAside(from, to, up) => {
-                format!("from {} to {} is not parallel to {}", names(from), names(to), names(up))
+                format!("from {} to {} is not parallel to {}, if given", names(from), names(to), names(up))
             }
             Self::Greater(a, b) => format!("{} is greater than {}", names(a), names(b)),
             Self::NotBothZero(a, b) => format!("{} and {} are not both 0", names(a), names(b)),

@@ -20,11 +20,11 @@ pub struct Look {
 
 impl Look {
     /// `eye` and `target` are positions, `field_of_view` is the vertical angle in degrees; `up` a direction of any
-    /// length: if it is not given, y, or -z for a gaze straight up or down.
+    /// length: if it is not given, y, or -z for a gaze that is parallel to y, which is then drawn as if it were exactly so.
     ///
     /// # Errors
-    /// When eye and target are the same, the angle is not above 0 and below 180, up is zero or along the gaze, or a
-    /// number is not finite.
+    /// When eye and target are the same, the angle is not above 0 and below 180, up is given and zero or parallel to the
+    /// gaze, or a number is not finite.
     pub fn new(
         eye: DVec3,
         target: DVec3,
@@ -51,7 +51,7 @@ impl Look {
         let look = Self { eye, target, field_of_view, up };
         if eye == target {
             faults.push(InvalidValue::NoGaze);
-        } else if faults.is_empty() && is_parallel(look.gaze(), look.up()) {
+        } else if faults.is_empty() && up.is_some_and(|up| is_parallel(look.gaze(), up)) {
             faults.push(InvalidValue::GazeParallelToUp);
         }
         if faults.is_empty() { Ok(look) } else { Err(faults) }
@@ -85,15 +85,25 @@ impl Look {
 
     /// View-up, of any length.
     pub fn up(&self) -> DVec3 {
-        let gaze = self.gaze();
-        self.up.unwrap_or(if gaze.x == 0.0 && gaze.z == 0.0 { DVec3::NEG_Z } else { DVec3::Y })
+        self.gaze_and_up().1
     }
 
     /// The orthonormal frame (u, v, w): u to the right, v up, w against the gaze, as [`super::Pinhole::basis`].
     pub fn basis(&self) -> (DVec3, DVec3, DVec3) {
-        let w = -unit(self.gaze());
-        let u = unit(cross(level(self.gaze()), level(self.up())));
+        let (gaze, up) = self.gaze_and_up();
+        let w = -unit(gaze);
+        let u = unit(cross(level(gaze), level(up)));
         (u, w.cross(u), w)
+    }
+
+    /// Without an up of its own a gaze that is parallel to y is turned into y, so that rounding has no say in the frame.
+    fn gaze_and_up(&self) -> (DVec3, DVec3) {
+        let gaze = self.gaze();
+        match self.up {
+            Some(up) => (gaze, up),
+            None if is_parallel(gaze, DVec3::Y) => (DVec3::new(0.0, gaze.y, 0.0), DVec3::NEG_Z),
+            None => (gaze, DVec3::Y),
+        }
     }
 }
 
@@ -121,5 +131,53 @@ impl Scripted for Look {
         line.vector(self.target)?;
         line.number(self.field_of_view)?;
         self.up.map_or(Ok(()), |up| line.vector(up))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn look(eye: DVec3, up: Option<DVec3>) -> Result<Look, InvalidValue> {
+        Look::new(eye, DVec3::ZERO, 40.0, up)
+    }
+
+    #[test]
+    fn a_gaze_that_is_parallel_to_y_within_rounding_is_that_from_exactly_above_or_below() {
+        for side in [1.0, -1.0] {
+            let exact = look(DVec3::new(0.0, 5.0 * side, 0.0), None).unwrap().basis();
+            assert_eq!(exact.0, side * DVec3::X);
+            assert_eq!(exact.1, DVec3::NEG_Z);
+            for sine in [3.06e-16, -1e-13, 0.99 / (1u64 << 40) as f64] {
+                for aside in [DVec3::X, DVec3::Z, DVec3::new(0.6, 0.0, -0.8)] {
+                    let eye = DVec3::new(0.0, 5.0 * side, 0.0) + 5.0 * sine * aside;
+                    assert_eq!(look(eye, None).unwrap().basis(), exact, "{sine:e} along {aside}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn frames_beside_the_pole_of_an_orbit_look_as_the_orbit_does() {
+        // Over the pole from +z to -z, as near as is not parallel: the picture's right is that of the orbit.
+        for sine in [1e-3, 1e-9, 1.01 / (1u64 << 40) as f64] {
+            for (side, right) in [(1.0, DVec3::X), (-1.0, DVec3::NEG_X)] {
+                let (u, v, w) = look(DVec3::new(0.0, 5.0, 5.0 * side * sine), None).unwrap().basis();
+                assert_eq!(u, right, "{sine:e}");
+                assert!(v.distance(DVec3::new(0.0, sine, -side)) < 1e-5 && w.y > 0.99, "{sine:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_up_of_its_own_along_the_gaze_is_an_error_within_the_same_rounding() {
+        let above = |x: f64| DVec3::new(x, 5.0, 0.0);
+        let near = 0.99 * 5.0 / (1u64 << 40) as f64;
+        for (eye, up) in
+            [(above(3.06e-16), DVec3::Y), (above(near), DVec3::Y), (above(0.0), DVec3::NEG_Y * 1e200)]
+        {
+            assert_eq!(look(eye, Some(up)), Err(InvalidValue::GazeParallelToUp), "{eye} {up}");
+        }
+        assert!(look(above(1.02 / 0.99 * near), Some(DVec3::Y)).is_ok());
     }
 }

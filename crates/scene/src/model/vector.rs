@@ -25,13 +25,13 @@ pub(super) fn to_unit_scale(largest: f64) -> f64 {
     2f64.powi(-exponent)
 }
 
-/// Directions whose sine is below this are taken for parallel: what is parallel as written in decimals is only nearly
-/// so once it is rounded to floats.
-pub(crate) const PARALLEL: f64 = 4.0 * f64::EPSILON;
+/// Directions are parallel where the sine of their angle is at most this: what is parallel on paper is only nearly so
+/// once programs have worked it out in floats.
+pub(crate) const PARALLEL: f64 = 1.0 / (1u64 << 40) as f64;
 
 pub(super) fn is_parallel(a: DVec3, b: DVec3) -> bool {
     let (a, b) = (level(a), level(b));
-    cross(a, b).length() < PARALLEL * a.length() * b.length()
+    cross(a, b).length() <= PARALLEL * a.length() * b.length()
 }
 
 /// The vector times a power of two, about as long as 1.

@@ -1,4 +1,5 @@
-//! Whether a ray passes a triangle near enough, decided in `f64` whatever the kernels compute with.
+//! Whether a ray passes a triangle near enough, and which of two triangles at an edge is behind the other, decided in `f64`
+//! whatever the kernels compute with.
 //!
 //! The side on which a ray passes an edge is the sign of a volume. It is worked out with a bound on the error, and where
 //! that leaves the sign open as a sum of numbers that do not overlap, which is exact (Shewchuk, "Adaptive precision
@@ -7,39 +8,67 @@
 
 use glam::DVec3;
 
+use super::real::Real;
+
 /// Rounding errors of a volume of three edges or a direction in `f64`, as a part of the product of their magnitudes,
 /// generously: two roundings of the differences, and six of the sums and products.
 const NOISE: f64 = 8.0 * f64::EPSILON;
 
-/// Whether the ray from `origin` along `direction` meets the plane of a triangle ahead, and passes within `reach` of the
-/// triangle; `reach` depends on how far along the ray that is.
+/// The ends of an edge.
+pub(super) type Edge = [DVec3; 2];
+
+/// How far beside an edge a ray may pass that is meant to meet it, in roundoffs of the distance: the direction itself is rounded.
+const ON_EDGE: f64 = 16.0 * <f64 as Real>::ROUNDOFF;
+
+/// Whether the ray from `origin` along `direction` meets the plane of a triangle ahead, and passes within it or on an edge, or
+/// within `reach` of one of the edges of which `is_wide` holds; `reach` depends on how far along the ray that is.
 pub(super) fn passes(
     corners: [DVec3; 3],
     origin: DVec3,
     direction: DVec3,
     reach: impl Fn(f64) -> f64,
+    is_wide: impl Fn(Edge) -> bool,
 ) -> bool {
     let [a, b, c] = corners;
     let facing = volume([direction, b - a, c - a], || {
         exact(&[(1.0, [direction, b, c]), (-1.0, [direction, b, a]), (-1.0, [direction, a, c])])
     });
-    let ahead = volume(corners.map(|corner| corner - origin), || {
-        exact(&[(1.0, corners), (-1.0, [origin, b, c]), (-1.0, [a, origin, c]), (-1.0, [a, b, origin])])
-    });
-    if facing * ahead <= 0 {
+    if facing * orientation(corners, origin) <= 0 {
         return false;
     }
-    let edges = [(b, c), (c, a), (a, b)];
-    let sides = edges.map(|(p, q)| {
+    let edges = [[b, c], [c, a], [a, b]];
+    let sides = edges.map(|[p, q]| {
         volume([direction, p - origin, q - origin], || {
             exact(&[(1.0, [direction, p, q]), (-1.0, [direction, p, origin]), (-1.0, [direction, origin, q])])
         })
     });
     sides.iter().all(|side| side * facing >= 0)
-        || edges.iter().any(|&(p, q)| {
-            let (along, aside) = nearest_of_edge(p - origin, q - origin, direction);
-            along >= 0.0 && aside <= reach(along)
+        || edges.into_iter().any(|edge| {
+            is_beside(edge, origin, direction, &reach)
+                && (is_beside(edge, origin, direction, |along| reach(along).min(ON_EDGE * along))
+                    || is_wide(edge))
         })
+}
+
+/// Whether a ray passes within `reach` of an edge ahead; `reach` depends on how far along the ray that is.
+pub(super) fn is_beside([p, q]: Edge, origin: DVec3, direction: DVec3, reach: impl Fn(f64) -> f64) -> bool {
+    let (along, aside) = nearest_of_edge(p - origin, q - origin, direction);
+    along >= 0.0 && aside <= reach(along)
+}
+
+/// Whether, of two triangles with one edge, that with the corner `apex` is behind that with the corner `other` where a ray from
+/// `origin` passes the edge: both are on one side of it, as at an outline, and the plane of the other lies between.
+pub(super) fn is_behind([p, q]: Edge, apex: DVec3, other: DVec3, origin: DVec3) -> bool {
+    let side = orientation([p, q, apex], origin);
+    side != 0 && side == orientation([p, q, other], origin) && orientation([p, q, other], apex) == -side
+}
+
+/// The side of a triangle's plane on which a point lies.
+fn orientation(corners: [DVec3; 3], point: DVec3) -> i32 {
+    let [a, b, c] = corners;
+    volume(corners.map(|corner| corner - point), || {
+        exact(&[(1.0, corners), (-1.0, [point, b, c]), (-1.0, [a, point, c]), (-1.0, [a, b, point])])
+    })
 }
 
 /// The point of an edge from `p` to `q` that is nearest to the line through zero along a direction of length 1: how far
@@ -124,7 +153,7 @@ mod tests {
     }
 
     fn meets(corners: [DVec3; 3], origin: DVec3, direction: DVec3) -> bool {
-        passes(corners, origin, direction, |_| -1.0)
+        passes(corners, origin, direction, |_| -1.0, |_| true)
     }
 
     /// `meets` by whole numbers.
@@ -182,8 +211,8 @@ mod tests {
             (1.0 + 1e-6, 0.0, true),
             (1.0 + 1e-5, 0.0, false),
         ] {
-            assert_eq!(passes(needle, DVec3::ZERO, aimed(x, y), reach), is_near, "towards {x} {y}");
-            assert!(!passes(needle, DVec3::ZERO, -aimed(x, y), reach), "away from {x} {y}");
+            assert_eq!(passes(needle, DVec3::ZERO, aimed(x, y), reach, |_| true), is_near, "towards {x} {y}");
+            assert!(!passes(needle, DVec3::ZERO, -aimed(x, y), reach, |_| true), "away from {x} {y}");
         }
     }
 
@@ -198,5 +227,29 @@ mod tests {
             // u · (v × w) with w = (0, 0, w): w (u.x v.y - u.y v.x), and v.x - u.x is what the lift leaves of it.
             assert_eq!(sum, -sign(p.x - along.x), "{lift}");
         }
+    }
+
+    #[test]
+    fn of_two_faces_at_an_outline_one_is_behind_the_other_whatever_their_orientation() {
+        let mut rng = fastrand::Rng::with_seed(4);
+        let mut decided = 0;
+        for _ in 0..20_000 {
+            // In the plane across an edge along z, with the eye at (0, -8) and the edge at (0, 0).
+            let far = whole(&mut rng) * 2f64.powi(46);
+            let [one, other] =
+                [(); 2].map(|()| DVec3::new(f64::from(rng.i32(-3..4)), f64::from(rng.i32(-3..4)), 0.0));
+            let eye = DVec3::new(0.0, -8.0, 0.0);
+            let edge = [DVec3::NEG_Z, DVec3::Z];
+            // Seen from the eye, by the angle from where the eye is.
+            let angle = |v: DVec3| v.x.abs().atan2(-v.y);
+            let expected = one.x * other.x > 0.0 && angle(one) > angle(other) + 1e-9;
+            let place = |v: DVec3| (far + v) * 2f64.powi(-50);
+            for [p, q] in [edge, [edge[1], edge[0]]] {
+                let found = is_behind([place(p), place(q)], place(one), place(other), place(eye));
+                assert_eq!(found, expected, "{one} behind {other}");
+            }
+            decided += usize::from(expected);
+        }
+        assert!(decided > 2000, "{decided}");
     }
 }

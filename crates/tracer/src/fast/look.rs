@@ -14,24 +14,27 @@ use super::rays::{AlongAxis, FromEye};
 use super::real::{Lanes, Real, Vec3, constant};
 use super::search::nearest;
 
-/// The numbers of the column and the row of each pixel of the tile, packet by packet; rows count from the bottom.
+/// The numbers of the column and the row of each pixel of the tile, packet by packet; they count from an `anchor` from the
+/// left and from the bottom, and are whole numbers or halves.
 #[inline(always)]
 fn each_packet<S: Simd, E: Real>(
     simd: S,
     (tile, band): (Tile, &Band),
+    anchor: (f64, f64),
     mut each: impl FnMut(usize, Lanes<S, E>, Lanes<S, E>),
 ) {
     let (width, height) = packet_shape::<S, E>();
     let columns = lanes_modulo::<S, E>(simd, width);
     let rows = (count_from::<S, E>(simd, 0) - columns) * E::narrow(1.0 / width as f64);
-    let right = constant::<S, E>(simd, f64::from(tile.left + tile.width - 1));
+    let first = f64::from(tile.left) - anchor.0;
+    let right = constant::<S, E>(simd, first + f64::from(tile.width - 1));
     let bottom = constant::<S, E>(simd, f64::from(tile.top + tile.height - 1));
-    let last_row = constant::<S, E>(simd, f64::from(band.size.1 - 1));
+    let last_row = constant::<S, E>(simd, f64::from(band.size.1 - 1) - anchor.1);
     let mut at = 0;
     for top in (0..tile.height as usize).step_by(height) {
         for left in (0..tile.width as usize).step_by(width) {
             // Lanes beyond the edge draw the pixel on the edge again.
-            let i = (columns + E::narrow((tile.left as usize + left) as f64)).min(right);
+            let i = (columns + E::narrow(first + left as f64)).min(right);
             let row = (rows + E::narrow((tile.top as usize + top) as f64)).min(bottom);
             each(at, i, last_row - row);
             at += Lanes::<S, E>::LEN;
@@ -57,6 +60,7 @@ pub(super) fn look_from_eye<S: Simd, E: Real, F: Features<E>>(
             each_packet::<S, E>(
                 simd,
                 (tile, band),
+                rays.anchor(),
                 #[inline(always)]
                 |at, i, j| {
                     let direction = rays.direction(simd, i, j);
@@ -91,6 +95,7 @@ pub(super) fn aim_along_axis<S: Simd, E: Real>(
             each_packet::<S, E>(
                 simd,
                 (tile, band),
+                (0.0, 0.0),
                 #[inline(always)]
                 |at, i, j| {
                     let end = at + Lanes::<S, E>::LEN;

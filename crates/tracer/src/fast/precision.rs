@@ -173,7 +173,7 @@ impl Colors {
 
 /// The largest slopes across and along the window.
 fn widest((x, y): (Axis, Axis), size: (u32, u32)) -> (f64, f64) {
-    let of = |axis: Axis, samples: u32| axis.start.abs().max(axis.at(f64::from(samples - 1)).abs());
+    let of = |axis: Axis, samples: u32| axis.at(0.0).abs().max(axis.at(f64::from(samples - 1)).abs());
     (of(x, size.0), of(y, size.1))
 }
 

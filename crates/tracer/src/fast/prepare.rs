@@ -22,7 +22,7 @@ use super::lights::sun::{Direction, Outline, Outlines, Sun};
 use super::lists::LISTED;
 use super::parts;
 use super::placed::Placed;
-use super::rays::Rays;
+use super::rays::{Pixels, Rays};
 use super::real::Real;
 use super::shapes::{Obstacles, Shape, Shapes, Solid, Sorted};
 use super::shared::SharedSurfaces;
@@ -82,7 +82,7 @@ pub(super) struct Prepared<E> {
     row: Row,
     pub(super) entries: Vec<Entry<E>>,
     pub(super) suns: Vec<Sunlight<E>>,
-    pub(super) tree: Option<Tree<E>>,
+    pub(super) tree: Option<Arc<Tree<E>>>,
     /// For scenes of many objects, where it helps: what the tiles show.
     pub(super) sights: Option<Sights>,
     /// Unclamped, for mirrored rays; of a sky its first colour.
@@ -159,7 +159,11 @@ impl<E: Real> Prepared<E> {
             let of_bodies = boxes.unwrap_or_default().iter().map(Placed::bounds);
             [Balls::new(standing.shapes().map(Placed::bounds)), Balls::new(of_bodies)]
         });
-        let shapes = Shapes::new(solids, sorted);
+        let tree = branches.map(|branches| {
+            Arc::new(Tree::new(branches, solids, |place| entries[solids[place].order as usize].index))
+        });
+        let pixels = if scene.samples.most() > 1 { None } else { Pixels::of(&geometry.view) };
+        let shapes = Shapes::new(solids, sorted, tree.clone(), pixels);
         let alone = match (&solids[..], &geometry.view) {
             ([solid], View::Pinhole { .. }) if grid.lens.is_none() => {
                 !needs.mirrors && shapes.is_seen_from_outside(solid.shape.kind(), 0)
@@ -177,9 +181,7 @@ impl<E: Real> Prepared<E> {
             needs,
             background: narrow(scene.background.colors().0),
             sky,
-            tree: branches.map(|branches| {
-                Tree::new(branches, solids, |place| entries[solids[place].order as usize].index)
-            }),
+            tree,
             sights,
             entries,
             beyond,

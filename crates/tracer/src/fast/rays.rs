@@ -1,13 +1,17 @@
 //! Where the rays of pixels start and go, in packets: [`View`] with its numbers rounded.
 //!
-//! Columns count from the left and rows from the bottom, and both may be fractions.
+//! Columns count from the left and rows from the bottom, both from the view's [anchor](Rays::anchor), and both may be
+//! fractions.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::DVec3;
+use rayfold_scene::model::unit;
 
 use super::geometry::View;
 use super::real::{Lanes, Real, Vec3, splat};
+use super::rounding::TURNED;
+use crate::camera::Axis;
 
 /// The rays of a view.
 #[derive(Clone, Copy, Debug)]
@@ -16,12 +20,23 @@ pub(super) enum Rays<E> {
     Parallel(AlongAxis<E>),
 }
 
-/// Rays from the origin along `corner + i·right + j·up`.
+/// Rays from the origin along `x·right + y·up + ahead`, by where their column and row lie on the window.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FromEye<E> {
-    corner: [E; 3],
     right: [E; 3],
     up: [E; 3],
+    ahead: [E; 3],
+    x: Steps<E>,
+    y: Steps<E>,
+}
+
+/// An [`Axis`] with its numbers rounded.
+#[derive(Clone, Copy, Debug)]
+struct Steps<E> {
+    anchor: f64,
+    at_anchor: E,
+    step: E,
+    rest: E,
 }
 
 /// Rays from `corner + (i·pixel, j·pixel, 0)` along `(0, 0, -1)`.
@@ -39,11 +54,76 @@ impl<E: Real> Rays<E> {
                 Self::Parallel(AlongAxis { corner: narrow(corner), pixel: E::narrow(pixel) })
             }
             View::Pinhole { right, up, back, x, y } => Self::Pinhole(FromEye {
-                corner: narrow(x.start * right + y.start * up - back),
-                right: narrow(x.step * right),
-                up: narrow(y.step * up),
+                right: narrow(right),
+                up: narrow(up),
+                ahead: narrow(-back),
+                x: Steps::new(x),
+                y: Steps::new(y),
             }),
         }
+    }
+}
+
+/// The rays of an image's pixels from the eye, unrounded.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pixels {
+    right: DVec3,
+    up: DVec3,
+    back: DVec3,
+    x: Axis,
+    y: Axis,
+}
+
+impl Pixels {
+    pub(super) fn of(view: &View) -> Option<Self> {
+        match *view {
+            View::Pinhole { right, up, back, x, y } => Some(Self { right, up, back, x, y }),
+            View::Parallel { .. } => None,
+        }
+    }
+
+    /// The direction of the pixel's ray of which this one is what rounding left; none if it is that of no pixel.
+    pub(super) fn unrounded<E: Real>(&self, direction: DVec3) -> Option<DVec3> {
+        let ahead = -direction.dot(self.back);
+        let nearest =
+            |axis: Axis, at: f64| axis.at(if axis.step == 0.0 { 0.0 } else { axis.index(at).round() });
+        let x = nearest(self.x, direction.dot(self.right) / ahead);
+        let y = nearest(self.y, direction.dot(self.up) / ahead);
+        let exact = unit(x * self.right + (y * self.up - self.back));
+        (ahead > 0.0 && exact.cross(direction).length() <= TURNED * E::ROUNDOFF).then_some(exact)
+    }
+}
+
+impl<E> Rays<E> {
+    /// The column and the row that the others are counted from.
+    pub(super) fn anchor(&self) -> (f64, f64) {
+        match self {
+            Self::Pinhole(rays) => rays.anchor(),
+            Self::Parallel(_) => (0.0, 0.0),
+        }
+    }
+}
+
+impl<E> FromEye<E> {
+    /// The column and the row that the others are counted from.
+    #[inline(always)]
+    pub(super) fn anchor(&self) -> (f64, f64) {
+        (self.x.anchor, self.y.anchor)
+    }
+}
+
+impl<E: Real> Steps<E> {
+    fn new(Axis { anchor, at_anchor, step, rest }: Axis) -> Self {
+        let rounded = E::narrow(step);
+        let rest = E::narrow(step - rounded.widen() + rest);
+        Self { anchor, at_anchor: E::narrow(at_anchor), step: rounded, rest }
+    }
+
+    /// Where samples lie that are counted from the anchor.
+    #[inline(always)]
+    fn at<S: Simd>(&self, simd: S, index: Lanes<S, E>) -> Lanes<S, E> {
+        let rest = index.mul_add(splat::<S, E>(simd, self.rest), splat::<S, E>(simd, self.at_anchor));
+        index.mul_add(splat::<S, E>(simd, self.step), rest)
     }
 }
 
@@ -57,8 +137,9 @@ impl<E: Real> FromEye<E> {
     /// The same, so long that they go as far as 1 along the gaze.
     #[inline(always)]
     pub(super) fn along<S: Simd>(&self, simd: S, i: Lanes<S, E>, j: Lanes<S, E>) -> Vec3<S, E> {
-        let along = Vec3::splat(simd, self.right).scale_add(i, Vec3::splat(simd, self.corner));
-        Vec3::splat(simd, self.up).scale_add(j, along)
+        // The row first: it is the same for all packets side by side.
+        let row = Vec3::splat(simd, self.up).scale_add(self.y.at(simd, j), Vec3::splat(simd, self.ahead));
+        Vec3::splat(simd, self.right).scale_add(self.x.at(simd, i), row)
     }
 }
 

@@ -43,8 +43,8 @@ pub(super) const BOX: f64 = 32.0;
 
 /// The part of a pixel by which tiles are wider than their pixels.
 ///
-/// A pixel's coordinate on the window is `start + i · step`, with 3 roundoffs: in `f32`, in an image of 100,000 columns,
-/// 1/56 of a pixel. What the direction is off besides is in [`BOUNDS`].
+/// A pixel's coordinate on the window is rounded by 2 roundoffs: in `f32`, in an image of 100,000 columns, 1/168 of a pixel.
+/// What the direction is off besides is in [`BOUNDS`].
 pub(super) const MARGIN: f64 = 1.0 / 32.0;
 
 /// Below this many roundoffs the sine of the angle between a ray and a triangle's plane is noise: the ray is in the plane,
@@ -77,6 +77,15 @@ pub(super) const LATE_IN_TREE: f64 = 64.0;
 ///
 /// One of the constant, four of the sum without fused multiply-add, and what is of second order.
 pub(super) const SIDE: f64 = 5.25;
+
+/// How far rounding turns a ray from the eye, in roundoffs.
+///
+/// A coordinate on the window and the axis that it is along are rounded, 1 each, and the two sums, 1 each; each of these is a part of
+/// the direction's length. A ray that is turned by more counts as one of no pixel.
+pub(super) const TURNED: f64 = 4.0;
+
+/// [`SIDE`] of a ray from the eye, where the ray of the pixel is meant.
+pub(super) const SIDE_OF_PIXEL: f64 = SIDE + TURNED;
 
 /// Rounding errors of the constants of an edge in `f64`, before they are rounded to the kernels' numbers, relative to the
 /// product of the lengths.

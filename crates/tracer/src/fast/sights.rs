@@ -36,10 +36,10 @@ impl Sights {
         }
         let (columns, rows) = (width.div_ceil(side.0) as usize, height.div_ceil(side.1) as usize);
         let (x, y) = axes(view);
-        let tiles = |span: Option<(f64, f64)>, Axis { start, step }: Axis, pixels: u32, side: u32| {
+        let tiles = |span: Option<(f64, f64)>, axis: Axis, pixels: u32, side: u32| {
             let last = f64::from(pixels - 1);
             let (from, to) = span.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
-            let (a, b) = ((from - start) / step, (to - start) / step);
+            let (a, b) = (axis.index(from), axis.index(to));
             let (from, to) = (a.min(b) - margin, a.max(b) + margin);
             // Also where a bound is not a number.
             if from > last || to < 0.0 {

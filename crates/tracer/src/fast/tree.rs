@@ -367,4 +367,24 @@ impl<E: Real> Tree<E> {
         };
         Self { nodes: place.iter().map(node).collect() }
     }
+
+    /// Whether `is` holds of the objects of any leaf whose box has this one within it.
+    pub(super) fn any_around(&self, (min, max): Bounds, is: impl Fn(Kind, Range<usize>) -> bool) -> bool {
+        let mut pending = vec![0];
+        while let Some(at) = pending.pop() {
+            let node: &Node<E> = &self.nodes[at];
+            let is_around = (0..3)
+                .all(|axis| node.low[axis].widen() <= min[axis] && max[axis] <= node.high[axis].widen());
+            match node.content() {
+                _ if !is_around => {}
+                Content::Leaf(kind, items) => {
+                    if is(kind, items) {
+                        return true;
+                    }
+                }
+                Content::Children(first, _) => pending.extend([first as usize, first as usize + 1]),
+            }
+        }
+        false
+    }
 }

@@ -153,15 +153,13 @@ fn up(view: &View) -> DVec3 {
 pub(super) fn axes(view: &View) -> (Axis, Axis) {
     match *view {
         View::Pinhole { x, y, .. } => (widened(x), widened(y)),
-        View::Parallel { corner, pixel } => {
-            (Axis { start: corner.x, step: pixel }, Axis { start: corner.y, step: pixel })
-        }
+        View::Parallel { corner, pixel } => (Axis::along(corner.x, pixel), Axis::along(corner.y, pixel)),
     }
 }
 
 /// A single sample has no step; its tile is given a little width all the same.
-fn widened(Axis { start, step }: Axis) -> Axis {
-    Axis { start, step: if step == 0.0 { 1e-3 * start.abs().max(1.0) } else { step } }
+fn widened(axis: Axis) -> Axis {
+    Axis { step: if axis.step == 0.0 { 1e-3 * axis.at_anchor.abs().max(1.0) } else { axis.step }, ..axis }
 }
 
 fn mask(shapes: &[Shape], is_candidate: impl Fn(&Shape) -> bool) -> u64 {

@@ -414,6 +414,7 @@ fn place<S: Simd, E: Real>(
         #[inline(always)]
         || {
             let Workspace { scratch, lights, seeds, samples, columns, rows, coordinates, .. } = workspace;
+            let anchor = moment.prepared.rays.anchor();
             let count = batch.len();
             // In two loops, of which the second is done in packets.
             let mut pixels = [[0; ROOM]; 2];
@@ -423,7 +424,8 @@ fn place<S: Simd, E: Real>(
             }
             for k in 0..count {
                 let (column, row) = (pixels[0][k], pixels[1][k]);
-                (columns[k], rows[k]) = (f64::from(column), f64::from(pass.height - 1 - row));
+                (columns[k], rows[k]) =
+                    (f64::from(column) - anchor.0, f64::from(pass.height - 1 - row) - anchor.1);
                 seeds[k] = pixel_seed(column, row);
             }
             let (seeds, samples) = (&seeds[..count], &samples[..count]);

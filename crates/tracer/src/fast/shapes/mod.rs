@@ -18,13 +18,16 @@ use self::cuboid::Cuboid;
 use self::sphere::{Circle, Sphere};
 use self::triangle::{Prism, Triangle};
 use super::bounds::Bounds;
+use super::exact::Edge;
 use super::kind::{ByKind, Kind};
 use super::lights::sun::Sun;
 use super::packet::{Nearest, Ray, Surface};
 use super::placed::{Face, Placed, Sight};
 use super::predicate::Corners;
+use super::rays::Pixels;
 use super::real::{Lanes, Mask, Real, Vec3};
 use super::shape::{Aim, Items, Obstructs, Tests};
+use super::tree::Tree;
 use crate::parallel::map;
 
 /// A shape in the kernels' coordinates.
@@ -179,7 +182,7 @@ pub(super) struct Shapes<E> {
     spheres: Vec<Sphere<E>>,
     cuboids: Vec<Cuboid<E>>,
     triangles: Vec<Triangle<E>>,
-    exact: Exact,
+    exact: Exact<E>,
 }
 
 /// Solids by kind, each by its place among all.
@@ -187,17 +190,40 @@ pub(super) type Sorted = ByKind<Vec<u32>>;
 
 /// The solids before their numbers were rounded.
 #[derive(Debug)]
-struct Exact {
+struct Exact<E> {
     solids: Arc<Vec<Solid>>,
     triangles: Vec<u32>,
+    /// Where triangles are, if they are many.
+    tree: Option<Arc<Tree<E>>>,
+    /// If they are single rays from the eye.
+    pixels: Option<Pixels>,
 }
 
-impl Corners for Exact {
+impl<E: Real> Corners for Exact<E> {
     fn of(&self, at: usize) -> [DVec3; 3] {
         match self.solids[self.triangles[at] as usize].shape {
             Shape::Triangle(triangle) => triangle.vertices,
             Shape::Sphere(_) | Shape::Cuboid(_) => unreachable!("the places are those of triangles"),
         }
+    }
+
+    // Neighbours are looked up for the few rays that need them: to know them all would cost every mesh.
+    fn any_across(&self, at: usize, [p, q]: Edge, is: &dyn Fn(DVec3) -> bool) -> bool {
+        let is_across = |other: usize| {
+            let corners = self.of(other);
+            let apex = corners.iter().find(|corner| **corner != p && **corner != q);
+            other != at && corners.contains(&p) && corners.contains(&q) && apex.is_some_and(|apex| is(*apex))
+        };
+        match &self.tree {
+            Some(tree) => tree.any_around((p.min(q), p.max(q)), |kind, mut items| {
+                kind == Kind::Triangle && items.any(is_across)
+            }),
+            None => (0..self.triangles.len()).any(is_across),
+        }
+    }
+
+    fn unrounded(&self, direction: DVec3) -> Option<DVec3> {
+        self.pixels?.unrounded::<E>(direction)
     }
 }
 
@@ -213,14 +239,19 @@ macro_rules! each {
 }
 
 impl<E: Real> Shapes<E> {
-    pub(super) fn new(solids: &Arc<Vec<Solid>>, sorted: Sorted) -> Self {
+    pub(super) fn new(
+        solids: &Arc<Vec<Solid>>,
+        sorted: Sorted,
+        tree: Option<Arc<Tree<E>>>,
+        pixels: Option<Pixels>,
+    ) -> Self {
         Self {
             spheres: each!(solids, &sorted.spheres, Sphere(sphere), order => Sphere::new(sphere, *order)),
             cuboids: each!(solids, &sorted.cuboids, Cuboid(cuboid), order => Cuboid::new(cuboid, *order)),
             triangles: each!(solids, &sorted.triangles, Triangle(triangle), order => {
                 Triangle::new(triangle, *order)
             }),
-            exact: Exact { solids: solids.clone(), triangles: sorted.triangles },
+            exact: Exact { solids: solids.clone(), triangles: sorted.triangles, tree, pixels },
         }
     }
 }

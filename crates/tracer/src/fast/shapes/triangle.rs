@@ -12,7 +12,9 @@ use crate::fast::packet::{Nearest, Ray, Surface, affine, no_lane, offset};
 use crate::fast::placed::{self, Face, Sight, across_corners, edge_nearest, nearest_within};
 use crate::fast::predicate::{Beside, Corners, Place, settle};
 use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
-use crate::fast::rounding::{CONSTANT, EDGE_ON, GRAZING, OFFSET, SIDE, VOLUME, distance_error};
+use crate::fast::rounding::{
+    CONSTANT, EDGE_ON, GRAZING, OFFSET, SIDE, SIDE_OF_PIXEL, VOLUME, distance_error,
+};
 use crate::fast::shape::{Aim, Items, Obstacles, Obstructs, Robust, Tests};
 use crate::reference::{normal_and_width, triangle_normal};
 
@@ -159,7 +161,7 @@ impl<E: Real> Triangle<E> {
             let moment = anchor.cross(direction);
             let length = l1(direction);
             let noise = CONSTANT * l1(anchor) * length;
-            let scale = 0.5 * sign / (SIDE * E::ROUNDOFF * moment.length() + noise);
+            let scale = 0.5 * sign / (SIDE_OF_PIXEL * E::ROUNDOFF * moment.length() + noise);
             let from_eye = (point(moment * scale), E::narrow(if sign == 0.0 { -1.0 } else { 0.5 }));
             let (direction, slack) = (point(direction), (slack(l1(moment), noise), slack(length, 0.0)));
             (Edge { direction, moment: point(moment), slack }, from_eye)

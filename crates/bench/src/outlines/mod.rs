@@ -1,0 +1,212 @@
+//! `rayfold-bench outlines`: dots at the outlines of bodies, as a person sees them, and pixels off at needles.
+//!
+//! `f32` places an outline some 0.0002 pixels off, which nobody sees. What is seen is a dot: a pixel that has nothing to do with any
+//! pixel around it in the exact picture. So what is counted is a pixel of `auto` that is more than [`SEEN`] levels from each of the
+//! nine pixels that the `f64` kernels draw around it. Everything random comes from the seed of the scene.
+
+mod families;
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, ensure};
+use image::{Rgb, RgbImage};
+use rayfold_tracer::{Precision, RenderOptions, precision, render};
+use rayon::prelude::*;
+
+use self::families::{FAMILIES, Family};
+
+/// What to draw.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The folder that receives outlines.md
+    #[arg(long, default_value = "docs/reports")]
+    output: PathBuf,
+    /// Pixels to draw, in millions
+    #[arg(long, default_value_t = 100)]
+    millions: u64,
+    /// Seed of the first scene; the others have those that follow
+    #[arg(long, default_value_t = 35)]
+    seed: u64,
+    /// Print the table and write nothing
+    #[arg(long)]
+    check: bool,
+}
+
+/// Columns and rows of a picture.
+const SIZE: (u32, u32) = (320, 240);
+
+/// Levels of a channel that are seen in a single pixel.
+const SEEN: u8 = 16;
+
+/// Share of pixels off by more than 2 levels that is asked for, in percent: of all pictures, and of the worst.
+const MOST: (f64, f64) = (0.01, 1.0);
+
+/// Dots of a family that are told one by one.
+const TOLD: usize = 5;
+
+/// What was found in some scenes of a family.
+#[derive(Clone, Debug, Default)]
+struct Found {
+    pictures: u64,
+    /// Pictures that `auto` draws in `f32`.
+    single: u64,
+    pixels: u64,
+    /// Pixels off by more than 2 levels.
+    off: u64,
+    /// The largest share of them in a picture.
+    worst: f64,
+    /// The seed of the scene, column and row of each dot.
+    dots: Vec<(u64, u32, u32)>,
+}
+
+/// Draws all, prints the table and writes the report.
+///
+/// # Errors
+/// When a scene cannot be drawn, there is a dot, or the report cannot be written.
+pub fn run(args: &Args) -> Result<()> {
+    let pictures = args.millions * 1_000_000 / u64::from(SIZE.0 * SIZE.1);
+    let mut found = vec![Found::default(); FAMILIES.len()];
+    for from in (0..pictures).step_by(200) {
+        let seeds = args.seed + from..args.seed + pictures.min(from + 200);
+        add(&mut found, seeds)?;
+        eprintln!("{} of {pictures} pictures", pictures.min(from + 200));
+    }
+    let report = report(args, &found)?;
+    eprintln!("{report}");
+    if !args.check {
+        std::fs::create_dir_all(&args.output)?;
+        let path = args.output.join("outlines.md");
+        std::fs::write(&path, &report).with_context(|| path.display().to_string())?;
+    }
+    let dots: usize = found.iter().map(|found| found.dots.len()).sum();
+    ensure!(dots == 0, "{dots} dots");
+    Ok(())
+}
+
+/// The family of a seed.
+fn family(seed: u64) -> usize {
+    (seed % FAMILIES.len() as u64) as usize
+}
+
+fn add(sum: &mut [Found], seeds: std::ops::Range<u64>) -> Result<()> {
+    let found: Vec<(u64, Found)> =
+        seeds.into_par_iter().map(|seed| Ok((seed, compare(seed)?))).collect::<Result<_>>()?;
+    for (seed, found) in found {
+        let sum = &mut sum[family(seed)];
+        sum.pictures += found.pictures;
+        sum.single += found.single;
+        sum.pixels += found.pixels;
+        sum.off += found.off;
+        sum.worst = sum.worst.max(found.worst);
+        sum.dots.extend(found.dots);
+    }
+    Ok(())
+}
+
+/// The scene of a seed as users get it, and by the `f64` kernels.
+fn compare(seed: u64) -> Result<Found> {
+    let family: Family = FAMILIES[family(seed)];
+    let scene = family.scene(&mut fastrand::Rng::with_seed(seed), SIZE)?;
+    let draw = |precision| {
+        let options = RenderOptions { precision, ..Default::default() };
+        render(&scene, &options).with_context(|| format!("seed {seed}: {}", family.name()))
+    };
+    let (ours, exact) = (draw(Precision::Auto)?, draw(Precision::F64)?);
+    let pixels = u64::from(SIZE.0 * SIZE.1);
+    let off = ours.pixels().zip(exact.pixels()).filter(|(a, b)| are_apart(a, b, 2)).count() as u64;
+    Ok(Found {
+        pictures: 1,
+        single: u64::from(precision(&scene) == Precision::F32),
+        pixels,
+        off,
+        worst: 100.0 * off as f64 / pixels as f64,
+        // A pattern of needles finer than a pixel has no neighbours that are alike.
+        dots: if family.is_of_needles() {
+            vec![]
+        } else {
+            dots(&ours, &exact).into_iter().map(|(x, y)| (seed, x, y)).collect()
+        },
+    })
+}
+
+fn are_apart(a: &Rgb<u8>, b: &Rgb<u8>, levels: u8) -> bool {
+    (0..3).any(|channel| a[channel].abs_diff(b[channel]) > levels)
+}
+
+/// Pixels that are more than [`SEEN`] levels from each of the nine around them in the exact picture: columns and rows from the top.
+pub(crate) fn dots(image: &RgbImage, exact: &RgbImage) -> Vec<(u32, u32)> {
+    let (width, height) = exact.dimensions();
+    let is_dot = |x: u32, y: u32| {
+        let near = |at: u32, count: u32| at.saturating_sub(1)..=(at + 1).min(count - 1);
+        let pixel = image.get_pixel(x, y);
+        are_apart(pixel, exact.get_pixel(x, y), SEEN)
+            && near(y, height).all(|y| near(x, width).all(|x| are_apart(pixel, exact.get_pixel(x, y), SEEN)))
+    };
+    (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).filter(|&(x, y)| is_dot(x, y)).collect()
+}
+
+fn report(args: &Args, found: &[Found]) -> Result<String> {
+    let mut text = format!(
+        "# Dots at outlines\n\n\
+         Written by `cargo run --release -p rayfold-bench -- outlines --millions {} --seed {}`. Pictures of {} x {} pixels, each \
+         drawn as users get it (`auto`) and by the `f64` kernels. A *dot* is a pixel of `auto` that is more than {SEEN} levels from \
+         each of the nine `f64` pixels around it: what a person sees in a film. None is asked for. *Off*: more than 2 levels from \
+         the `f64` pixel; at most {} % of all pixels are asked for, and of no picture more than {} %. Where needles are finer than \
+         pixels no pixel is like those around it, and only that is counted.\n\n\
+         | pictures of | pictures | drawn in f32 | pixels | off | off, % | worst picture, % | dots |\n\
+         | --- | --: | --: | --: | --: | --: | --: | --: |\n",
+        args.millions, args.seed, SIZE.0, SIZE.1, MOST.0, MOST.1
+    );
+    for (family, found) in FAMILIES.iter().zip(found) {
+        let Found { pictures, single, pixels, off, worst, dots } = found;
+        let share = 100.0 * *off as f64 / (*pixels).max(1) as f64;
+        let dots = if family.is_of_needles() { String::new() } else { dots.len().to_string() };
+        let name = family.name();
+        writeln!(
+            text,
+            "| {name} | {pictures} | {single} | {pixels} | {off} | {share:.4} | {worst:.3} | {dots} |"
+        )?;
+    }
+    let (off, pixels) = found.iter().fold((0, 0), |sum, found| (sum.0 + found.off, sum.1 + found.pixels));
+    writeln!(text, "\nOff in all: {:.4} %.", 100.0 * off as f64 / pixels.max(1) as f64)?;
+    for (seed, x, y) in found.iter().flat_map(|found| found.dots.iter().take(TOLD)) {
+        writeln!(text, "\n- seed {seed}: a dot in column {x}, row {y} from the top")?;
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use image::Rgb;
+
+    use super::*;
+
+    #[test]
+    fn a_dot_is_like_no_pixel_around_it() {
+        let exact = RgbImage::from_fn(8, 6, |x, _| if x < 4 { Rgb([200; 3]) } else { Rgb([100, 90, 90]) });
+        let mut image = exact.clone();
+        assert!(dots(&image, &exact).is_empty());
+        // An outline that is a pixel off is none; what is dark is.
+        image.put_pixel(3, 2, Rgb([100, 90, 90]));
+        image.put_pixel(4, 0, Rgb([190, 200, 210]));
+        image.put_pixel(4, 3, Rgb([60, 90, 90]));
+        image.put_pixel(0, 5, Rgb([217; 3]));
+        assert_eq!(dots(&image, &exact), [(4, 3), (0, 5)]);
+    }
+
+    /// A short slice of the command; `RAYFOLD_SEED` draws others.
+    #[test]
+    fn no_outline_of_a_body_has_a_dot_and_few_pixels_are_off() {
+        let seed = std::env::var("RAYFOLD_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(35);
+        println!("RAYFOLD_SEED={seed}");
+        let mut found = vec![Found::default(); FAMILIES.len()];
+        add(&mut found, seed..seed + 160).unwrap();
+        for (family, found) in FAMILIES.iter().zip(&found) {
+            let share = 100.0 * found.off as f64 / found.pixels as f64;
+            println!("{}: {share:.4} % off, at worst {:.3} %", family.name(), found.worst);
+            assert_eq!(found.dots, [], "{}", family.name());
+            assert!(found.worst <= MOST.1, "{}: {} %", family.name(), found.worst);
+        }
+    }
+}
