@@ -22,17 +22,22 @@
 //! # Ok(()) }
 //! ```
 
+mod answer;
 mod checksum;
+mod cors;
 mod delivery;
 mod error;
 mod events;
 mod front;
+mod gate;
 mod host;
 mod identity;
+mod limits;
 mod options;
 pub mod policy;
 pub mod private;
 mod records;
+mod replies;
 mod server;
 mod service;
 mod storage;

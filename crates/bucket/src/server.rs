@@ -1,6 +1,7 @@
 //! The listener: connections in, requests to the service, an end in order.
 
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 use hyper_util::rt::{TokioIo, TokioTimer};
@@ -15,6 +16,7 @@ use crate::delivery::Delivery;
 use crate::front::Front;
 use crate::host::Hosts;
 use crate::identity::{Access, AssumeRole, Identities, Sessions};
+use crate::limits::Limits;
 use crate::options::Options;
 use crate::service::Service;
 use crate::storage::{Storage, Writing};
@@ -57,13 +59,15 @@ impl Server {
         let sessions = Sessions::open(storage.clone(), SystemTime::now());
         let identities =
             Identities::new(options.root, sessions.map_err(|why| Error::Start(why.to_string()))?);
-        let mut builder = S3ServiceBuilder::new(Service::new(storage, &options.region));
+        let store = Service::new(storage, &options.region);
+        let mut builder = S3ServiceBuilder::new(store.clone());
+        builder.set_config(Arc::new(Limits::new()));
         builder.set_host(Hosts);
         builder.set_auth(identities.clone());
         builder.set_access(Access(identities.clone()));
         builder.set_route(AssumeRole(identities));
         let (ending, end) = oneshot::channel();
-        let accepting = tokio::spawn(accept(listener, builder.build(), end));
+        let accepting = tokio::spawn(accept(listener, (builder.build(), store), end));
         Ok(Self { address, ending: Some(ending), accepting, delivering, writing: Some(writing) })
     }
 
@@ -102,7 +106,11 @@ impl Drop for Server {
     }
 }
 
-async fn accept(listener: TcpListener, service: S3Service, mut end: oneshot::Receiver<()>) {
+async fn accept(
+    listener: TcpListener,
+    (service, store): (S3Service, Service),
+    mut end: oneshot::Receiver<()>,
+) {
     let mut connections = JoinSet::new();
     let graceful = GracefulShutdown::new();
     loop {
@@ -116,9 +124,10 @@ async fn accept(listener: TcpListener, service: S3Service, mut end: oneshot::Rec
             continue;
         };
         let _ = stream.set_nodelay(true);
+        let front = Front { service: service.clone(), store: store.clone(), peer: peer.ip() };
         let connection = hyper::server::conn::http1::Builder::new()
             .timer(TokioTimer::new())
-            .serve_connection(TokioIo::new(stream), Front { service: service.clone(), peer: peer.ip() });
+            .serve_connection(TokioIo::new(stream), front);
         let connection = graceful.watch(connection);
         // A client that goes away in the middle is that client's end.
         connections.spawn(async move { drop(connection.await) });

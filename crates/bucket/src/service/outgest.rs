@@ -19,7 +19,7 @@ use s3s::stream::{ByteStream, RemainingLength};
 use tokio::task::JoinHandle;
 
 use super::Service;
-use super::answer::{Answer, unreadable};
+use crate::answer::{Answer, unreadable};
 use crate::records::{Body, Layout, LayoutPart, Object, find};
 use crate::storage::{BodyId, Pins, Snapshot, Storage, Table, View};
 

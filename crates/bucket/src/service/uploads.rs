@@ -6,13 +6,13 @@ use hyper::http::uri::Authority;
 use s3s::dto::*;
 use s3s::{S3Request, s3_error};
 
-use super::answer::{Answer, coded, invalid_argument, invalid_request, no_such_upload, time, unreadable};
 use super::conditions::{ReadConditions, WriteConditions};
 use super::copies::source;
 use super::ingest::{Claims, Ingested, etag, ingest, is_too_large};
 use super::objects::{Destination, admit, bucket, check_key, check_metadata, expires, keep, place};
 use super::writes::{of, stored_encoding};
 use super::{Caller, Service, Stop};
+use crate::answer::{Answer, coded, invalid_argument, invalid_request, no_such_upload, time, unreadable};
 use crate::checksum::{self, Algorithm};
 use crate::records::{self, Body, Headers, Layout, LayoutPart, Moment, all, decode, find, key, release, set};
 use crate::storage::{Batch, Kind, Table, View};
