@@ -22,6 +22,7 @@ use tokio::time::timeout;
 use crate::gate::Gate;
 use crate::host::bucket_of;
 use crate::identity::{in_sts_shape, is_for_sts};
+use crate::records::CorsRule;
 use crate::{cors, limits, replies};
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-amz-request-id");
@@ -89,13 +90,12 @@ impl Front {
         if is_for_sts(request.method(), request.uri(), request.headers()) {
             return in_sts_shape(self.service.call(request).await?).await;
         }
-        let bucket = bucket_of(request.headers(), request.uri().path());
-        let rules =
-            |bucket: Option<String>| bucket.map(|name| self.store.cors_rules(&name)).unwrap_or_default();
         if request.method() == Method::OPTIONS {
-            return cors::preflight(&rules(bucket), request.headers()).or_else(refusal);
+            let bucket = bucket_of(request.headers(), request.uri().path());
+            return cors::preflight(&self.rules(bucket), request.headers()).or_else(refusal);
         }
         let origin = cors::Origin::of(request.method(), request.headers());
+        let rules_of = origin.as_ref().and_then(|_| bucket_of(request.headers(), request.uri().path()));
         let is_head = request.method() == Method::HEAD;
         let mut response = match Gate::admit(&mut request) {
             Err(error) => {
@@ -119,9 +119,14 @@ impl Front {
             *response.body_mut() = Body::empty();
         }
         if let Some(origin) = origin {
-            origin.allow(&rules(bucket), response.headers_mut());
+            origin.allow(&self.rules(rules_of), response.headers_mut());
         }
         Ok(response)
+    }
+
+    /// A bucket's rules for pages of other sites.
+    fn rules(&self, bucket: Option<String>) -> Vec<CorsRule> {
+        bucket.map(|name| self.store.cors_rules(&name)).unwrap_or_default()
     }
 }
 

@@ -44,7 +44,7 @@ pub(super) struct Operation {
     /// Further headers: of those that change what a request means ([`super::values::matters`]) no other is taken.
     pub(super) headers: &'static [&'static str],
     pub(super) payload: Payload,
-    /// S3 demands a digest of the body.
+    /// S3 demands a digest of the body. (Its model says so of access lists as well; clients send those without.)
     pub(super) needs_digest: bool,
 }
 
@@ -86,7 +86,12 @@ const READ_HEADERS: &[&str] = &[
     "if-range",
     "range",
     "x-amz-checksum-mode",
+    // What the client can take, of which nothing is used here. Those for Java send it.
+    "x-amz-te",
 ];
+
+/// Asks MinIO for more in a listing, and is passed over by S3. `mc` sends it to both.
+const MINIO_METADATA: &str = "metadata";
 
 const SOURCE: [&str; 5] = [
     "x-amz-copy-source-if-match",
@@ -161,7 +166,6 @@ pub(super) const OPERATIONS: &[Operation] = &[
         chosen_by: &["acl"],
         headers: &["x-amz-acl"],
         payload: ACL,
-        needs_digest: true,
         ..PLAIN
     },
     Operation {
@@ -215,13 +219,22 @@ pub(super) const OPERATIONS: &[Operation] = &[
             "continuation-token",
             "fetch-owner",
             "start-after",
+            MINIO_METADATA,
         ],
         ..PLAIN
     },
     Operation {
         name: "ListObjectVersions",
         chosen_by: &["versions"],
-        query: &["delimiter", "encoding-type", "key-marker", "max-keys", "prefix", "version-id-marker"],
+        query: &[
+            "delimiter",
+            "encoding-type",
+            "key-marker",
+            "max-keys",
+            "prefix",
+            "version-id-marker",
+            MINIO_METADATA,
+        ],
         ..PLAIN
     },
     Operation {
@@ -266,7 +279,7 @@ pub(super) const OPERATIONS: &[Operation] = &[
         query: &["versionId"],
         headers: &["x-amz-acl"],
         payload: ACL,
-        needs_digest: true,
+        ..PLAIN
     },
     Operation {
         name: "GetObjectTagging",
@@ -288,7 +301,6 @@ pub(super) const OPERATIONS: &[Operation] = &[
             WRITTEN[5],
             "if-match",
             "if-none-match",
-            "x-amz-checksum-algorithm",
         ],
         payload: Payload::Bytes,
         ..PLAIN
@@ -348,7 +360,6 @@ pub(super) const OPERATIONS: &[Operation] = &[
         method: "PUT",
         on: On::Object,
         chosen_by: &["partNumber", "uploadId"],
-        headers: &["x-amz-checksum-algorithm"],
         payload: Payload::Bytes,
         ..PLAIN
     },

@@ -57,6 +57,21 @@ pub(super) fn check(operation: &Operation, headers: &HeaderMap) -> S3Result<()> 
         }
         check_value(operation, name, value.trim())?;
     }
+    check_digests(headers)
+}
+
+/// Checks that what is said of a body's digest can be compared: a trailer needs a body in chunks, and the name of an
+/// algorithm its checksum.
+fn check_digests(headers: &HeaderMap) -> S3Result<()> {
+    let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok()).map(str::trim);
+    let in_chunks = text("x-amz-content-sha256").is_some_and(|hash| hash.starts_with("STREAMING-"));
+    let of_chunks =
+        ["x-amz-trailer", "x-amz-decoded-content-length"].into_iter().find(|name| text(name).is_some());
+    if let Some(name) = of_chunks.filter(|_| !in_chunks) {
+        return Err(invalid_request(format!(
+            "{name} is for a body in chunks, which x-amz-content-sha256 has to say: STREAMING-UNSIGNED-PAYLOAD-TRAILER, for one"
+        )));
+    }
     Ok(())
 }
 
@@ -225,7 +240,6 @@ mod tests {
             ("x-amz-server-side-encryption", "AES256"),
             ("x-amz-expected-bucket-owner", OWNER),
             ("x-amz-request-payer", "requester"),
-            ("x-amz-trailer", "x-amz-checksum-CRC32"),
             ("content-md5", "CY9rzUYh03PK3k6DJie09g=="),
             ("x-custom", "1"),
         ] {
@@ -233,6 +247,23 @@ mod tests {
         }
         assert_eq!(code("DeleteObject", "x-amz-bypass-governance-retention", "true"), "ok");
         assert_eq!(code("CreateMultipartUpload", "content-md5", MD5_OF_NOTHING), "ok");
+    }
+
+    #[test]
+    fn a_trailer_needs_a_body_in_chunks() {
+        let operation = OPERATIONS.iter().find(|known| known.name == "PutObject").unwrap();
+        let trailer = ("x-amz-trailer", "x-amz-checksum-CRC32");
+        let length = ("x-amz-decoded-content-length", "5");
+        for hash in ["STREAMING-UNSIGNED-PAYLOAD-TRAILER", "UNSIGNED-PAYLOAD", ""] {
+            for header in [trailer, length] {
+                let given = [header, ("x-amz-content-sha256", hash)];
+                let headers = given
+                    .into_iter()
+                    .map(|(name, value)| (HeaderName::from_static(name), HeaderValue::from_static(value)));
+                let is_fine = check(operation, &headers.collect()).is_ok();
+                assert_eq!(is_fine, hash.starts_with("STREAMING"), "{given:?}");
+            }
+        }
     }
 
     #[test]
