@@ -262,3 +262,17 @@ async fn a_checksum_of_an_algorithm_that_is_not_there_is_not_passed_over() {
     }
     assert_eq!(stage.client.list_objects_v2().bucket(BUCKET).send().await.unwrap().key_count, Some(0));
 }
+
+/// Its checksum would not be there to be compared.
+#[tokio::test]
+async fn a_trailer_of_a_body_that_is_not_in_chunks_is_refused() {
+    let stage = stage().await;
+    for header in [("x-amz-trailer", "x-amz-checksum-crc32"), ("x-amz-decoded-content-length", "5")] {
+        let put = send(&stage, "PUT", "/films/a", &[header], b"hello").await;
+        assert_eq!(put.failure(), (400, "InvalidRequest"), "{header:?}");
+    }
+    // What asks for more in an answer may be passed over.
+    stage.put("a", "hello").await;
+    assert_eq!(send(&stage, "GET", "/films/a", &[("x-amz-te", "append-md5")], b"").await.body, "hello");
+    assert_eq!(send(&stage, "GET", "/films?list-type=2&metadata=true", &[], b"").await.status, 200);
+}

@@ -1,11 +1,11 @@
 //! Requests that no client makes, signed as the owner's: any method, target, headers and body.
 
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use aws_sdk_s3::config::Credentials;
 use aws_sigv4::http_request::{
-    PayloadChecksumKind, PercentEncodingMode, SignableBody, SignableRequest, SigningSettings,
-    UriPathNormalizationMode, sign,
+    PayloadChecksumKind, PercentEncodingMode, SignableBody, SignableRequest, SignatureLocation,
+    SigningInstructions, SigningSettings, UriPathNormalizationMode, sign,
 };
 use aws_sigv4::sign::v4::SigningParams;
 
@@ -64,18 +64,37 @@ pub(crate) async fn send(
     send_signed(stage, method, target, headers, body, Signed::Hash).await
 }
 
-pub(crate) async fn send_signed(
-    stage: &Stage,
-    method: &str,
-    target: &str,
-    headers: &[(&str, &str)],
-    body: &[u8],
-    signed: Signed,
-) -> Answer {
+/// A target that is signed by what it says, for a minute.
+pub(crate) fn presigned(stage: &Stage, method: &str, target: &str) -> String {
+    let mut settings = settings();
+    settings.signature_location = SignatureLocation::QueryParams;
+    settings.payload_checksum_kind = PayloadChecksumKind::NoHeader;
+    settings.expires_in = Some(Duration::from_secs(60));
+    let host = stage.server.address().to_string();
+    let uri = format!("http://{host}{target}");
+    let headers = [("host", host.as_str())];
+    let body = SignableBody::UnsignedPayload;
+    let request = SignableRequest::new(method, &uri, headers.into_iter(), body).unwrap();
+    let instructions = signed_as(settings, request);
+    let mut signed = target.to_owned();
+    for (name, value) in instructions.params() {
+        let between = if signed.contains('?') { '&' } else { '?' };
+        let value = percent_encoding::utf8_percent_encode(value, percent_encoding::NON_ALPHANUMERIC);
+        signed += &format!("{between}{name}={value}");
+    }
+    signed
+}
+
+fn settings() -> SigningSettings {
     let mut settings = SigningSettings::default();
     settings.percent_encoding_mode = PercentEncodingMode::Single;
     settings.uri_path_normalization_mode = UriPathNormalizationMode::Disabled;
     settings.payload_checksum_kind = PayloadChecksumKind::XAmzSha256;
+    settings
+}
+
+/// AWS's own signer, as the owner.
+fn signed_as(settings: SigningSettings, request: SignableRequest<'_>) -> SigningInstructions {
     let identity = Credentials::new("root", "secret-key", None, None, "test").into();
     let params = SigningParams::builder()
         .identity(&identity)
@@ -86,6 +105,17 @@ pub(crate) async fn send_signed(
         .build()
         .unwrap()
         .into();
+    sign(request, &params).unwrap().into_parts().0
+}
+
+pub(crate) async fn send_signed(
+    stage: &Stage,
+    method: &str,
+    target: &str,
+    headers: &[(&str, &str)],
+    body: &[u8],
+    signed: Signed,
+) -> Answer {
     let host = stage.server.address().to_string();
     let uri = format!("http://{host}{target}");
     let with_host = [("host", host.as_str())].into_iter().chain(headers.iter().copied());
@@ -94,7 +124,7 @@ pub(crate) async fn send_signed(
         Signed::As(name) => SignableBody::Precomputed(name.to_owned()),
     };
     let request = SignableRequest::new(method, &uri, with_host.clone(), payload).unwrap();
-    let (instructions, _) = sign(request, &params).unwrap().into_parts();
+    let instructions = signed_as(settings(), request);
     let lines = with_host.chain(instructions.headers()).map(|(name, value)| format!("{name}: {value}\r\n"));
     let mut head =
         format!("{method} {target} HTTP/1.1\r\nConnection: close\r\n{}", lines.collect::<String>());
