@@ -271,8 +271,12 @@ async fn a_trailer_of_a_body_that_is_not_in_chunks_is_refused() {
         let put = send(&stage, "PUT", "/films/a", &[header], b"hello").await;
         assert_eq!(put.failure(), (400, "InvalidRequest"), "{header:?}");
     }
-    // What asks for more in an answer may be passed over.
+    // What asks for more in an answer may be passed over, and a request without a body has a checksum, too: of nothing.
     stage.put("a", "hello").await;
+    for (crc, status) in [("AAAAAA==", 200), ("AAAAAQ==", 400)] {
+        let headers = [("x-amz-checksum-crc32", crc), ("x-amz-sdk-checksum-algorithm", "CRC32")];
+        assert_eq!(send(&stage, "GET", "/films/a", &headers, b"").await.status, status, "{crc}");
+    }
     assert_eq!(send(&stage, "GET", "/films/a", &[("x-amz-te", "append-md5")], b"").await.body, "hello");
     assert_eq!(send(&stage, "GET", "/films?list-type=2&metadata=true", &[], b"").await.status, 200);
 }

@@ -77,13 +77,14 @@ fn check_digests(headers: &HeaderMap) -> S3Result<()> {
 
 fn is_known(operation: &Operation, name: &str) -> bool {
     let listed = |list: &[&str]| list.contains(&name);
-    let has_body = operation.payload != Payload::None;
+    // Clients for Java send the checksum of no bytes with a Get.
+    let has_digest = operation.payload != Payload::Form;
     name == "content-md5"
         || listed(&COMMON)
         || listed(operation.headers)
         || listed(operation.chosen_by)
         || (name.starts_with("x-amz-meta-") && operation.headers.contains(&"x-amz-meta-"))
-        || (has_body && (name == "x-amz-sdk-checksum-algorithm" || is_checksum(name)))
+        || (has_digest && (name == "x-amz-sdk-checksum-algorithm" || is_checksum(name)))
         || (operation.payload == Payload::Bytes
             && matches!(name, "x-amz-decoded-content-length" | "x-amz-trailer"))
 }
@@ -110,6 +111,12 @@ pub(super) fn check_value(operation: &Operation, name: &str, value: &str) -> S3R
         "content-md5" => {
             if operation.payload == Payload::None && value != MD5_OF_NOTHING {
                 return Err(s3_error!(BadDigest, "The Content-MD5 is not that of a request without a body."));
+            }
+            true
+        }
+        _ if operation.payload == Payload::None && is_checksum(name) => {
+            if !Algorithm::ALL.iter().any(|sum| sum.header() == name && sum.of(b"") == value) {
+                return Err(s3_error!(BadDigest, "{name} is not that of a request without a body."));
             }
             true
         }
@@ -247,6 +254,9 @@ mod tests {
         }
         assert_eq!(code("DeleteObject", "x-amz-bypass-governance-retention", "true"), "ok");
         assert_eq!(code("CreateMultipartUpload", "content-md5", MD5_OF_NOTHING), "ok");
+        assert_eq!(code("GetObject", "x-amz-checksum-crc32", "AAAAAA=="), "ok");
+        assert_eq!(code("GetObject", "x-amz-checksum-crc32", "AAAAAQ=="), "BadDigest");
+        assert_eq!(code("PostObject", "x-amz-checksum-crc32", "AAAAAA=="), "NotImplemented");
     }
 
     #[test]
