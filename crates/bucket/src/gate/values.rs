@@ -57,12 +57,12 @@ pub(super) fn check(operation: &Operation, headers: &HeaderMap) -> S3Result<()> 
         }
         check_value(operation, name, value.trim())?;
     }
-    check_digests(headers)
+    check_digests(operation, headers)
 }
 
 /// Checks that what is said of a body's digest can be compared: a trailer needs a body in chunks, and the name of an
 /// algorithm its checksum.
-fn check_digests(headers: &HeaderMap) -> S3Result<()> {
+fn check_digests(operation: &Operation, headers: &HeaderMap) -> S3Result<()> {
     let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok()).map(str::trim);
     let in_chunks = text("x-amz-content-sha256").is_some_and(|hash| hash.starts_with("STREAMING-"));
     let of_chunks =
@@ -71,6 +71,18 @@ fn check_digests(headers: &HeaderMap) -> S3Result<()> {
         return Err(invalid_request(format!(
             "{name} is for a body in chunks, which x-amz-content-sha256 has to say: STREAMING-UNSIGNED-PAYLOAD-TRAILER, for one"
         )));
+    }
+    // MinIO's clients name it beside the checksum, which S3 passes over.
+    let named = text("x-amz-checksum-algorithm").filter(|_| operation.payload == Payload::Bytes);
+    if let Some(algorithm) = named.and_then(Algorithm::of_name) {
+        let header = algorithm.header();
+        let is_there = text("x-amz-trailer").is_some_and(|trailer| trailer.eq_ignore_ascii_case(header));
+        if !is_there && !headers.contains_key(header) {
+            return Err(invalid_request(format!(
+                "x-amz-checksum-algorithm says {}, and there is neither {header} nor a trailer of that name",
+                algorithm.name()
+            )));
+        }
     }
     Ok(())
 }
@@ -86,7 +98,7 @@ fn is_known(operation: &Operation, name: &str) -> bool {
         || (name.starts_with("x-amz-meta-") && operation.headers.contains(&"x-amz-meta-"))
         || (has_digest && (name == "x-amz-sdk-checksum-algorithm" || is_checksum(name)))
         || (operation.payload == Payload::Bytes
-            && matches!(name, "x-amz-decoded-content-length" | "x-amz-trailer"))
+            && matches!(name, "x-amz-decoded-content-length" | "x-amz-trailer" | "x-amz-checksum-algorithm"))
 }
 
 fn is_checksum(name: &str) -> bool {
@@ -273,6 +285,24 @@ mod tests {
                 let is_fine = check(operation, &headers.collect()).is_ok();
                 assert_eq!(is_fine, hash.starts_with("STREAMING"), "{given:?}");
             }
+        }
+    }
+
+    #[test]
+    fn an_algorithm_is_named_with_its_checksum() {
+        let operation = OPERATIONS.iter().find(|known| known.name == "UploadPart").unwrap();
+        let named = ("x-amz-checksum-algorithm", "CRC32C");
+        for (others, is_fine) in [
+            (vec![("x-amz-checksum-crc32c", "4waSgw==")], true),
+            (vec![("x-amz-trailer", "X-Amz-Checksum-Crc32c"), ("x-amz-content-sha256", "STREAMING-x")], true),
+            (vec![("x-amz-checksum-crc32", "AAAAAA==")], false),
+            (vec![], false),
+        ] {
+            let headers = others
+                .iter()
+                .chain([&named])
+                .map(|(name, value)| (HeaderName::from_static(name), HeaderValue::from_static(value)));
+            assert_eq!(check(operation, &headers.collect()).is_ok(), is_fine, "{others:?}");
         }
     }
 
