@@ -263,6 +263,20 @@ async fn a_checksum_of_an_algorithm_that_is_not_there_is_not_passed_over() {
     assert_eq!(stage.client.list_objects_v2().bucket(BUCKET).send().await.unwrap().key_count, Some(0));
 }
 
+/// As MinIO's clients do.
+#[tokio::test]
+async fn an_algorithm_that_is_named_alone_is_what_the_checksum_is_made_by() {
+    let stage = stage().await;
+    let headers = [("x-amz-checksum-algorithm", "SHA256"), ("x-amz-checksum-type", "FULL_OBJECT")];
+    let put = send(&stage, "PUT", "/films/a", &headers, b"123456789").await;
+    assert_eq!(put.status, 200, "{put:?}");
+    let sum = "feKw08M4keuw8e9gnsQZQgwg4yDOlMZfvIwzEkSOsiU=".to_lowercase();
+    assert_eq!(put.header("x-amz-checksum-sha256"), sum);
+    let other = [("x-amz-checksum-algorithm", "SHA256"), ("x-amz-checksum-crc32", "y/Q5Jg==")];
+    let other = send(&stage, "PUT", "/films/a", &other, b"123456789").await;
+    assert_eq!(other.failure(), (400, "InvalidRequest"));
+}
+
 /// Its checksum would not be there to be compared.
 #[tokio::test]
 async fn a_trailer_of_a_body_that_is_not_in_chunks_is_refused() {

@@ -72,15 +72,18 @@ fn check_digests(operation: &Operation, headers: &HeaderMap) -> S3Result<()> {
             "{name} is for a body in chunks, which x-amz-content-sha256 has to say: STREAMING-UNSIGNED-PAYLOAD-TRAILER, for one"
         )));
     }
-    // MinIO's clients name it beside the checksum, which S3 passes over.
+    // MinIO's clients name it, with a checksum or without, for the store to make one.
     let named = text("x-amz-checksum-algorithm").filter(|_| operation.payload == Payload::Bytes);
     if let Some(algorithm) = named.and_then(Algorithm::of_name) {
-        let header = algorithm.header();
-        let is_there = text("x-amz-trailer").is_some_and(|trailer| trailer.eq_ignore_ascii_case(header));
-        if !is_there && !headers.contains_key(header) {
+        let trailer = text("x-amz-trailer").map(str::to_ascii_lowercase);
+        let in_header =
+            Algorithm::ALL.into_iter().map(Algorithm::header).find(|name| headers.contains_key(*name));
+        let given = in_header.or(trailer.as_deref());
+        if given.is_some_and(|given| given != algorithm.header()) {
             return Err(invalid_request(format!(
-                "x-amz-checksum-algorithm says {}, and there is neither {header} nor a trailer of that name",
-                algorithm.name()
+                "x-amz-checksum-algorithm says {}, and {} is another one",
+                algorithm.name(),
+                given.unwrap_or_default()
             )));
         }
     }
@@ -98,7 +101,13 @@ fn is_known(operation: &Operation, name: &str) -> bool {
         || (name.starts_with("x-amz-meta-") && operation.headers.contains(&"x-amz-meta-"))
         || (has_digest && (name == "x-amz-sdk-checksum-algorithm" || is_checksum(name)))
         || (operation.payload == Payload::Bytes
-            && matches!(name, "x-amz-decoded-content-length" | "x-amz-trailer" | "x-amz-checksum-algorithm"))
+            && matches!(
+                name,
+                "x-amz-decoded-content-length"
+                    | "x-amz-trailer"
+                    | "x-amz-checksum-algorithm"
+                    | "x-amz-checksum-type"
+            ))
 }
 
 fn is_checksum(name: &str) -> bool {
@@ -132,6 +141,8 @@ pub(super) fn check_value(operation: &Operation, name: &str, value: &str) -> S3R
             }
             true
         }
+        // Of a body in one piece.
+        "x-amz-checksum-type" if operation.payload == Payload::Bytes => value == "FULL_OBJECT",
         "x-amz-storage-class" => value == "STANDARD",
         "x-amz-server-side-encryption" => value == "AES256",
         "x-amz-server-side-encryption-bucket-key-enabled" => value == "false",
@@ -289,14 +300,17 @@ mod tests {
     }
 
     #[test]
-    fn an_algorithm_is_named_with_its_checksum() {
+    fn an_algorithm_is_named_with_its_checksum_or_alone() {
         let operation = OPERATIONS.iter().find(|known| known.name == "UploadPart").unwrap();
         let named = ("x-amz-checksum-algorithm", "CRC32C");
         for (others, is_fine) in [
             (vec![("x-amz-checksum-crc32c", "4waSgw==")], true),
             (vec![("x-amz-trailer", "X-Amz-Checksum-Crc32c"), ("x-amz-content-sha256", "STREAMING-x")], true),
             (vec![("x-amz-checksum-crc32", "AAAAAA==")], false),
-            (vec![], false),
+            (vec![("x-amz-trailer", "x-amz-checksum-sha1"), ("x-amz-content-sha256", "STREAMING-x")], false),
+            (vec![("x-amz-checksum-type", "FULL_OBJECT")], true),
+            (vec![("x-amz-checksum-type", "COMPOSITE")], false),
+            (vec![], true),
         ] {
             let headers = others
                 .iter()

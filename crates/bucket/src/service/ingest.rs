@@ -85,8 +85,10 @@ impl Claims {
                 "x-amz-sdk-checksum-algorithm specified ({name}), but no corresponding x-amz-checksum-* or x-amz-trailer headers were found."
             )));
         }
-        let algorithm =
-            in_header.as_ref().map(|(algorithm, _)| *algorithm).or(in_trailer).unwrap_or(otherwise);
+        // A client may name it for the store to make the checksum; the gate sees to it that it is that of the others.
+        let named = text("x-amz-checksum-algorithm").and_then(Algorithm::of_name);
+        let given = in_header.as_ref().map(|(algorithm, _)| *algorithm).or(in_trailer);
+        let algorithm = given.or(named).unwrap_or(otherwise);
         let checksum = in_header.map(|(algorithm, value)| valid(algorithm, Some(&value))).transpose()?;
         let trailer = in_trailer.and(trailer);
         Ok(Self { length, md5, algorithm, checksum, trailer })
