@@ -110,7 +110,8 @@ def main():
         answer = call(s3, name, base)
         not_there, others = [], {}
         for member in members:
-            if member in base or answer == "NotImplemented":
+            # A length that is not the body's breaks the connection, not the request.
+            if member in base or member == "ContentLength" or answer == "NotImplemented":
                 continue
             got = call(s3, name, base | {member: value(members[member])})
             if got in ("NotImplemented", "AccessControlListNotSupported"):
