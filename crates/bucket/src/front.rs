@@ -5,6 +5,7 @@
 
 use std::net::IpAddr;
 use std::panic::AssertUnwindSafe;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
@@ -42,12 +43,15 @@ pub(crate) struct Origin {
     pub(crate) request: String,
 }
 
+/// The rules of a bucket, by its name.
+pub(crate) type Rules = Arc<dyn Fn(&str) -> Vec<CorsRule> + Send + Sync>;
+
 /// The service of one connection.
 #[derive(Clone)]
 pub(crate) struct Front {
     pub(crate) service: S3Service,
     /// Asked for a bucket's rules for pages of other sites.
-    pub(crate) store: crate::service::Service,
+    pub(crate) rules: Rules,
     pub(crate) peer: IpAddr,
 }
 
@@ -126,7 +130,7 @@ impl Front {
 
     /// A bucket's rules for pages of other sites.
     fn rules(&self, bucket: Option<String>) -> Vec<CorsRule> {
-        bucket.map(|name| self.store.cors_rules(&name)).unwrap_or_default()
+        bucket.map(|name| (self.rules)(&name)).unwrap_or_default()
     }
 }
 

@@ -13,7 +13,7 @@ use tokio::task::{JoinHandle, JoinSet};
 use tokio::time::timeout;
 
 use crate::delivery::Delivery;
-use crate::front::Front;
+use crate::front::{Front, Rules};
 use crate::host::Hosts;
 use crate::identity::{Access, AssumeRole, Identities, Sessions};
 use crate::limits::Limits;
@@ -61,13 +61,14 @@ impl Server {
             Identities::new(options.root, sessions.map_err(|why| Error::Start(why.to_string()))?);
         let store = Service::new(storage, &options.region);
         let mut builder = S3ServiceBuilder::new(store.clone());
+        let rules: Rules = Arc::new(move |name: &str| store.cors_rules(name));
         builder.set_config(Arc::new(Limits::new()));
         builder.set_host(Hosts);
         builder.set_auth(identities.clone());
         builder.set_access(Access(identities.clone()));
         builder.set_route(AssumeRole(identities));
         let (ending, end) = oneshot::channel();
-        let accepting = tokio::spawn(accept(listener, (builder.build(), store), end));
+        let accepting = tokio::spawn(accept(listener, (builder.build(), rules), end));
         Ok(Self { address, ending: Some(ending), accepting, delivering, writing: Some(writing) })
     }
 
@@ -106,11 +107,7 @@ impl Drop for Server {
     }
 }
 
-async fn accept(
-    listener: TcpListener,
-    (service, store): (S3Service, Service),
-    mut end: oneshot::Receiver<()>,
-) {
+async fn accept(listener: TcpListener, (service, rules): (S3Service, Rules), mut end: oneshot::Receiver<()>) {
     let mut connections = JoinSet::new();
     let graceful = GracefulShutdown::new();
     loop {
@@ -124,7 +121,7 @@ async fn accept(
             continue;
         };
         let _ = stream.set_nodelay(true);
-        let front = Front { service: service.clone(), store: store.clone(), peer: peer.ip() };
+        let front = Front { service: service.clone(), rules: rules.clone(), peer: peer.ip() };
         let connection = hyper::server::conn::http1::Builder::new()
             .timer(TokioTimer::new())
             .serve_connection(TokioIo::new(stream), front);
