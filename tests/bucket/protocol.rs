@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use aws_sdk_s3::presigning::PresigningConfig;
 use aws_sdk_s3::primitives::{DateTime, DateTimeFormat};
-use aws_sdk_s3::types::ObjectCannedAcl;
 use rayfold_bucket::{Error, Server};
 
 use crate::stage::{BUCKET, Stage, failure, options, path, raw, stage};
@@ -149,14 +148,13 @@ async fn what_is_not_there_is_not_implemented() {
     let stage = stage().await;
     let put = || stage.client.put_object().bucket(BUCKET).key("a").body(b"1".to_vec().into());
     let not_implemented = (501, "NotImplemented".to_owned());
-    assert_eq!(failure(put().acl(ObjectCannedAcl::PublicRead).send().await), not_implemented);
     assert_eq!(failure(put().tagging("a=b").send().await), not_implemented);
     assert_eq!(failure(put().storage_class(StorageClass::Glacier).send().await), not_implemented);
     let encrypted = put().server_side_encryption(ServerSideEncryption::AwsKms);
     assert_eq!(failure(encrypted.send().await), not_implemented);
     assert_eq!(failure(put().sse_customer_algorithm("AES256").send().await), not_implemented);
     assert_eq!(failure(put().website_redirect_location("/b").send().await), not_implemented);
-    put().acl(ObjectCannedAcl::Private).send().await.unwrap();
+    put().send().await.unwrap();
     let versioned = stage.client.get_object().bucket(BUCKET).key("a").version_id("3sL4kqtJlcpXroDTDmJ");
     assert_eq!(failure(versioned.send().await), (400, "InvalidArgument".into()));
     let tags =

@@ -60,6 +60,13 @@ impl Algorithm {
         }
     }
 
+    /// The checksum of bytes.
+    pub(crate) fn of(self, bytes: &[u8]) -> String {
+        let mut hasher = Hasher::new(self);
+        hasher.update(bytes);
+        base64(&hasher.finish())
+    }
+
     pub(crate) fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|algorithm| algorithm.name().eq_ignore_ascii_case(name))
     }

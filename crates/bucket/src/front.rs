@@ -1,25 +1,36 @@
-//! What stands before S3's protocol: each request gets an id and is told where it came from, and every answer names the id
-//! and the time.
+//! What stands before S3's protocol: each request gets an id and is told where it came from, what asks for more than there
+//! is is refused (`gate`), browsers' questions are answered (`cors`), and every answer names the id and the time.
 //!
 //! A panic is answered, too: bytes from strangers pass through code that is not ours.
 
 use std::net::IpAddr;
 use std::panic::AssertUnwindSafe;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use futures_util::FutureExt;
+use http_body_util::BodyExt;
 use hyper::body::Incoming;
-use hyper::header::{DATE, HeaderName, HeaderValue};
+use hyper::header::{CONNECTION, DATE, EXPECT, HeaderName, HeaderValue};
 use hyper::service::Service;
-use hyper::{Request, Response};
+use hyper::{Method, Request, Response};
 use s3s::dto::{Timestamp, TimestampFormat};
 use s3s::service::S3Service;
-use s3s::{Body, HttpError, s3_error};
+use s3s::{Body, HttpError, S3Error, s3_error};
+use tokio::time::timeout;
 
+use crate::gate::Gate;
+use crate::host::bucket_of;
 use crate::identity::{in_sts_shape, is_for_sts};
+use crate::records::CorsRule;
+use crate::{cors, limits, replies};
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-amz-request-id");
+
+/// How long, and how much of, a refused body is read.
+const DRAIN: Duration = Duration::from_secs(1);
+const MOST_DRAINED: usize = 1024 * 1024;
 
 static NEXT: AtomicU64 = AtomicU64::new(1);
 
@@ -32,10 +43,15 @@ pub(crate) struct Origin {
     pub(crate) request: String,
 }
 
+/// The rules of a bucket, by its name.
+pub(crate) type Rules = Arc<dyn Fn(&str) -> Vec<CorsRule> + Send + Sync>;
+
 /// The service of one connection.
 #[derive(Clone)]
 pub(crate) struct Front {
     pub(crate) service: S3Service,
+    /// Asked for a bucket's rules for pages of other sites.
+    pub(crate) rules: Rules,
     pub(crate) peer: IpAddr,
 }
 
@@ -48,19 +64,17 @@ impl Service<Request<Incoming>> for Front {
         let id = format!("{:016X}", NEXT.fetch_add(1, Ordering::Relaxed));
         let header = HeaderValue::from_str(&id);
         request.extensions_mut().insert(Origin { source: self.peer.to_string(), request: id });
-        let for_sts = is_for_sts(request.method(), request.uri(), request.headers());
-        let service = self.service.clone();
+        // A client that waits to be told to send its body may take the connection for used up by a refusal, or not.
+        let waits = request.headers().contains_key(EXPECT);
+        let this = self.clone();
         Box::pin(async move {
-            let answer = AssertUnwindSafe(service.call(request.map(Body::from))).catch_unwind();
+            let answer = AssertUnwindSafe(this.answer(request.map(Body::from))).catch_unwind();
             let mut response = match answer.await {
                 Ok(response) => response?,
-                Err(_) => {
-                    let error = s3_error!(InternalError, "the store failed; its standard error says how");
-                    error.to_http_response().map_err(|error| HttpError::new(Box::new(error)))?
-                }
+                Err(_) => refusal(s3_error!(InternalError, "the store failed; its standard error says how"))?,
             };
-            if for_sts {
-                response = in_sts_shape(response).await?;
+            if waits && !response.status().is_success() {
+                response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
             }
             if let Ok(header) = header {
                 response.headers_mut().insert(REQUEST_ID, header);
@@ -71,6 +85,65 @@ impl Service<Request<Incoming>> for Front {
             }
             Ok(response)
         })
+    }
+}
+
+impl Front {
+    /// The answer of S3's protocol, or of what stands before it.
+    async fn answer(&self, mut request: Request<Body>) -> Result<Response<Body>, HttpError> {
+        if is_for_sts(request.method(), request.uri(), request.headers()) {
+            return in_sts_shape(self.service.call(request).await?).await;
+        }
+        if request.method() == Method::OPTIONS {
+            let bucket = bucket_of(request.headers(), request.uri().path());
+            return cors::preflight(&self.rules(bucket), request.headers()).or_else(refusal);
+        }
+        let origin = cors::Origin::of(request.method(), request.headers());
+        let rules_of = origin.as_ref().and_then(|_| bucket_of(request.headers(), request.uri().path()));
+        let is_head = request.method() == Method::HEAD;
+        let mut response = match Gate::admit(&mut request) {
+            Err(error) => {
+                drain(request).await;
+                refusal(error)?
+            }
+            Ok(gate) => {
+                request.extensions_mut().insert(gate.clone());
+                let response = match gate.operation() {
+                    "PostObject" => limits::of_form(self.service.call(request)).await?,
+                    _ => self.service.call(request).await?,
+                };
+                let response = match gate.refusal() {
+                    Some(error) => refusal(error)?,
+                    None => response,
+                };
+                replies::written(gate.operation(), response).await?
+            }
+        };
+        if is_head && !response.status().is_success() {
+            *response.body_mut() = Body::empty();
+        }
+        if let Some(origin) = origin {
+            origin.allow(&self.rules(rules_of), response.headers_mut());
+        }
+        Ok(response)
+    }
+
+    /// A bucket's rules for pages of other sites.
+    fn rules(&self, bucket: Option<String>) -> Vec<CorsRule> {
+        bucket.map(|name| (self.rules)(&name)).unwrap_or_default()
+    }
+}
+
+/// An error as an answer.
+fn refusal(error: S3Error) -> Result<Response<Body>, HttpError> {
+    error.to_http_response().map_err(|error| HttpError::new(Box::new(error)))
+}
+
+/// Reads a short body that nobody wants, so that its sender comes to read the answer.
+async fn drain(request: Request<Body>) {
+    if !request.headers().contains_key(EXPECT) {
+        let _ =
+            timeout(DRAIN, http_body_util::Limited::new(request.into_body(), MOST_DRAINED).collect()).await;
     }
 }
 

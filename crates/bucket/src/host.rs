@@ -1,6 +1,10 @@
 //! Which bucket a host name says: `bucket.localhost:9000` and `bucket.s3.localhost:9000` are buckets, any other host is
 //! the store itself, and the bucket is the first part of the path.
 
+use std::net::{IpAddr, SocketAddr};
+
+use hyper::HeaderMap;
+use hyper::header::HOST;
 use s3s::S3Result;
 use s3s::host::{S3Host, VirtualHost};
 
@@ -23,6 +27,24 @@ impl S3Host for Hosts {
         }
         Ok(VirtualHost::new(host))
     }
+}
+
+/// The bucket that a host name or else a path says, whether there is one or not.
+pub(crate) fn bucket_of(headers: &HeaderMap, path: &str) -> Option<String> {
+    if let Some(bucket) = in_host(headers) {
+        return Some(bucket);
+    }
+    let path = percent_encoding::percent_decode_str(path).decode_utf8_lossy();
+    let name = path.strip_prefix('/')?.split('/').next()?;
+    (!name.is_empty()).then(|| name.to_owned())
+}
+
+/// The bucket that a host name says.
+pub(crate) fn in_host(headers: &HeaderMap) -> Option<String> {
+    let host = headers.get(HOST)?.to_str().ok()?;
+    let is_address = host.parse::<SocketAddr>().is_ok() || host.parse::<IpAddr>().is_ok();
+    let named = Hosts.parse_host_header(host).ok().filter(|_| !is_address)?;
+    named.bucket().map(str::to_owned)
 }
 
 #[cfg(test)]

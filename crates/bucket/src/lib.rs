@@ -22,19 +22,24 @@
 //! # Ok(()) }
 //! ```
 
+mod answer;
 mod check;
 mod checksum;
+mod cors;
 mod delivery;
 mod error;
 mod events;
 mod expiry;
 mod front;
+mod gate;
 mod host;
 mod identity;
+mod limits;
 mod options;
 pub mod policy;
 pub mod private;
 mod records;
+mod replies;
 mod server;
 mod service;
 mod storage;

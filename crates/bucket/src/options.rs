@@ -6,6 +6,9 @@ use std::path::PathBuf;
 /// The queue that a bucket's notifications name to reach [`Options::webhook`].
 pub const QUEUE_ARN: &str = "arn:aws:sqs:us-east-1:000000000000:webhook";
 
+/// The account that all buckets and objects belong to.
+pub(crate) const OWNER: &str = "000000000000";
+
 /// An access key and its secret.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Credentials {

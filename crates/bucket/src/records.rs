@@ -40,6 +40,25 @@ pub(crate) struct Bucket {
     /// Which changes are told.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) notifications: Vec<Notification>,
+    /// Which pages of other sites may ask for what.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) cors: Vec<CorsRule>,
+}
+
+/// A rule of which pages of other sites may ask for what, and see of the answer.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct CorsRule {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) id: Option<String>,
+    /// `*` in it, at most once, stands for anything; in `headers` as well.
+    pub(crate) origins: Vec<String>,
+    pub(crate) methods: Vec<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) headers: Vec<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) exposed: Vec<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) max_age_seconds: Option<i32>,
 }
 
 /// A rule of which changes are told.

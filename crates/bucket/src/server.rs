@@ -1,6 +1,7 @@
 //! The listener: connections in, requests to the service, an end in order.
 
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 use hyper_util::rt::{TokioIo, TokioTimer};
@@ -13,9 +14,10 @@ use tokio::time::timeout;
 
 use crate::delivery::Delivery;
 use crate::expiry::{INTERVAL, expire_uploads};
-use crate::front::Front;
+use crate::front::{Front, Rules};
 use crate::host::Hosts;
 use crate::identity::{Access, AssumeRole, Identities, Sessions};
+use crate::limits::Limits;
 use crate::options::Options;
 use crate::records::Moment;
 use crate::service::Service;
@@ -61,13 +63,16 @@ impl Server {
         let sessions = Sessions::open(storage.clone(), SystemTime::now());
         let identities =
             Identities::new(options.root, sessions.map_err(|why| Error::Start(why.to_string()))?);
-        let mut builder = S3ServiceBuilder::new(Service::new(storage, &options.region));
+        let store = Service::new(storage, &options.region);
+        let mut builder = S3ServiceBuilder::new(store.clone());
+        let rules: Rules = Arc::new(move |name: &str| store.cors_rules(name));
+        builder.set_config(Arc::new(Limits::new()));
         builder.set_host(Hosts);
         builder.set_auth(identities.clone());
         builder.set_access(Access(identities.clone()));
         builder.set_route(AssumeRole(identities));
         let (ending, end) = oneshot::channel();
-        let accepting = tokio::spawn(accept(listener, builder.build(), end));
+        let accepting = tokio::spawn(accept(listener, (builder.build(), rules), end));
         Ok(Self { address, ending: Some(ending), accepting, delivering, expiring, writing: Some(writing) })
     }
 
@@ -117,7 +122,7 @@ async fn expire(storage: Storage) {
     }
 }
 
-async fn accept(listener: TcpListener, service: S3Service, mut end: oneshot::Receiver<()>) {
+async fn accept(listener: TcpListener, (service, rules): (S3Service, Rules), mut end: oneshot::Receiver<()>) {
     let mut connections = JoinSet::new();
     let graceful = GracefulShutdown::new();
     loop {
@@ -131,9 +136,10 @@ async fn accept(listener: TcpListener, service: S3Service, mut end: oneshot::Rec
             continue;
         };
         let _ = stream.set_nodelay(true);
+        let front = Front { service: service.clone(), rules: rules.clone(), peer: peer.ip() };
         let connection = hyper::server::conn::http1::Builder::new()
             .timer(TokioTimer::new())
-            .serve_connection(TokioIo::new(stream), Front { service: service.clone(), peer: peer.ip() });
+            .serve_connection(TokioIo::new(stream), front);
         let connection = graceful.watch(connection);
         // A client that goes away in the middle is that client's end.
         connections.spawn(async move { drop(connection.await) });

@@ -1,17 +1,16 @@
 //! S3's operations, by the storage.
 //!
 //! One module a family: `buckets`, `reads`, `writes`, `copies`, `deletes`, `lists`, `versions`, `uploads` (in parts),
-//! `notifications`. What an operation's headers ask for beyond it is `meaning`'s; conditions are `conditions`'; a body on
-//! its way in is `ingest`'s, out `outgest`'s. Operations that are not listed here answer `NotImplemented`.
+//! `notifications`, `cross_origin` (rules for other sites' pages). Conditions are `conditions`'; a body on its way in is
+//! `ingest`'s, out `outgest`'s. What a request may ask for beyond its operation is judged before, by `gate`.
 
-mod answer;
 mod buckets;
 mod conditions;
 mod copies;
+mod cross_origin;
 mod deletes;
 mod ingest;
 mod lists;
-mod meaning;
 mod notifications;
 mod objects;
 mod outgest;
@@ -27,12 +26,11 @@ use redb::StorageError;
 use s3s::dto::*;
 use s3s::{S3, S3Error, S3Request, S3Response, S3Result};
 
+use crate::answer::{Answer, no_such_bucket, no_such_key, unavailable, unreadable};
 use crate::front::Origin;
 use crate::identity::discreetly;
 use crate::records::{self, key};
 use crate::storage::{Batch, Kind, Snapshot, Storage, Table};
-use answer::{Answer, no_such_bucket, no_such_key, unavailable, unreadable};
-use meaning::check;
 
 /// See the module.
 #[derive(Clone)]
@@ -122,7 +120,6 @@ impl S3 for Service {
         &self,
         req: S3Request<ListBucketsInput>,
     ) -> S3Result<S3Response<ListBucketsOutput>> {
-        check(&req)?;
         self.buckets_listed(&req.input).map(S3Response::new)
     }
 
@@ -130,12 +127,10 @@ impl S3 for Service {
         &self,
         req: S3Request<CreateBucketInput>,
     ) -> S3Result<S3Response<CreateBucketOutput>> {
-        check(&req)?;
         self.bucket_created(req.input).await.map(S3Response::new)
     }
 
     async fn head_bucket(&self, req: S3Request<HeadBucketInput>) -> S3Result<S3Response<HeadBucketOutput>> {
-        check(&req)?;
         self.bucket_found(&req.input).map(S3Response::new)
     }
 
@@ -143,7 +138,6 @@ impl S3 for Service {
         &self,
         req: S3Request<DeleteBucketInput>,
     ) -> S3Result<S3Response<DeleteBucketOutput>> {
-        check(&req)?;
         self.bucket_deleted(req.input).await.map(S3Response::new)
     }
 
@@ -151,7 +145,6 @@ impl S3 for Service {
         &self,
         req: S3Request<GetBucketLocationInput>,
     ) -> S3Result<S3Response<GetBucketLocationOutput>> {
-        check(&req)?;
         self.bucket_location(&req.input).map(S3Response::new)
     }
 
@@ -159,7 +152,6 @@ impl S3 for Service {
         &self,
         req: S3Request<GetBucketVersioningInput>,
     ) -> S3Result<S3Response<GetBucketVersioningOutput>> {
-        check(&req)?;
         self.bucket_exists(&req.input.bucket)?;
         Ok(S3Response::new(GetBucketVersioningOutput::default()))
     }
@@ -168,7 +160,6 @@ impl S3 for Service {
         &self,
         req: S3Request<GetBucketAclInput>,
     ) -> S3Result<S3Response<GetBucketAclOutput>> {
-        check(&req)?;
         self.bucket_exists(&req.input.bucket)?;
         Ok(S3Response::new(buckets::owners_alone()))
     }
@@ -177,28 +168,62 @@ impl S3 for Service {
         &self,
         req: S3Request<GetBucketPolicyInput>,
     ) -> S3Result<S3Response<GetBucketPolicyOutput>> {
-        self.no_configuration(&req, &req.input.bucket, s3s::S3ErrorCode::NoSuchBucketPolicy)
+        self.no_configuration(&req.input.bucket, s3s::S3ErrorCode::NoSuchBucketPolicy)
     }
 
     async fn get_bucket_cors(
         &self,
         req: S3Request<GetBucketCorsInput>,
     ) -> S3Result<S3Response<GetBucketCorsOutput>> {
-        self.no_configuration(&req, &req.input.bucket, s3s::S3ErrorCode::NoSuchCORSConfiguration)
+        self.cors_told(&req.input.bucket).map(S3Response::new)
+    }
+
+    async fn put_bucket_cors(
+        &self,
+        req: S3Request<PutBucketCorsInput>,
+    ) -> S3Result<S3Response<PutBucketCorsOutput>> {
+        self.cors_set(req.input.bucket, req.input.cors_configuration.cors_rules).await?;
+        Ok(S3Response::new(PutBucketCorsOutput {}))
+    }
+
+    async fn delete_bucket_cors(
+        &self,
+        req: S3Request<DeleteBucketCorsInput>,
+    ) -> S3Result<S3Response<DeleteBucketCorsOutput>> {
+        self.cors_removed(req.input.bucket).await?;
+        Ok(S3Response::new(DeleteBucketCorsOutput {}))
+    }
+
+    async fn put_bucket_acl(
+        &self,
+        req: S3Request<PutBucketAclInput>,
+    ) -> S3Result<S3Response<PutBucketAclOutput>> {
+        self.bucket_exists(&req.input.bucket)?;
+        buckets::check_list(req.input.acl.is_some(), req.input.access_control_policy)?;
+        Ok(S3Response::new(PutBucketAclOutput {}))
+    }
+
+    async fn put_object_acl(
+        &self,
+        req: S3Request<PutObjectAclInput>,
+    ) -> S3Result<S3Response<PutObjectAclOutput>> {
+        self.object(&self.snapshot()?, &req.input.bucket, &req.input.key)?;
+        buckets::check_list(req.input.acl.is_some(), req.input.access_control_policy)?;
+        Ok(S3Response::new(PutObjectAclOutput::default()))
     }
 
     async fn get_bucket_lifecycle_configuration(
         &self,
         req: S3Request<GetBucketLifecycleConfigurationInput>,
     ) -> S3Result<S3Response<GetBucketLifecycleConfigurationOutput>> {
-        self.no_configuration(&req, &req.input.bucket, s3s::S3ErrorCode::NoSuchLifecycleConfiguration)
+        self.no_configuration(&req.input.bucket, s3s::S3ErrorCode::NoSuchLifecycleConfiguration)
     }
 
     async fn get_bucket_tagging(
         &self,
         req: S3Request<GetBucketTaggingInput>,
     ) -> S3Result<S3Response<GetBucketTaggingOutput>> {
-        self.no_configuration(&req, &req.input.bucket, s3s::S3ErrorCode::NoSuchTagSet)
+        self.no_configuration(&req.input.bucket, s3s::S3ErrorCode::NoSuchTagSet)
     }
 
     async fn get_bucket_encryption(
@@ -206,7 +231,7 @@ impl S3 for Service {
         req: S3Request<GetBucketEncryptionInput>,
     ) -> S3Result<S3Response<GetBucketEncryptionOutput>> {
         let code = s3s::S3ErrorCode::ServerSideEncryptionConfigurationNotFoundError;
-        self.no_configuration(&req, &req.input.bucket, code)
+        self.no_configuration(&req.input.bucket, code)
     }
 
     async fn get_object_lock_configuration(
@@ -214,21 +239,20 @@ impl S3 for Service {
         req: S3Request<GetObjectLockConfigurationInput>,
     ) -> S3Result<S3Response<GetObjectLockConfigurationOutput>> {
         let code = s3s::S3ErrorCode::ObjectLockConfigurationNotFoundError;
-        self.no_configuration(&req, &req.input.bucket, code)
+        self.no_configuration(&req.input.bucket, code)
     }
 
     async fn get_bucket_website(
         &self,
         req: S3Request<GetBucketWebsiteInput>,
     ) -> S3Result<S3Response<GetBucketWebsiteOutput>> {
-        self.no_configuration(&req, &req.input.bucket, s3s::S3ErrorCode::NoSuchWebsiteConfiguration)
+        self.no_configuration(&req.input.bucket, s3s::S3ErrorCode::NoSuchWebsiteConfiguration)
     }
 
     async fn put_bucket_notification_configuration(
         &self,
         req: S3Request<PutBucketNotificationConfigurationInput>,
     ) -> S3Result<S3Response<PutBucketNotificationConfigurationOutput>> {
-        check(&req)?;
         self.notifications_set(req.input).await.map(S3Response::new)
     }
 
@@ -236,7 +260,6 @@ impl S3 for Service {
         &self,
         req: S3Request<GetBucketNotificationConfigurationInput>,
     ) -> S3Result<S3Response<GetBucketNotificationConfigurationOutput>> {
-        check(&req)?;
         self.notifications_told(&req.input).map(S3Response::new)
     }
 
@@ -244,7 +267,6 @@ impl S3 for Service {
         &self,
         req: S3Request<ListObjectsInput>,
     ) -> S3Result<S3Response<ListObjectsOutput>> {
-        check(&req)?;
         self.objects_listed(req.input).await.map(S3Response::new)
     }
 
@@ -252,7 +274,6 @@ impl S3 for Service {
         &self,
         req: S3Request<ListObjectsV2Input>,
     ) -> S3Result<S3Response<ListObjectsV2Output>> {
-        check(&req)?;
         self.objects_listed_v2(req.input).await.map(S3Response::new)
     }
 
@@ -260,18 +281,15 @@ impl S3 for Service {
         &self,
         req: S3Request<ListObjectVersionsInput>,
     ) -> S3Result<S3Response<ListObjectVersionsOutput>> {
-        check(&req)?;
         self.versions_listed(req.input).await.map(S3Response::new)
     }
 
     async fn get_object(&self, req: S3Request<GetObjectInput>) -> S3Result<S3Response<GetObjectOutput>> {
-        check(&req)?;
         let told = discreetly(&req.extensions);
-        self.object_read(req.input).await.map_err(told)
+        self.object_read(req).await.map_err(told)
     }
 
     async fn head_object(&self, req: S3Request<HeadObjectInput>) -> S3Result<S3Response<HeadObjectOutput>> {
-        check(&req)?;
         self.object_looked_at(&req).map_err(discreetly(&req.extensions))
     }
 
@@ -279,7 +297,6 @@ impl S3 for Service {
         &self,
         req: S3Request<GetObjectAttributesInput>,
     ) -> S3Result<S3Response<GetObjectAttributesOutput>> {
-        check(&req)?;
         let attributes = self.object_attributes(&req.input).map(S3Response::new);
         attributes.map_err(discreetly(&req.extensions))
     }
@@ -288,7 +305,6 @@ impl S3 for Service {
         &self,
         req: S3Request<GetObjectAclInput>,
     ) -> S3Result<S3Response<GetObjectAclOutput>> {
-        check(&req)?;
         self.object(&self.snapshot()?, &req.input.bucket, &req.input.key)?;
         let GetBucketAclOutput { grants, owner } = buckets::owners_alone();
         Ok(S3Response::new(GetObjectAclOutput { grants, owner, request_charged: None }))
@@ -298,18 +314,15 @@ impl S3 for Service {
         &self,
         req: S3Request<GetObjectTaggingInput>,
     ) -> S3Result<S3Response<GetObjectTaggingOutput>> {
-        check(&req)?;
         self.object(&self.snapshot()?, &req.input.bucket, &req.input.key)?;
         Ok(S3Response::new(GetObjectTaggingOutput { tag_set: Vec::new(), version_id: None }))
     }
 
     async fn put_object(&self, req: S3Request<PutObjectInput>) -> S3Result<S3Response<PutObjectOutput>> {
-        check(&req)?;
         self.object_put(req).await.map(S3Response::new)
     }
 
     async fn copy_object(&self, req: S3Request<CopyObjectInput>) -> S3Result<S3Response<CopyObjectOutput>> {
-        check(&req)?;
         let told = discreetly(&req.extensions);
         self.object_copied(req).await.map(S3Response::new).map_err(told)
     }
@@ -318,7 +331,6 @@ impl S3 for Service {
         &self,
         req: S3Request<DeleteObjectInput>,
     ) -> S3Result<S3Response<DeleteObjectOutput>> {
-        check(&req)?;
         self.object_deleted(req).await.map(S3Response::new)
     }
 
@@ -326,7 +338,6 @@ impl S3 for Service {
         &self,
         req: S3Request<DeleteObjectsInput>,
     ) -> S3Result<S3Response<DeleteObjectsOutput>> {
-        check(&req)?;
         self.objects_deleted(req).await.map(S3Response::new)
     }
 
@@ -334,12 +345,10 @@ impl S3 for Service {
         &self,
         req: S3Request<CreateMultipartUploadInput>,
     ) -> S3Result<S3Response<CreateMultipartUploadOutput>> {
-        check(&req)?;
         self.upload_created(req).await.map(S3Response::new)
     }
 
     async fn upload_part(&self, req: S3Request<UploadPartInput>) -> S3Result<S3Response<UploadPartOutput>> {
-        check(&req)?;
         self.part_uploaded(req).await.map(S3Response::new)
     }
 
@@ -347,7 +356,6 @@ impl S3 for Service {
         &self,
         req: S3Request<UploadPartCopyInput>,
     ) -> S3Result<S3Response<UploadPartCopyOutput>> {
-        check(&req)?;
         let told = discreetly(&req.extensions);
         self.part_copied(req).await.map(S3Response::new).map_err(told)
     }
@@ -356,7 +364,6 @@ impl S3 for Service {
         &self,
         req: S3Request<CompleteMultipartUploadInput>,
     ) -> S3Result<S3Response<CompleteMultipartUploadOutput>> {
-        check(&req)?;
         self.upload_completed(req).await.map(S3Response::new)
     }
 
@@ -364,12 +371,10 @@ impl S3 for Service {
         &self,
         req: S3Request<AbortMultipartUploadInput>,
     ) -> S3Result<S3Response<AbortMultipartUploadOutput>> {
-        check(&req)?;
         self.upload_aborted(req.input).await.map(S3Response::new)
     }
 
     async fn list_parts(&self, req: S3Request<ListPartsInput>) -> S3Result<S3Response<ListPartsOutput>> {
-        check(&req)?;
         self.parts_listed(&req.input).map(S3Response::new)
     }
 
@@ -377,7 +382,6 @@ impl S3 for Service {
         &self,
         req: S3Request<ListMultipartUploadsInput>,
     ) -> S3Result<S3Response<ListMultipartUploadsOutput>> {
-        check(&req)?;
         self.uploads_listed(&req.input).map(S3Response::new)
     }
 }

@@ -61,6 +61,14 @@ They refuse what RAYFOLD_MAX_PIXELS, RAYFOLD_MAX_OBJECTS and the like do not all
 Stop with Ctrl-C; the data is kept, and the next start goes on where this one was.
 Of what was made for FOLDER nothing is kept but the GIF.
 
+Other clients take the two keys that it prints, and its address as URL:
+  s5cmd   AWS_REGION=us-east-1, and --endpoint-url URL
+  rclone  RCLONE_CONFIG_BOX_TYPE=s3 RCLONE_CONFIG_BOX_PROVIDER=Other
+          RCLONE_CONFIG_BOX_ENV_AUTH=true RCLONE_CONFIG_BOX_REGION=us-east-1
+          RCLONE_CONFIG_BOX_ENDPOINT=URL; the bucket is BOX:rayfold
+  s3cmd   --no-ssl --region=us-east-1 --host=HOST:PORT --host-bucket=HOST:PORT
+  mc      mc alias set box URL KEY SECRET --api s3v4 --path on; box/rayfold
+
 Examples:
   rayfold dev scenes/hello -o hello.gif
       scripts in, GIF out, through the bucket

@@ -15,6 +15,7 @@ use s3s::{S3Error, S3ErrorCode, S3Request, S3Result, s3_error};
 use super::caller::{Caller, Identities};
 use super::session::Session;
 use super::signed::{self, parameter};
+use crate::gate::Gate;
 use crate::policy::{self, Scope, Verdict, needed};
 
 /// Where a session's token is, unless it is in the URL.
@@ -46,7 +47,7 @@ pub(crate) fn discreetly(extensions: &Extensions) -> impl Fn(S3Error) -> S3Error
 #[async_trait::async_trait]
 impl S3Access for Access {
     async fn check(&self, cx: &mut S3AccessContext<'_>) -> S3Result<()> {
-        let Some(credentials) = cx.credentials() else {
+        let Some(access_key) = cx.credentials().map(|credentials| credentials.access_key.clone()) else {
             return Err(s3_error!(AccessDenied, "Access Denied: requests must be signed"));
         };
         let query = cx.uri().query().unwrap_or_default();
@@ -55,11 +56,16 @@ impl S3Access for Access {
         if cx.s3_op().name() != "PostObject" {
             signed::check(cx.headers(), &query)?;
         }
+        let routed = cx.s3_op().name().to_owned();
+        match cx.extensions_mut().get::<Gate>() {
+            Some(gate) => gate.check_route(&routed)?,
+            None => return Err(s3_error!(InternalError, "a request passed by the table of operations")),
+        }
         let token = match cx.headers().get(TOKEN) {
             Some(token) => Some(token.to_str().map_err(|e| s3_error!(e, InvalidToken))?),
             None => parameter(&query, "X-Amz-Security-Token")?,
         };
-        let session = match self.0.caller(&credentials.access_key, token, SystemTime::now())? {
+        let session = match self.0.caller(&access_key, token, SystemTime::now())? {
             Caller::Owner => return Ok(()),
             Caller::Session(session) => session,
         };

@@ -4,8 +4,10 @@
 //! that begins with `x-amz-` changes what is asked for: a copy's source turns a write of one object into a read of another.
 
 use hyper::HeaderMap;
-use hyper::header::{AUTHORIZATION, HeaderName};
+use hyper::header::{AUTHORIZATION, DATE, HeaderName};
 use s3s::{S3Error, S3ErrorCode, S3Result, s3_error};
+
+use crate::gate::amz_date;
 
 /// Seconds that a presigned URL may be valid, as with AWS.
 const LONGEST_EXPIRY: u64 = 604_800;
@@ -81,8 +83,20 @@ pub(super) fn check(headers: &HeaderMap, query: &[(String, String)]) -> S3Result
     }
     // The hash of the body is part of what is signed, or is checked against the body.
     let is_free = |name: &str| !name.starts_with("x-amz-") || name == "x-amz-content-sha256";
+    // The whole query of a URL is signed, and a parameter of it may stand for a header (`gate`).
+    let in_query = |name: &str| {
+        signature.is_in_url
+            && query.iter().any(|(given, value)| {
+                given.eq_ignore_ascii_case(name) && headers.get(name).is_some_and(|header| header == value)
+            })
+    };
+    let is_date = |name: &str| {
+        let date = headers.get(DATE).filter(|_| name == "x-amz-date" && signature.covers("date"));
+        date.and_then(|date| amz_date(date.to_str().ok()?))
+            .is_some_and(|date| headers.get(name).is_some_and(|given| given == &date))
+    };
     let mut names = headers.keys().map(HeaderName::as_str).filter(|name| !is_free(name)).chain(["host"]);
-    match names.find(|name| !signature.covers(name)) {
+    match names.find(|name| !signature.covers(name) && !in_query(name) && !is_date(name)) {
         None => Ok(()),
         Some(name) => Err(s3_error!(
             AccessDenied,
@@ -151,6 +165,28 @@ mod tests {
         assert_eq!(outcome(&[("authorization", &whole), copy], &url("host")), "AccessDenied");
         let listed = ("X-Amz-SignedHeaders", "host;x-amz-copy-source");
         assert_eq!(outcome(&[("authorization", &plain), copy], &[listed]), "AccessDenied");
+    }
+
+    #[test]
+    fn a_signed_date_or_parameter_covers_the_header_that_it_stands_for() {
+        let plain = format!("AWS4-HMAC-SHA256 Credential={SCOPE},SignedHeaders=date;host, Signature=0");
+        let signed = ("authorization", &*plain);
+        let (date, same) = (("date", "Wed, 25 Nov 2026 01:02:03 GMT"), ("x-amz-date", "20261125T010203Z"));
+        assert_eq!(outcome(&[signed, date, same], &[]), "ok");
+        assert_eq!(outcome(&[signed, date, ("x-amz-date", "20261125T010204Z")], &[]), "AccessDenied");
+        assert_eq!(outcome(&[signed, same], &[]), "AccessDenied");
+        let url = |parameter| {
+            [
+                ("X-Amz-Signature", "0"),
+                ("X-Amz-Credential", SCOPE),
+                ("X-Amz-SignedHeaders", "host"),
+                parameter,
+            ]
+        };
+        let acl = ("x-amz-acl", "private");
+        assert_eq!(outcome(&[acl], &url(("X-Amz-Acl", "private"))), "ok");
+        assert_eq!(outcome(&[acl], &url(("X-Amz-Acl", "public-read"))), "AccessDenied");
+        assert_eq!(outcome(&[signed, date, acl], &[("X-Amz-Acl", "private")]), "AccessDenied");
     }
 
     #[test]

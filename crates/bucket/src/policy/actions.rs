@@ -36,6 +36,8 @@ pub fn needed(operation: &str) -> Option<(Scope, &'static [&'static str])> {
         "GetBucketTagging" => (Scope::Bucket, &["s3:GetBucketTagging"]),
         "GetBucketVersioning" => (Scope::Bucket, &["s3:GetBucketVersioning"]),
         "GetObjectLockConfiguration" => (Scope::Bucket, &["s3:GetBucketObjectLockConfiguration"]),
+        "PutBucketAcl" => (Scope::Bucket, &["s3:PutBucketAcl"]),
+        "PutBucketCors" | "DeleteBucketCors" => (Scope::Bucket, &["s3:PutBucketCORS"]),
         "PutBucketNotificationConfiguration" => (Scope::Bucket, &["s3:PutBucketNotification"]),
 
         "GetObject" | "HeadObject" => (Scope::Object, &["s3:GetObject"]),
@@ -83,6 +85,9 @@ mod tests {
         GetBucketTagging                    Bucket   s3:GetBucketTagging
         GetBucketVersioning                 Bucket   s3:GetBucketVersioning
         GetObjectLockConfiguration          Bucket   s3:GetBucketObjectLockConfiguration
+        PutBucketAcl                        Bucket   s3:PutBucketAcl
+        PutBucketCors                       Bucket   s3:PutBucketCORS
+        DeleteBucketCors                    Bucket   s3:PutBucketCORS
         PutBucketNotificationConfiguration  Bucket   s3:PutBucketNotification
         GetObject                           Object   s3:GetObject
         HeadObject                          Object   s3:GetObject

@@ -1,13 +1,12 @@
 //! Buckets: made, found, listed, deleted; and what can be asked of one that has no such thing.
 
 use s3s::dto::*;
-use s3s::{S3Error, S3ErrorCode, S3Request, S3Response, S3Result, s3_error};
+use s3s::{S3Error, S3ErrorCode, S3Response, S3Result, s3_error};
 
 use super::Service;
-use super::answer::{Answer, invalid_argument, not_implemented, time, unreadable};
-use super::meaning::OWNER;
-use super::meaning::check;
 use super::objects::bucket;
+use crate::answer::{Answer, invalid_argument, no_lists, not_implemented, time, unreadable};
+use crate::options::OWNER;
 use crate::records::{self, Moment, abandon, all, decode, find, key, set};
 use crate::storage::{Kind, Table, View};
 
@@ -69,16 +68,25 @@ impl Service {
             ));
         }
         let name = input.bucket;
+        if !can_be_new(&name) {
+            return Err(s3_error!(InvalidBucketName, "The specified bucket is not valid."));
+        }
         let location = format!("/{name}");
+        // As ever: S3's first region answers its owner as if the bucket were new.
+        let again_is_fine = &*self.region == "us-east-1";
         let create = self.change(Kind::Grows, move |batch| {
             if batch.get(Table::Buckets, name.as_bytes())?.is_some() {
+                if again_is_fine {
+                    return Ok(());
+                }
                 return Err(S3Error::with_message(
                     S3ErrorCode::BucketAlreadyOwnedByYou,
                     "Your previous request to create the named bucket succeeded and you already own it.",
                 )
                 .into());
             }
-            let record = records::Bucket { created: Moment::now(), notifications: Vec::new() };
+            let record =
+                records::Bucket { created: Moment::now(), notifications: Vec::new(), cors: Vec::new() };
             Ok(set(batch, Table::Buckets, name.as_bytes(), &record)?)
         });
         create.await?;
@@ -122,18 +130,35 @@ impl Service {
     }
 
     /// What is asked for is no thing that a bucket here can have.
-    pub(super) fn no_configuration<I, O>(
-        &self,
-        req: &S3Request<I>,
-        bucket: &str,
-        code: S3ErrorCode,
-    ) -> S3Result<S3Response<O>> {
-        check(req)?;
+    pub(super) fn no_configuration<O>(&self, bucket: &str, code: S3ErrorCode) -> S3Result<S3Response<O>> {
         let _: records::Bucket = find(&self.snapshot()?, Table::Buckets, bucket.as_bytes())
             .map_err(unreadable)?
-            .ok_or_else(super::answer::no_such_bucket)?;
+            .ok_or_else(crate::answer::no_such_bucket)?;
         Err(S3Error::with_message(code, "The bucket has no such configuration"))
     }
+}
+
+/// What S3 demands of a new bucket's name beyond what `s3s` looks at.
+fn can_be_new(name: &str) -> bool {
+    let kept = ["sthree-", "amzn-s3-demo-"].iter().any(|start| name.starts_with(start))
+        || ["-s3alias", "--ol-s3", ".mrap", "--x-s3", "--table-s3"].iter().any(|end| name.ends_with(end));
+    !kept && !name.contains(".-") && !name.contains("-.")
+}
+
+/// An access list is one that says what holds anyway: the owner may do everything. Canned lists were judged before.
+pub(super) fn check_list(is_canned: bool, list: Option<AccessControlPolicy>) -> Answer<()> {
+    let Some(list) = list else {
+        return if is_canned { Ok(()) } else { Err(s3_error!(MissingSecurityHeader, "An ACL is missing.")) };
+    };
+    let is_owners = |grant: &Grant| {
+        grant.grantee.as_ref().is_some_and(|grantee| grantee.id.as_deref() == Some(OWNER))
+            && grant.permission.as_ref().is_some_and(|may| may.as_str() == Permission::FULL_CONTROL)
+    };
+    let grants = list.grants.unwrap_or_default();
+    if is_canned || grants.is_empty() || !grants.iter().all(is_owners) {
+        return Err(no_lists());
+    }
+    Ok(())
 }
 
 pub(super) fn owner() -> Owner {
@@ -152,4 +177,17 @@ pub(super) fn owners_alone() -> GetBucketAclOutput {
     let grant =
         Grant { grantee: Some(grantee), permission: Some(Permission::from_static(Permission::FULL_CONTROL)) };
     GetBucketAclOutput { grants: Some(vec![grant]), owner: Some(owner()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::can_be_new;
+
+    #[test]
+    fn names_that_s3_keeps_or_refuses_are_refused() {
+        assert!(can_be_new("films") && can_be_new("my.films-2"));
+        for name in ["a.-b", "a-.b", "sthree-a", "amzn-s3-demo-a", "a-s3alias", "a--x-s3", "a.mrap"] {
+            assert!(!can_be_new(name), "{name}");
+        }
+    }
 }

@@ -5,7 +5,7 @@ use std::time::SystemTime;
 use s3s::dto::{ETagCondition, Timestamp};
 use s3s::{S3Error, S3ErrorCode};
 
-use super::answer::{Answer, no_such_key, not_implemented, precondition_failed};
+use crate::answer::{Answer, no_such_key, not_implemented, precondition_failed};
 use crate::records::Object;
 
 /// The conditions of a change.

@@ -3,12 +3,12 @@
 use s3s::dto::*;
 use s3s::{S3Request, s3_error};
 
-use super::answer::{Answer, invalid_argument, invalid_request, not_implemented, time};
 use super::conditions::{ReadConditions, WriteConditions};
 use super::ingest::{Claims, etag, ingest, is_too_large};
 use super::objects::{Destination, admit, check_key, check_metadata, expires, keep, place};
 use super::writes::{of, stored_encoding};
 use super::{Caller, Service};
+use crate::answer::{Answer, invalid_argument, invalid_request, not_implemented, time};
 use crate::checksum::Algorithm;
 use crate::records::{self, Headers, Moment};
 use crate::storage::Kind;
@@ -30,7 +30,8 @@ impl Service {
         let (bucket, key) = source(&input.copy_source)?;
         let replace = directive(input.metadata_directive.as_ref())?;
         let to_itself = bucket == input.bucket && key == input.key;
-        if to_itself && !replace {
+        let says_how_it_is_kept = input.storage_class.is_some() || input.server_side_encryption.is_some();
+        if to_itself && !replace && !says_how_it_is_kept {
             return Err(invalid_request(
                 "This copy request is illegal because it is trying to copy an object to itself without changing the object's metadata, storage class, website redirect location or encryption attributes.",
             ));

@@ -3,9 +3,9 @@
 use s3s::dto::*;
 use s3s::{S3Request, s3_error};
 
-use super::answer::{Answer, invalid_request, not_implemented, precondition_failed, unavailable};
 use super::objects::{bucket, tell};
 use super::{Caller, Service, Stop};
+use crate::answer::{Answer, invalid_request, not_implemented, precondition_failed, unavailable};
 use crate::identity::DeniedKeys;
 use crate::records::{self, find, key, release};
 use crate::storage::{Batch, Bodies, Kind, Table};
@@ -103,7 +103,7 @@ fn remove(
     let existing: Option<records::Object> = find(batch, Table::Objects, &row)?;
     if let Some(condition) = if_match {
         let matches = match (condition, &existing) {
-            (_, None) => return Err(super::answer::no_such_key().into()),
+            (_, None) => return Err(crate::answer::no_such_key().into()),
             (ETagCondition::Any, Some(_)) => true,
             (ETagCondition::ETag(given), Some(object)) => given.value() == object.etag,
         };

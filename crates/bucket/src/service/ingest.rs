@@ -9,8 +9,9 @@ use hyper::HeaderMap;
 use s3s::{S3Error, StdError, TrailingHeaders, s3_error};
 use tokio::task::JoinHandle;
 
-use super::answer::{Answer, body_failed, file_failed, invalid_request};
+use crate::answer::{Answer, body_failed, file_failed, invalid_request, wrong_checksum, wrong_md5};
 use crate::checksum::{Algorithm, Checksum, Digests, bytes_of};
+use crate::gate::checksum_header;
 use crate::storage::{NewBody, Storage};
 
 /// A body up to this size is a row: one sync for everything. Beyond it, writing it twice would cost more than its own.
@@ -55,7 +56,10 @@ impl Claims {
         otherwise: Algorithm,
     ) -> Answer<Self> {
         let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok()).map(str::trim);
-        let length = text("content-length").and_then(|text| text.parse().ok());
+        // `s3s` has put the length of the bytes themselves in the place of that of the chunks, where one was given.
+        let in_chunks = text("x-amz-content-sha256").is_some_and(|hash| hash.starts_with("STREAMING-"));
+        let decoded = text("x-amz-decoded-content-length").filter(|_| in_chunks);
+        let length = text("content-length").or(decoded).and_then(|text| text.parse().ok());
         if length.is_none() {
             return Err(s3_error!(MissingContentLength, "You must provide the Content-Length HTTP header."));
         }
@@ -67,24 +71,25 @@ impl Claims {
             Some(Some(md5)) if md5.len() == 16 => Some(md5),
             Some(_) => return Err(s3_error!(InvalidDigest, "The Content-MD5 you specified is not valid.")),
         };
-        let mut named =
-            Algorithm::ALL.into_iter().filter(|algorithm| headers.contains_key(algorithm.header()));
-        let in_header = named.next();
+        let in_header = checksum_header(headers)?;
         let in_trailer = text("x-amz-trailer").and_then(|name| {
             Algorithm::ALL.into_iter().find(|algorithm| algorithm.header().eq_ignore_ascii_case(name))
         });
-        if named.next().is_some() || (in_header.is_some() && in_trailer.is_some()) {
+        if in_header.is_some() && in_trailer.is_some() {
             let message =
                 "Expecting a single x-amz-checksum- header. Multiple checksum Types are not allowed.";
             return Err(invalid_request(message));
         }
-        if let (Some(name), None, None) = (text("x-amz-sdk-checksum-algorithm"), in_header, in_trailer) {
+        if let (Some(name), None, None) = (text("x-amz-sdk-checksum-algorithm"), &in_header, in_trailer) {
             return Err(invalid_request(format!(
                 "x-amz-sdk-checksum-algorithm specified ({name}), but no corresponding x-amz-checksum-* or x-amz-trailer headers were found."
             )));
         }
-        let checksum = in_header.map(|algorithm| valid(algorithm, text(algorithm.header()))).transpose()?;
-        let algorithm = in_header.or(in_trailer).unwrap_or(otherwise);
+        // A client may name it for the store to make the checksum; the gate sees to it that it is that of the others.
+        let named = text("x-amz-checksum-algorithm").and_then(Algorithm::of_name);
+        let given = in_header.as_ref().map(|(algorithm, _)| *algorithm).or(in_trailer);
+        let algorithm = given.or(named).unwrap_or(otherwise);
+        let checksum = in_header.map(|(algorithm, value)| valid(algorithm, Some(&value))).transpose()?;
         let trailer = in_trailer.and(trailer);
         Ok(Self { length, md5, algorithm, checksum, trailer })
     }
@@ -128,7 +133,7 @@ where
         return Err(s3_error!(IncompleteBody, "The body is shorter than Content-Length says."));
     }
     if claims.md5.is_some_and(|md5| md5 != ingested.md5) {
-        return Err(s3_error!(BadDigest, "The Content-MD5 you specified did not match what we received."));
+        return Err(wrong_md5());
     }
     let header = claims.algorithm.header();
     let claimed = match claims.trailer {
@@ -140,8 +145,7 @@ where
         }
     };
     if claimed.is_some_and(|claimed| claimed != ingested.checksum.value) {
-        let name = claims.algorithm.name();
-        return Err(s3_error!(BadDigest, "The {name} you specified did not match the calculated checksum."));
+        return Err(wrong_checksum(claims.algorithm));
     }
     Ok(ingested)
 }
@@ -269,6 +273,12 @@ mod tests {
         ] {
             assert_eq!(claims(&headers).map(|_| ()), Err(code.to_owned()), "{headers:?}");
         }
+        let chunked = [
+            ("x-amz-content-sha256", "STREAMING-UNSIGNED-PAYLOAD-TRAILER"),
+            ("x-amz-decoded-content-length", "7"),
+        ];
+        assert_eq!(claims(&chunked).map(|claims| claims.length), Ok(Some(7)));
+        assert_eq!(claims(&chunked[1..]).map(|_| ()), Err("MissingContentLength".to_owned()));
         let good = claims(&[length, crc, ("content-md5", "CZ7fAjxLoqlN0Cf2Vm8Zew==")]).unwrap();
         assert_eq!((good.md5.map(|md5| md5.len()), good.algorithm), (Some(16), Algorithm::Crc32));
         let behind = claims(&[length, ("x-amz-trailer", "x-amz-checksum-sha256")]).unwrap();

@@ -7,8 +7,8 @@
 use s3s::dto::*;
 
 use super::Service;
-use super::answer::{Answer, invalid_argument, time, unreadable};
 use super::buckets::owner;
+use crate::answer::{Answer, invalid_argument, time, unreadable};
 use crate::records::{self, decode, key};
 use crate::storage::{Snapshot, Table, View};
 

@@ -3,9 +3,9 @@
 use s3s::dto::*;
 
 use super::Service;
-use super::answer::{Answer, invalid_argument, not_implemented};
 use super::objects::bucket;
 use crate::QUEUE_ARN;
+use crate::answer::{Answer, invalid_argument, not_implemented};
 use crate::records::{self, set};
 use crate::storage::{Kind, Table};
 

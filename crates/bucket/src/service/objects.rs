@@ -3,10 +3,10 @@
 use redb::StorageError;
 use s3s::dto::Timestamp;
 
-use super::answer::{Answer, invalid_request, no_such_bucket};
 use super::conditions::WriteConditions;
 use super::ingest::Content;
 use super::{Caller, Stop};
+use crate::answer::{Answer, invalid_request, no_such_bucket};
 use crate::records::{self, Body, Bucket, Event, Headers, Moment, Object, find, key, release, set};
 use crate::storage::{Batch, Bodies, Table, View};
 

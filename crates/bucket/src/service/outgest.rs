@@ -20,7 +20,7 @@ use s3s::stream::{ByteStream, RemainingLength};
 use tokio::task::JoinHandle;
 
 use super::Service;
-use super::answer::{Answer, BodyDamaged, unreadable};
+use crate::answer::{Answer, BodyDamaged, unreadable};
 use crate::checksum::Comparison;
 use crate::error::report;
 use crate::records::{Body, Layout, LayoutPart, Object, find};

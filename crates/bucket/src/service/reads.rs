@@ -3,14 +3,18 @@
 use std::ops::Range as Bytes;
 
 use hyper::StatusCode;
-use hyper::header::{CONTENT_RANGE, ETAG, HeaderMap, HeaderValue, LAST_MODIFIED};
+use hyper::header::{
+    CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_ENCODING, CONTENT_LANGUAGE, CONTENT_RANGE, CONTENT_TYPE,
+    ETAG, EXPIRES, HeaderMap, HeaderValue, IF_RANGE, LAST_MODIFIED,
+};
 use s3s::dto::*;
 use s3s::{S3Error, S3ErrorCode, S3Request, S3Response, S3Result, s3_error};
 
 use super::Service;
-use super::answer::{Answer, coded, invalid_argument, invalid_request, time};
 use super::conditions::ReadConditions;
+use super::objects::expires;
 use super::writes::of;
+use crate::answer::{Answer, coded, invalid_argument, invalid_request, time};
 use crate::checksum::{Algorithm, Checksum as StoredChecksum};
 use crate::records::{Layout, Object};
 
@@ -92,7 +96,12 @@ macro_rules! answer {
 }
 
 impl Service {
-    pub(super) async fn object_read(&self, input: GetObjectInput) -> S3Result<S3Response<GetObjectOutput>> {
+    pub(super) async fn object_read(
+        &self,
+        req: S3Request<GetObjectInput>,
+    ) -> S3Result<S3Response<GetObjectOutput>> {
+        let range_holds = req.headers.get(IF_RANGE).cloned();
+        let input = req.input;
         let conditions = ReadConditions {
             if_match: input.if_match,
             if_none_match: input.if_none_match,
@@ -102,7 +111,8 @@ impl Service {
         let held = self.held(&input.bucket, &input.key)?;
         conditions.check(&held.object).map_err(|error| with_validators(error, &held.object))?;
         let mode = input.checksum_mode.as_ref();
-        let told = Told::new(&held.object, held.layout.as_ref(), input.range, input.part_number, mode)?;
+        let range = input.range.filter(|_| is_of_range(range_holds.as_ref(), &held.object));
+        let told = Told::new(&held.object, held.layout.as_ref(), range, input.part_number, mode)?;
         let body = StreamingBlob::new(held.bytes(&self.storage, told.selection.bytes.clone())?);
         Ok(S3Response::new(answer!(GetObjectOutput, told, body: Some(body))))
     }
@@ -126,9 +136,25 @@ impl Service {
             None => None,
         };
         let mode = input.checksum_mode.as_ref();
-        let told = Told::new(&object, layout.as_ref(), input.range, input.part_number, mode)?;
+        let range = input.range.filter(|_| is_of_range(req.headers.get(IF_RANGE), &object));
+        let told = Told::new(&object, layout.as_ref(), range, input.part_number, mode)?;
         let partial = told.selection.partial;
         let mut response = S3Response::new(answer!(HeadObjectOutput, told));
+        // Those of a Get are `s3s`' to put there.
+        let expires = input.response_expires.as_ref().and_then(|date| expires(Some(date)));
+        for (name, value) in [
+            (CACHE_CONTROL, input.response_cache_control.as_ref()),
+            (CONTENT_DISPOSITION, input.response_content_disposition.as_ref()),
+            (CONTENT_ENCODING, input.response_content_encoding.as_ref()),
+            (CONTENT_LANGUAGE, input.response_content_language.as_ref()),
+            (CONTENT_TYPE, input.response_content_type.as_ref()),
+            (EXPIRES, expires.as_ref()),
+        ] {
+            let Some(value) = value else { continue };
+            let value = HeaderValue::try_from(value.as_str())
+                .map_err(|_| invalid_argument(format!("response-{name} cannot be a header")))?;
+            response.headers.insert(name, value);
+        }
         response.status = partial.then_some(StatusCode::PARTIAL_CONTENT);
         Ok(response)
     }
@@ -240,6 +266,14 @@ fn select(
             Ok(Selection { bytes: start..start + size, partial: true, part: Some(part) })
         }
     }
+}
+
+/// Whether a range is of the object as it is: `If-Range` names an entity tag or a date, and otherwise the whole is meant.
+fn is_of_range(condition: Option<&HeaderValue>, object: &Object) -> bool {
+    let Some(condition) = condition else { return true };
+    let condition = condition.to_str().unwrap_or_default().trim();
+    let same_date = || date(condition) == Some(object.modified.whole_seconds().into());
+    condition == format!("\"{}\"", object.etag) || same_date()
 }
 
 fn no_such_part() -> S3Error {

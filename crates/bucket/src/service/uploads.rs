@@ -6,13 +6,13 @@ use hyper::http::uri::Authority;
 use s3s::dto::*;
 use s3s::{S3Request, s3_error};
 
-use super::answer::{Answer, coded, invalid_argument, invalid_request, no_such_upload, time, unreadable};
 use super::conditions::{ReadConditions, WriteConditions};
 use super::copies::source;
 use super::ingest::{Claims, Ingested, etag, ingest, is_too_large};
 use super::objects::{Destination, admit, bucket, check_key, check_metadata, expires, keep, place};
 use super::writes::{of, stored_encoding};
 use super::{Caller, Service, Stop};
+use crate::answer::{Answer, coded, invalid_argument, invalid_request, no_such_upload, time, unreadable};
 use crate::checksum::{self, Algorithm};
 use crate::records::{
     self, Body, Headers, Layout, LayoutPart, Moment, abandon, all, decode, find, key, release, set,
@@ -102,10 +102,11 @@ impl Service {
         let input = req.input;
         let number = part_number(input.part_number)?;
         let upload = self.upload(&input.bucket, &input.key, &input.upload_id)?;
+        let text = |name: &str| req.headers.get(name).and_then(|value| value.to_str().ok()).map(str::trim);
         let named = Algorithm::ALL.into_iter().find(|algorithm| {
-            let trailer = req.headers.get("x-amz-trailer").and_then(|name| name.to_str().ok());
             req.headers.contains_key(algorithm.header())
-                || trailer.is_some_and(|name| name.trim().eq_ignore_ascii_case(algorithm.header()))
+                || text("x-amz-trailer").is_some_and(|name| name.eq_ignore_ascii_case(algorithm.header()))
+                || text("x-amz-checksum-algorithm").and_then(Algorithm::of_name) == Some(*algorithm)
         });
         if upload.asked && named.is_some_and(|named| named != upload.algorithm) {
             return Err(invalid_request(format!(

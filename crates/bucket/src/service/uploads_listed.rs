@@ -3,10 +3,10 @@
 use s3s::dto::*;
 
 use super::Service;
-use super::answer::{Answer, invalid_argument, time, unreadable};
 use super::buckets::owner;
 use super::lists::{encoded, encoding, most, prefixes};
 use super::writes::of;
+use crate::answer::{Answer, invalid_argument, time, unreadable};
 use crate::checksum::Algorithm;
 use crate::records::{self, decode, key};
 use crate::storage::{Table, View};

@@ -5,9 +5,9 @@
 use s3s::dto::*;
 
 use super::Service;
-use super::answer::{Answer, invalid_argument, time};
 use super::buckets::owner;
 use super::lists::{Query, after, encoded, encoding, most, prefixes};
+use crate::answer::{Answer, invalid_argument, time};
 use crate::records;
 
 /// The version of an object that was put while its bucket kept none.

@@ -1,21 +1,28 @@
 //! PutObject.
 
+use hyper::header::{HeaderMap, HeaderValue};
 use s3s::dto::*;
 use s3s::{S3Request, s3_error};
 
-use super::answer::Answer;
 use super::conditions::WriteConditions;
 use super::ingest::{Claims, etag, ingest};
 use super::objects::{Destination, admit, check_key, check_metadata, expires, keep, place};
 use super::{Caller, Service};
+use crate::answer::{Answer, invalid_argument};
 use crate::checksum::{Algorithm, Checksum};
+use crate::gate::Gate;
 use crate::records::{Headers, Moment, Object};
 use crate::storage::Kind;
 
 impl Service {
     pub(super) async fn object_put(&self, req: S3Request<PutObjectInput>) -> Answer<PutObjectOutput> {
+        let is_form = req.extensions.get::<Gate>().is_some_and(|gate| gate.operation() == "PostObject");
+        let claims = if is_form {
+            Claims::of_request(&said_in_form(&req.input)?, None, Algorithm::Crc64nvme)?
+        } else {
+            Claims::of_request(&req.headers, req.trailing_headers.clone(), Algorithm::Crc64nvme)?
+        };
         let caller = Caller::of(&req);
-        let claims = Claims::of_request(&req.headers, req.trailing_headers.clone(), Algorithm::Crc64nvme)?;
         let input = req.input;
         check_key(&input.key)?;
         let conditions = WriteConditions { if_match: input.if_match, if_none_match: input.if_none_match };
@@ -59,6 +66,29 @@ impl Service {
             ..PutObjectOutput::default()
         })
     }
+}
+
+/// What the fields of a browser's form say of its file, as a put says it in headers.
+fn said_in_form(input: &PutObjectInput) -> Answer<HeaderMap> {
+    let length = input.content_length.unwrap_or_default().to_string();
+    let algorithm = input.checksum_algorithm.as_ref().map(|name| name.as_str().to_owned());
+    let mut said = HeaderMap::new();
+    for (name, value) in [
+        ("content-length", Some(&length)),
+        ("content-md5", input.content_md5.as_ref()),
+        ("x-amz-sdk-checksum-algorithm", algorithm.as_ref()),
+        (Algorithm::Crc32.header(), input.checksum_crc32.as_ref()),
+        (Algorithm::Crc32c.header(), input.checksum_crc32c.as_ref()),
+        (Algorithm::Crc64nvme.header(), input.checksum_crc64nvme.as_ref()),
+        (Algorithm::Sha1.header(), input.checksum_sha1.as_ref()),
+        (Algorithm::Sha256.header(), input.checksum_sha256.as_ref()),
+    ] {
+        let Some(value) = value else { continue };
+        let value = HeaderValue::try_from(value)
+            .map_err(|_| invalid_argument(format!("{name} of the form cannot be read")))?;
+        said.insert(name, value);
+    }
+    Ok(said)
 }
 
 /// `aws-chunked` is how the body travelled, not what it is.

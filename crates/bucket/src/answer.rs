@@ -5,6 +5,7 @@ use redb::StorageError;
 use s3s::dto::Timestamp;
 use s3s::{S3Error, S3ErrorCode, StdError, s3_error};
 
+use crate::checksum::Algorithm;
 use crate::error::report;
 use crate::records::Moment;
 use crate::storage::Unavailable;
@@ -12,7 +13,7 @@ use crate::storage::Unavailable;
 /// What a request ends with: what was asked for, or S3's error.
 pub(crate) type Answer<T> = Result<T, S3Error>;
 
-pub(super) fn time(moment: Moment) -> Timestamp {
+pub(crate) fn time(moment: Moment) -> Timestamp {
     moment.system_time().into()
 }
 
@@ -45,6 +46,25 @@ pub(crate) fn invalid_request(message: impl Into<String>) -> S3Error {
 
 pub(crate) fn not_implemented(what: &str) -> S3Error {
     S3Error::with_message(S3ErrorCode::NotImplemented, format!("{what} is not implemented"))
+}
+
+/// A header, parameter or element that may stand there once.
+pub(crate) fn twice(name: &str) -> S3Error {
+    invalid_argument(format!("{name} stands there twice"))
+}
+
+pub(crate) fn wrong_md5() -> S3Error {
+    s3_error!(BadDigest, "The Content-MD5 you specified did not match what we received.")
+}
+
+pub(crate) fn wrong_checksum(algorithm: Algorithm) -> S3Error {
+    let name = algorithm.name();
+    s3_error!(BadDigest, "The {name} you specified did not match the calculated checksum.")
+}
+
+/// To an access list other than the owner's: a bucket here has none, as one of S3 whose owner did not ask for them.
+pub(crate) fn no_lists() -> S3Error {
+    coded("AccessControlListNotSupported", StatusCode::BAD_REQUEST, "The bucket does not allow ACLs")
 }
 
 /// A code that s3s does not know.
