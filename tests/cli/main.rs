@@ -8,6 +8,8 @@ mod bad_input;
 mod check;
 mod cost;
 mod encode;
+#[cfg(unix)]
+mod files;
 mod images;
 mod interrupted;
 mod movies;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use image::{DynamicImage, ImageFormat, ImageReader, Rgb, RgbImage};
+use rayfold_files::probe;
 use rayfold_gif::{Encoder, Plays, Settings};
 use rayfold_scene::natural_cmp;
 
@@ -13,7 +14,7 @@ use crate::ahead;
 use crate::console::Console;
 use crate::interrupt;
 use crate::outcome::{Outcome, Usage};
-use crate::output::probe;
+
 use crate::playback::Playback;
 use crate::progress::Progress;
 use crate::render::movie::{self, MovieError};
@@ -151,7 +152,7 @@ fn open(path: &Path) -> anyhow::Result<ImageReader<BufReader<File>>> {
             "it is a folder, expected its images, such as {0}/*.png",
             path.display()
         );
-        let reader = ImageReader::new(BufReader::new(File::open(path)?)).with_guessed_format()?;
+        let reader = ImageReader::new(BufReader::new(rayfold_files::open(path)?)).with_guessed_format()?;
         match reader.format() {
             Some(ImageFormat::Png | ImageFormat::Tiff) => Ok(reader),
             _ => anyhow::bail!("it is neither a PNG nor a TIFF image"),
