@@ -8,6 +8,7 @@ mod bad_input;
 mod check;
 mod cost;
 mod encode;
+mod encode_files;
 #[cfg(unix)]
 mod files;
 mod images;
