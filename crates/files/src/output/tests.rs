@@ -87,7 +87,7 @@ fn what_another_run_left_under_an_old_name_blocks_nothing() {
 fn a_run_that_ends_at_once_leaves_nothing() {
     let folder = Folder::new();
     let out = OutputFile::create(folder.join("a.gif")).unwrap();
-    std::fs::remove_file(&unfinished().iter().find(|path| **path == out.temporary.0).unwrap()).unwrap();
+    std::fs::remove_file(unfinished().iter().find(|path| **path == out.temporary.0).unwrap()).unwrap();
     assert_eq!(folder.count(), 0);
     drop(out);
     let path = folder.join("b.gif");
