@@ -14,6 +14,7 @@ use serde_json::Value;
 /// Which crates of the project each one may use. A new crate is an entry here and a section in ARCHITECTURE.md.
 const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-scene", &[]),
+    ("rayfold-files", &["rayfold-scene"]),
     ("rayfold-gif", &[]),
     ("rayfold-bucket", &[]),
     ("rayfold-tracer", &["rayfold-scene"]),
@@ -23,12 +24,20 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-local", &["rayfold-bucket", "rayfold-pipeline"]),
     (
         "rayfold-studio",
-        &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline", "rayfold-client"],
+        &[
+            "rayfold-scene",
+            "rayfold-files",
+            "rayfold-tracer",
+            "rayfold-gif",
+            "rayfold-pipeline",
+            "rayfold-client",
+        ],
     ),
     (
         "rayfold",
         &[
             "rayfold-scene",
+            "rayfold-files",
             "rayfold-tracer",
             "rayfold-gif",
             "rayfold-pipeline",
@@ -42,6 +51,7 @@ const KNOWS: &[(&str, &[&str])] = &[
         "rayfold-bench",
         &[
             "rayfold-scene",
+            "rayfold-files",
             "rayfold-tracer",
             "rayfold-gif",
             "rayfold-pipeline",

@@ -129,6 +129,8 @@ async fn a_submitted_folder_becomes_the_gif_that_render_makes() {
         let film = &report["animations"][0];
         assert_eq!((&film["animation"], &film["status"]), (&"film".into(), &"done".into()));
         assert_eq!((&film["done"], &film["gif"]["current"]), (&3.into(), &true.into()));
+        let text = cloud.prints("status film --format json");
+        assert_eq!(text.matches("\n      \"gif\": ").count(), 1, "a key that is there twice: {text}");
 
         // Fetch: the GIF, and the frames as they are drawn locally.
         cloud.rayfold("fetch film -o fetched.gif", 0);
@@ -184,6 +186,41 @@ async fn removing_leaves_nothing_of_an_animation_and_everything_of_others() {
                 format!("error: there is no animation film in {}\n", cloud.stage.store().bucket())
             );
         }
+    })
+    .await;
+}
+
+/// A marker of a folder was an animation that was new for ever, and what lay beside the folders was nowhere to be seen.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_ignored_misnamed_and_misplaced_is_what_the_status_says() {
+    on_every_store(async |store| {
+        let mut cloud = cloud(store, |_| {}).await;
+        for name in ["film/1.txt", "film/.old.txt", "film/._1.txt", "film/3.TXT"] {
+            cloud.write(name, scene(8.0));
+        }
+        let said = cloud.says("submit film", 0);
+        let warning = "warning: film/3.TXT: not read: expected the ending .txt in small letters";
+        assert!(said.contains(warning) && said.contains("1 script uploaded"), "{said}");
+        for key in ["scripts/film/._1.txt", "scripts/film/3.TXT", "scripts/1.txt", "Scripts/film/1.txt"] {
+            cloud.stage.put(key, scene(9.0)).await;
+        }
+        cloud.work().await;
+        let output = cloud.rayfold("status", 0);
+        let (table, said) =
+            (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+        assert!(table.starts_with("film  done       1 of 1 frame, GIF of "), "{table}");
+        assert!(table.ends_with("; 1 warning\n"), "{table}");
+        assert!(said.contains("2 objects misplaced"), "{said}");
+        assert!(said.contains("scripts/1.txt") && said.contains("Scripts/film/1.txt"), "{said}");
+        let said = cloud.says("status film", 0);
+        assert!(said.contains("warning: scripts/film/3.TXT: not read"), "{said}");
+        let report: serde_json::Value = serde_json::from_str(&cloud.prints("status --format json")).unwrap();
+        assert_eq!(report["misplaced"]["count"], 2);
+        assert_eq!(report["animations"][0]["warnings"][0]["key"], "scripts/film/3.TXT");
+        cloud.rayfold("remove film --delete", 0);
+        assert!(cloud.keys("scripts/film/").await.is_empty());
+        cloud.work().await;
+        assert_eq!(cloud.prints("status"), "");
     })
     .await;
 }

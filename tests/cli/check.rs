@@ -146,3 +146,52 @@ fn colour_only_where_it_is_wanted() {
     let colored = folder.rayfold("check a.txt --color always").output().unwrap().stderr;
     assert!(colored.contains(&b'\x1b'));
 }
+
+/// A hidden copy was a frame, one of macOS made the animation fail, and capitals made it shorter without a word.
+#[test]
+fn what_systems_leave_is_ignored_and_what_is_misnamed_is_a_warning() {
+    let folder = Folder::new();
+    for name in ["1.txt", ".old.txt", "3.TXT", "5.txt ", "Animation.json", "notes.md"] {
+        folder.write(&format!("scenes/{name}"), BALL);
+    }
+    for name in
+        ["._1.txt", ".#1.txt", ".ipynb_checkpoints/1.txt", "__MACOSX/._1.txt", "Thumbs.db", "9.txt/1.txt"]
+    {
+        folder.write(&format!("scenes/{name}"), b"\0\x05\x16\x07");
+    }
+    let warnings = "\
+warning: scenes/3.TXT: not read: expected the ending .txt in small letters
+warning: scenes/5.txt : not read: expected no blanks around the name and its ending .txt
+warning: scenes/9.txt: not read: expected a script, found a folder
+warning: scenes/Animation.json: not read: expected animation.json, in small letters and without blanks
+";
+    let said = warnings.to_owned() + "1 file, 1 frame: no errors, 4 warnings\n";
+    folder.rayfold("check scenes").assert().code(0).stderr_eq(said);
+    let out = folder.rayfold("check scenes --format json").output().unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!((&report["frames"], &report["warnings"]), (&1.into(), &4.into()));
+    assert_eq!(report["conflicts"][0]["input"], "scenes/3.TXT");
+    let out = folder.rayfold("render scenes -o a.gif").output().unwrap();
+    assert_eq!(out.status.code(), Some(0));
+    assert!(String::from_utf8(out.stderr).unwrap().starts_with(warnings));
+    // Which of them are in the way of other scripts is the same question.
+    folder.write("parts/.old.txt", "");
+    folder.write("parts/3.TXT", "");
+    folder.rayfold("split scenes/1.txt parts").assert().code(0);
+    folder.write("near/3.TXT", BALL);
+    folder.rayfold("check near").assert().code(1).stderr_eq(str![[r#"
+error: the folder near holds no scene scripts (*.txt); near/3.TXT: not read: expected the ending .txt in small letters
+1 error
+
+"#]]);
+}
+
+#[test]
+fn standard_input_is_read_once() {
+    for args in ["check - -", "render - - -o a.gif"] {
+        Folder::new().rayfold(args).stdin(BALL).assert().code(2).stderr_eq(str![[r#"
+error: standard input (-) can be read only once
+
+"#]]);
+    }
+}

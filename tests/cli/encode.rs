@@ -56,7 +56,7 @@ error: cannot read empty.tif: it is neither a PNG nor a TIFF image
 error: cannot read frames: it is a folder, expected its images, such as frames/*.png
 error: cannot read none.png: No such file or directory
 error: cannot read photo.png: it is neither a PNG nor a TIFF image
-error: 5 of 6 frames cannot be used
+error: 5 of 6 files cannot be used
 
 "#]]);
     assert_eq!(folder.list("."), ["a.png", "empty.tif", "frames", "photo.png", "text.png"]);

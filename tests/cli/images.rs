@@ -70,3 +70,60 @@ fn a_bad_script_leaves_no_image() {
     folder.rayfold("render a.txt b.txt -o %d.png").assert().code(1);
     assert_eq!(folder.list("."), ["a.txt", "b.txt"]);
 }
+
+#[test]
+fn frames_of_a_longer_run_are_told_and_stay() {
+    let folder = Folder::with("a.txt", BALL.to_owned() + &"Trace\n".repeat(5));
+    folder.rayfold("render a.txt -o fr/%04d.png").assert().code(0);
+    folder.write("a.txt", BALL.to_owned() + "Trace\n");
+    folder.write("fr/0009.tif", "");
+    for more in ["", " --frame 1", " --skip-existing"] {
+        let out = folder.rayfold(&format!("render a.txt -o fr/%04d.png{more}")).output().unwrap();
+        let said = String::from_utf8(out.stderr).unwrap();
+        let warning = "\nwarning: 4 frames of an earlier run left beside them: fr/0003.png to fr/0006.png\n";
+        assert!(out.status.success() && said.ends_with(warning), "{said}");
+    }
+    assert_eq!(folder.list("fr").len(), 7);
+    folder.rayfold("render a.txt -o other/%04d.png").assert().code(0).stderr_eq(str![[r#"
+other/0001.png to other/0002.png: 2 frames, [..]B, in [..] s
+
+"#]]);
+}
+
+/// The error named a file and a folder that nobody had asked for.
+#[test]
+fn a_pattern_below_a_file_is_refused_by_its_own_name() {
+    let folder = Folder::with("a.txt", BALL);
+    for out in ["a.txt/%d.png", "a.txt/deep/%d.png"] {
+        let said = folder.rayfold(&format!("render a.txt -o {out}")).output().unwrap();
+        let said = String::from_utf8(said.stderr).unwrap();
+        let expected = format!("error: cannot write {}: a.txt is no folder\n", out.replace("%d", "1"));
+        assert_eq!(said, expected);
+    }
+    let said = folder.rayfold("render a.txt -o a.txt/a.gif").output().unwrap().stderr;
+    assert_eq!(String::from_utf8(said).unwrap(), "error: cannot write a.txt/a.gif: a.txt is no folder\n");
+}
+
+/// What cannot be written was an error also where nothing was to be written.
+#[cfg(unix)]
+#[test]
+fn where_all_frames_are_there_nothing_need_be_written() {
+    let folder = Folder::with("a.txt", BALL.to_owned() + "Trace\n");
+    folder.rayfold("render a.txt -o fr/%d.png").assert().code(0);
+    let read_only = |name: &str, mode| {
+        let mode = std::os::unix::fs::PermissionsExt::from_mode(mode);
+        std::fs::set_permissions(folder.join(name), mode).unwrap();
+    };
+    // Root writes into the folder all the same, but replaces no read-only file.
+    for (name, mode) in [("fr/1.png", 0o444), ("fr/2.png", 0o444), ("fr", 0o555)] {
+        read_only(name, mode);
+    }
+    folder.rayfold("render a.txt -o fr/%d.png --skip-existing").assert().code(0);
+    read_only("fr", 0o755);
+    read_only("fr/2.png", 0o644);
+    folder.write("fr/2.png", "half a picture");
+    read_only("fr/2.png", 0o444);
+    let said = folder.rayfold("render a.txt -o fr/%d.png --skip-existing").output().unwrap();
+    let said = String::from_utf8(said.stderr).unwrap();
+    assert!(said.contains("cannot write fr/2.png: it is read-only"), "{said}");
+}

@@ -1,4 +1,5 @@
-//! Output appears whole or not at all: on Ctrl-C, when the disk is full, when a file may not grow.
+//! Output appears whole or not at all: on Ctrl-C, when the disk is full, when a file may not grow. Waiting ends with the
+//! first signal.
 
 #![cfg(unix)]
 
@@ -22,12 +23,12 @@ struct Running(Child);
 impl Running {
     fn start(folder: &Folder, args: &[&str]) -> Self {
         let mut command = Command::new(RAYFOLD);
-        command
-            .args(args)
-            .current_dir(folder.path())
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null());
+        command.args(args).stdin(Stdio::null());
+        Self::of(folder, command)
+    }
+
+    fn of(folder: &Folder, mut command: Command) -> Self {
+        command.current_dir(folder.path()).stdout(Stdio::null()).stderr(Stdio::null());
         Self(command.spawn().unwrap())
     }
 
@@ -67,7 +68,7 @@ fn parts(folder: &Folder) -> Vec<String> {
 
 #[test]
 fn ctrl_c_leaves_no_animation() {
-    for (name, code) in [("-INT", 130), ("-TERM", 143)] {
+    for (name, code) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
         let folder = long();
         folder.write("out.gif", "old");
         let mut rayfold = Running::start(&folder, &["render", "a.txt", "-o", "out.gif"]);
@@ -128,4 +129,100 @@ fn standard_output_on_a_full_disk_is_an_error() {
         String::from_utf8_lossy(&output.stderr),
         "error: cannot write to standard output: No space left on device\n"
     );
+}
+
+/// Something must be asked for at the terminal, or another program has more to say: a second Ctrl-C was needed, and
+/// SIGTERM waited for the end of the input.
+#[test]
+fn waiting_for_input_ends_with_the_first_signal() {
+    let folder = Folder::new();
+    let fifo = folder.join("prices.json");
+    assert!(Command::new("mkfifo").arg(&fifo).status().unwrap().success());
+    for args in [
+        &["check", "-"][..],
+        &["render", "-", "-o", "a.gif"],
+        &["split", "-", "parts"],
+        &["check", "/dev/fd/0"],
+        &["cost", "--frames", "9", "--ms", "9", "--prices", "prices.json"],
+    ] {
+        for (name, code) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
+            let mut command = Command::new(RAYFOLD);
+            command.args(args).stdin(Stdio::piped());
+            let mut rayfold = Running::of(&folder, command);
+            // Its standard input stays open as long as `rayfold` lives.
+            let _input = rayfold.0.stdin.take();
+            wait_until("it waits", || is_asleep(&rayfold));
+            rayfold.signal(name);
+            assert_eq!(rayfold.end().code(), Some(code), "{args:?} {name}");
+        }
+    }
+    assert_eq!(folder.list("."), ["prices.json"]);
+}
+
+/// It has begun to wait for its input: a thread of that name is there.
+#[cfg(target_os = "linux")]
+fn is_asleep(rayfold: &Running) -> bool {
+    let tasks = std::fs::read_dir(format!("/proc/{}/task", rayfold.0.id())).unwrap();
+    let mut names = tasks.flatten().filter_map(|task| std::fs::read_to_string(task.path().join("comm")).ok());
+    names.any(|name| name.trim() == "waiting")
+}
+
+#[cfg(not(target_os = "linux"))]
+fn is_asleep(_: &Running) -> bool {
+    std::thread::sleep(Duration::from_millis(500));
+    true
+}
+
+/// The reader of the pipe has stopped reading without closing it.
+#[test]
+fn waiting_for_a_reader_ends_with_the_first_signal() {
+    let folder = Folder::with("a.txt", BALL.replace("24, 16", "600, 400") + &"Trace\n".repeat(9));
+    let mut command = Command::new(RAYFOLD);
+    command.args(["render", "a.txt", "-o", "-"]).stdin(Stdio::null()).current_dir(folder.path());
+    let mut rayfold = Running(command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap());
+    wait_until("it waits", || is_asleep(&rayfold));
+    rayfold.signal("-TERM");
+    assert_eq!(rayfold.end().code(), Some(143));
+}
+
+#[test]
+fn signals_that_were_ignored_at_the_start_stay_ignored() {
+    let folder = Folder::new();
+    for name in ["HUP", "INT"] {
+        let mut command = Command::new("sh");
+        command.args(["-c", &format!("trap '' {name}; exec {RAYFOLD} check -")]).stdin(Stdio::piped());
+        let mut rayfold = Running::of(&folder, command);
+        let _input = rayfold.0.stdin.take();
+        wait_until("it waits", || is_asleep(&rayfold));
+        rayfold.signal(&format!("-{name}"));
+        rayfold.signal(&format!("-{name}"));
+        std::thread::sleep(Duration::from_millis(300));
+        assert!(rayfold.0.try_wait().unwrap().is_none(), "{name} ended it");
+        rayfold.signal("-TERM");
+        assert_eq!(rayfold.end().code(), Some(143));
+    }
+}
+
+/// In a container every run has the same number, and what one that was killed left blocked all later ones.
+#[test]
+fn what_a_killed_run_left_blocks_nothing_and_goes_when_it_is_old() {
+    let folder = long();
+    let mut rayfold = Running::start(&folder, &["render", "a.txt", "-o", "out.gif"]);
+    wait_until("a file is being written", || {
+        let before = parts(&folder);
+        std::thread::sleep(Duration::from_millis(200));
+        !before.is_empty() && before == parts(&folder)
+    });
+    rayfold.signal("-KILL");
+    rayfold.end();
+    let left = parts(&folder);
+    assert_eq!(left.len(), 1);
+    folder.write("a.txt", BALL);
+    folder.rayfold("render a.txt -o out.gif").assert().code(0);
+    assert_eq!(parts(&folder), left, "it may belong to a run that is just beginning");
+    let file = std::fs::File::options().write(true).open(folder.join(&left[0])).unwrap();
+    file.set_modified(std::time::SystemTime::now() - Duration::from_secs(2 * 60 * 60)).unwrap();
+    drop(file);
+    folder.rayfold("render a.txt -o out.gif").assert().code(0);
+    assert_eq!(folder.list("."), ["a.txt", "out.gif"]);
 }

@@ -8,6 +8,9 @@ mod bad_input;
 mod check;
 mod cost;
 mod encode;
+mod encode_files;
+#[cfg(unix)]
+mod files;
 mod images;
 mod interrupted;
 mod movies;

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use anyhow::Context as _;
+use rayfold_files::OutputFile;
 use rayfold_pipeline::Mutation;
 use rayfold_pipeline::simulation::explore::{
     Counterexample, Explored, World, explore, provoke, provoking, worlds,
@@ -215,7 +215,7 @@ fn write_report(
     let files = [("search.md", page.into_bytes()), ("search.csv", figures.into_inner()?)];
     for (name, bytes) in files {
         let path = args.output.join(name);
-        std::fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
+        OutputFile::write(&path, bytes, false)?;
     }
     Ok(())
 }

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use bytes::Bytes;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
+use rayfold_files::OutputFile;
 use rayfold_local::invoker::{Invoker, Settings};
 use rayfold_local::observation::{Observation, Requests, Seen};
 use rayfold_local::routes::Function;
@@ -307,7 +308,7 @@ fn write_report(args: &Args, rows: &[Row]) -> Result<()> {
     std::fs::create_dir_all(&args.output)?;
     for (name, bytes) in [("footprint.md", page.into_bytes()), ("footprint.csv", figures.into_inner()?)] {
         let path = args.output.join(name);
-        std::fs::write(&path, bytes).with_context(|| path.display().to_string())?;
+        OutputFile::write(&path, bytes, false)?;
     }
     plot(&args.output.join("footprint.svg"), rows)
 }

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
+use rayfold_files::OutputFile;
 use rayfold_scene::{Limits, Parsed, parse};
 
 use crate::cpu_time;
@@ -67,7 +68,7 @@ pub fn run(args: &Args) -> Result<()> {
     }
     std::fs::create_dir_all(&args.output)?;
     let path = args.output.join("parsing.md");
-    std::fs::write(&path, report).with_context(|| path.display().to_string())
+    Ok(OutputFile::write(&path, report, false)?)
 }
 
 fn row(kind: &Kind, args: &Args) -> Result<String> {

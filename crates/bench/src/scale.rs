@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
+use rayfold_files::OutputFile;
 use rayfold_pipeline::simulation::{Scale, ScaleReport, measure};
 use rayon::prelude::*;
 use serde::Deserialize;
@@ -311,7 +312,7 @@ fn write_report(args: &Args, rows: &[Row]) -> anyhow::Result<()> {
     }
     for (name, bytes) in [("scale.md", page.into_bytes()), ("scale.csv", figures.into_inner()?)] {
         let path = args.output.join(name);
-        std::fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
+        OutputFile::write(&path, bytes, false)?;
     }
     let plots: [(&str, &str, Value); 3] = [
         ("requests", "requests a frame", |row| row.report.requests_a_frame),

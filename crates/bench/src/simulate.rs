@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use anyhow::Context as _;
+use rayfold_files::OutputFile;
 use rayfold_pipeline::Mutation;
 use rayfold_pipeline::simulation::{Run, Scale, ScaleReport, Violation, measure, replay, run as run_seed};
 
@@ -100,7 +100,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     println!("{report}");
     if is_whole {
         let output = &args.output;
-        std::fs::write(output, &report).with_context(|| format!("cannot write {}", output.display()))?;
+        OutputFile::write(output, &report, false)?;
     }
     violation.map_or(Ok(()), |violation| Err(violation.into()))
 }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
+use rayfold_files::OutputFile;
 use serde::Deserialize;
 
 use crate::plot::{Labels, Series, shares};
@@ -117,7 +118,7 @@ pub fn run(args: &Args) -> Result<()> {
     let quietest = runs.iter().min_by(|a, b| a.others.total_cmp(&b.others)).context("no run was measured")?;
     ensure!(quietest.waits.len() > 10, "the browser has shown next to nothing");
     std::fs::create_dir_all(&args.output)?;
-    std::fs::write(args.output.join("studio.md"), report(&runs, quietest))?;
+    OutputFile::write(args.output.join("studio.md"), report(&runs, quietest), false)?;
     write_csv(&args.output.join("studio.csv"), &runs)?;
     plot(&args.output.join("studio.svg"), &runs, quietest)
 }

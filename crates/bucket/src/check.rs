@@ -273,7 +273,11 @@ impl Examined {
                 batch.remove(*table, row_key)?;
             }
             for bucket in &self.buckets {
-                let record = records::Bucket { created: records::Moment::now(), notifications: Vec::new(), cors: Vec::new() };
+                let record = records::Bucket {
+                    created: records::Moment::now(),
+                    notifications: Vec::new(),
+                    cors: Vec::new(),
+                };
                 set(batch, Table::Buckets, bucket.as_bytes(), &record)?;
             }
             Ok(())

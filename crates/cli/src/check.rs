@@ -6,7 +6,8 @@ use rayfold_scene::{Diagnostic, Language, Limits, SETTINGS_FILE, Severity};
 use serde::Serialize;
 
 use crate::console::{Console, Format, describe};
-use crate::input::Input;
+use crate::input::{Input, stdin_once};
+use crate::interrupt;
 use crate::outcome::Outcome;
 use crate::plan::{Plan, Wishes};
 use crate::survey::{Conflict, Faults};
@@ -29,8 +30,8 @@ Examples:
 
 The JSON document holds the number of files, frames, errors and warnings; `diagnostics`, each with file, line,
 column, span (byte offsets), severity, code, message and, where there is one, expected and help; `unreadable`, the
-files that could not be read; `conflicts`, why scripts that are fine by themselves are no animation together, each
-with its input, severity and message; and `language`, the table of the scene language: its commands, the clauses of
+files that could not be read; `conflicts`, why scripts that are fine by themselves are no animation together, and
+files that are not read because of their names, each with its input, severity and message; and `language`, the table of the scene language: its commands, the clauses of
 materials and the modes of curves, each number with its name, kind, unit, range and default.")]
 pub(crate) struct Args {
     /// Folders, script files, animation.json, or - for standard input
@@ -59,6 +60,7 @@ struct Report<'a> {
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
+    stdin_once(&args.input)?;
     args.threads.start()?;
     let limits = Limits { max_pixels: args.max_pixels, ..Limits::default() };
     let is_settings =
@@ -73,6 +75,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     for (path, input) in inputs.iter().zip(Input::each(&inputs, &limits)) {
         let input = match input {
             Ok(input) => input,
+            Err(error) if interrupt::signalled() => return Err(error),
             Err(error) => {
                 faults.unusable(error);
                 continue;

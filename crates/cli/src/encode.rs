@@ -1,11 +1,11 @@
 //! `rayfold encode`: images that are already there to an animation.
 
-use std::fs::File;
-use std::io::BufReader;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use image::{DynamicImage, ImageFormat, ImageReader, Rgb, RgbImage};
+use image::RgbImage;
+use rayfold_files::probe;
 use rayfold_gif::{Encoder, Plays, Settings};
 use rayfold_scene::natural_cmp;
 
@@ -13,7 +13,6 @@ use crate::ahead;
 use crate::console::Console;
 use crate::interrupt;
 use crate::outcome::{Outcome, Usage};
-use crate::output::probe;
 use crate::playback::Playback;
 use crate::progress::Progress;
 use crate::render::movie::{self, MovieError};
@@ -21,6 +20,11 @@ use crate::render::target::{Container, Movie, Place, must_be_gif};
 use crate::threads::Threads;
 use crate::values;
 use crate::wording::number;
+
+mod picture;
+mod tiff;
+
+use picture::Picture;
 
 /// Files at fault that are named, at most.
 const MOST_TOLD: usize = 20;
@@ -30,7 +34,8 @@ const AHEAD: u64 = 14 << 20;
 
 /// Turn images into an animated GIF
 ///
-/// Every image is a frame, and all are of one size. What is transparent is shown over black.
+/// Every image is a frame, and all are of one size; of an animated PNG each frame is one, of a TIFF each page. What is
+/// transparent is shown over black.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -65,12 +70,12 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let fps = args.fps;
     Encoder::new(std::io::sink(), Settings { fps, ..Settings::default() })
         .map_err(|error| Usage(format!("--fps {fps}: {error}")))?;
-    check(&args.frames, console)?;
-    let files = in_order(args, console);
+    let of_file = pictures(&args.frames, console)?;
+    let pictures: Vec<&Picture> = in_order(args, console).iter().flat_map(|file| &of_file[file]).collect();
     args.threads.start()?;
     let movie = Movie {
-        size: size(&files)?,
-        frames: files.len() as u64,
+        size: pictures.first().context("at least one frame")?.size()?,
+        frames: pictures.iter().map(|picture| picture.frames).sum(),
         fps,
         plays: args.playback.plays(Plays::Endless),
         last_delay_cs: args.playback.last_delay_cs(),
@@ -79,17 +84,26 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let mut progress = Progress::start(console, "frames", movie.frames);
     let place = Place::File(args.output.clone());
     let written = movie::write(&place, Container::Gif, movie, |push| {
-        let (mut names, mut done) = (files.iter(), 0);
-        let take = |image| {
-            anyhow::ensure!(!interrupt::stopping(), "interrupted");
-            let file = names.next().context("a file for each image")?;
-            push(image).map_err(|error| explain(error, file))?;
-            done += 1;
-            progress.set(console, done);
-            Ok(())
+        let (mut of_images, mut done) = (pictures.iter(), 0);
+        let take = |image: Option<RgbImage>| {
+            let picture = of_images.next().context("a picture for each image")?;
+            let mut take_one = |image| {
+                anyhow::ensure!(!interrupt::stopping(), "interrupted");
+                push(image).map_err(|error| explain(error, &picture.path))?;
+                done += 1;
+                progress.set(console, done);
+                Ok(())
+            };
+            match image {
+                Some(image) => take_one(image),
+                // Each frame needs the one before it.
+                None => picture.decode_each(&mut take_one),
+            }
         };
         // On a thread of the pool: it need not wait for another one to encode.
-        rayon::scope(|_| ahead::in_order(files.iter(), window(movie.size), |file| read(file), take))
+        rayon::scope(|_| {
+            ahead::in_order(pictures.iter(), window(movie.size), |picture| picture.decode(), take)
+        })
     })?;
     movie::tell(&place, &written, fps, progress.finish(), console);
     Ok(Outcome::Done)
@@ -114,14 +128,6 @@ fn in_order(args: &Args, console: &Console) -> Vec<PathBuf> {
     files
 }
 
-/// Columns and rows of the first image.
-fn size(files: &[PathBuf]) -> anyhow::Result<(u32, u32)> {
-    let first = files.first().context("at least one frame")?;
-    open(first)?
-        .into_dimensions()
-        .map_err(|error| anyhow::anyhow!("cannot read {}: {error}", first.display()))
-}
-
 /// How many images may be read before the encoder takes them.
 fn window((width, height): (u32, u32)) -> usize {
     let most = rayon::current_num_threads() + 2;
@@ -136,63 +142,22 @@ fn explain(error: MovieError, file: &Path) -> anyhow::Error {
     if of_the_frame { error.context(file.display().to_string()) } else { error }
 }
 
-/// Looks at all files before any is encoded: that each is there, and by its first bytes a PNG or TIFF image.
+/// Looks at all files before any is encoded: that each is there, and a PNG or TIFF image of how many frames.
 ///
 /// # Errors
-/// When one is not; each is told.
-fn check(frames: &[PathBuf], console: &Console) -> anyhow::Result<()> {
-    let faults = frames.iter().filter_map(|path| open(path).err()).collect::<Vec<_>>();
+/// When one is not; each is reported.
+fn pictures(files: &[PathBuf], console: &Console) -> anyhow::Result<HashMap<PathBuf, Vec<Picture>>> {
+    let mut pictures = HashMap::new();
+    let mut faults = Vec::new();
+    for path in files {
+        match Picture::all_of(path) {
+            Ok(all) => _ = pictures.insert(path.clone(), all),
+            Err(fault) => faults.push(fault),
+        }
+    }
     if faults.is_empty() {
-        return Ok(());
+        return Ok(pictures);
     }
     faults.iter().take(MOST_TOLD).for_each(|fault| console.error(fault));
-    anyhow::bail!("{} of {} cannot be used", faults.len(), number(frames.len() as u64, "frame"))
-}
-
-fn open(path: &Path) -> anyhow::Result<ImageReader<BufReader<File>>> {
-    let opened = || {
-        anyhow::ensure!(
-            !path.is_dir(),
-            "it is a folder, expected its images, such as {0}/*.png",
-            path.display()
-        );
-        let reader = ImageReader::new(BufReader::new(File::open(path)?)).with_guessed_format()?;
-        match reader.format() {
-            Some(ImageFormat::Png | ImageFormat::Tiff) => Ok(reader),
-            _ => anyhow::bail!("it is neither a PNG nor a TIFF image"),
-        }
-    };
-    opened().with_context(|| format!("cannot read {}", path.display()))
-}
-
-fn read(path: &Path) -> anyhow::Result<RgbImage> {
-    // The decoder's words say already what its cause says again.
-    let decoded = open(path)?.decode().map_err(|error| anyhow::anyhow!("{error}"));
-    Ok(opaque(decoded.with_context(|| format!("cannot read {}", path.display()))?))
-}
-
-/// A GIF's pixel is there or not; what is half there is shown over black.
-fn opaque(image: DynamicImage) -> RgbImage {
-    if !image.color().has_alpha() {
-        return image.into_rgb8();
-    }
-    let image = image.into_rgba8();
-    RgbImage::from_fn(image.width(), image.height(), |x, y| {
-        let [r, g, b, alpha] = image.get_pixel(x, y).0;
-        let over = |level: u8| ((u32::from(level) * u32::from(alpha) + 127) / 255) as u8;
-        Rgb([over(r), over(g), over(b)])
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn transparent_pixels_are_over_black() {
-        let image =
-            image::RgbaImage::from_fn(3, 1, |x, _| image::Rgba([200, 100, 50, [0, 128, 255][x as usize]]));
-        let shown = opaque(DynamicImage::ImageRgba8(image));
-        assert_eq!(shown.into_raw(), [0, 0, 0, 100, 50, 25, 200, 100, 50]);
-    }
+    anyhow::bail!("{} of {} cannot be used", faults.len(), number(files.len() as u64, "file"))
 }

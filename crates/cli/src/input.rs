@@ -11,17 +11,21 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context;
-use rayfold_scene::{Limits, Parsed, SETTINGS_FILE, natural_cmp, script_name};
+use rayfold_files::{Folder, NotRead};
+use rayfold_scene::{Limits, Name, Parsed};
 
+use crate::interrupt;
 use crate::outcome::Usage;
 
 /// Scripts in the order of their frames.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Input {
     /// At least one.
     pub(crate) scripts: Vec<ScriptFile>,
     /// Where a folder's settings lie, if it has any.
     pub(crate) settings: Option<PathBuf>,
+    /// What in a folder looks like a part of the animation and is not read.
+    pub(crate) not_read: Vec<NotRead>,
 }
 
 /// A script that can be read, also more than once.
@@ -45,9 +49,7 @@ impl Input {
     /// # Errors
     /// When something is not there or not readable, a folder holds no script, or folders are mixed with others.
     pub(crate) fn animation(inputs: &[PathBuf], limits: &Limits) -> anyhow::Result<Self> {
-        if inputs.iter().filter(|input| is_stdin(input)).count() > 1 {
-            return Err(Usage("standard input (-) can be read only once".into()).into());
-        }
+        stdin_once(inputs)?;
         if let ([_, _, ..], Some(folder)) = (inputs, inputs.iter().find(|input| input.is_dir())) {
             return Err(Usage(format!(
                 "{} is a folder, which is an animation by itself: give it alone, or give script files",
@@ -56,8 +58,10 @@ impl Input {
             .into());
         }
         let mut parts = Self::each(inputs, limits).collect::<anyhow::Result<Vec<_>>>()?;
-        let settings = parts.first_mut().and_then(|part| part.settings.take());
-        Ok(Self { scripts: parts.into_iter().flat_map(|part| part.scripts).collect(), settings })
+        if let [only] = &mut parts[..] {
+            return Ok(std::mem::take(only));
+        }
+        Ok(Self::of(parts.into_iter().flat_map(|part| part.scripts).collect()))
     }
 
     /// Every input by itself; an error in place of one that is a folder which cannot be listed or holds no script.
@@ -65,16 +69,28 @@ impl Input {
         inputs.iter().map(|input| Self::one(input, limits))
     }
 
+    fn of(scripts: Vec<ScriptFile>) -> Self {
+        Self { scripts, ..Self::default() }
+    }
+
     fn one(input: &Path, limits: &Limits) -> anyhow::Result<Self> {
         if is_stdin(input) {
-            let mut text = Vec::new();
-            read_limited(std::io::stdin().lock(), &mut text, limits).context("cannot read standard input")?;
+            let text = read_patiently(|| Ok(std::io::stdin().lock()), limits)
+                .context("cannot read standard input")?;
             let script = ScriptFile { name: "<stdin>".into(), place: Place::Read(text.into()) };
-            return Ok(Self { scripts: vec![script], settings: None });
+            return Ok(Self::of(vec![script]));
+        }
+        #[cfg(unix)]
+        if is_nameless_pipe(input) {
+            let name = input.display().to_string();
+            let path = input.to_path_buf();
+            let text =
+                read_patiently(|| File::open(path), limits).with_context(|| format!("cannot read {name}"))?;
+            return Ok(Self::of(vec![ScriptFile { name, place: Place::Read(text.into()) }]));
         }
         if !input.is_dir() {
             // One that is not there is found out when it is read, together with the faults of the others.
-            return Ok(Self { scripts: vec![ScriptFile::at(input.to_path_buf())], settings: None });
+            return Ok(Self::of(vec![ScriptFile::at(input.to_path_buf())]));
         }
         folder(input)
     }
@@ -102,7 +118,7 @@ impl ScriptFile {
             Place::Read(text) => Ok(Cow::Borrowed(text)),
             Place::File(path) => {
                 let mut text = Vec::new();
-                File::open(path)
+                rayfold_files::open(path)
                     .and_then(|file| read_limited(file, &mut text, limits))
                     .with_context(|| format!("cannot read {}", self.name))?;
                 Ok(Cow::Owned(text))
@@ -124,6 +140,36 @@ fn read_limited(from: impl Read, into: &mut Vec<u8>, limits: &Limits) -> std::io
     from.take(limits.max_script_bytes as u64 + 1).read_to_end(into).map(drop)
 }
 
+/// # Errors
+/// When standard input is named twice: the second reading would find nothing.
+pub(crate) fn stdin_once(inputs: &[PathBuf]) -> Result<(), Usage> {
+    match inputs.iter().filter(|input| is_stdin(input)).count() {
+        0 | 1 => Ok(()),
+        _ => Err(Usage("standard input (-) can be read only once".into())),
+    }
+}
+
+/// Reads what another program or a person writes, and comes back when a signal asks to stop.
+fn read_patiently<R: Read>(
+    open: impl FnOnce() -> std::io::Result<R> + Send + 'static,
+    limits: &Limits,
+) -> anyhow::Result<Vec<u8>> {
+    let limits = *limits;
+    let text = interrupt::wait_for(move || {
+        let mut text = Vec::new();
+        open().and_then(|from| read_limited(from, &mut text, &limits)).map(|()| text)
+    })?;
+    Ok(text?)
+}
+
+/// A pipe that a shell has made for this run, such as that of `<(generate)`: no folder holds it.
+#[cfg(unix)]
+fn is_nameless_pipe(input: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    let is_pipe = input.metadata().is_ok_and(|metadata| metadata.file_type().is_fifo());
+    is_pipe && (input.starts_with("/dev/fd") || input.canonicalize().is_err())
+}
+
 /// It is `-`, which is no file.
 pub(crate) fn is_stdin(input: &Path) -> bool {
     input.as_os_str() == "-"
@@ -132,32 +178,20 @@ pub(crate) fn is_stdin(input: &Path) -> bool {
 /// By its name, something in a folder is a script or the settings.
 pub(crate) fn is_part_of_animation(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    name == SETTINGS_FILE || name.ends_with(".txt")
+    matches!(Name::of(&name), Name::Script(_) | Name::Settings)
 }
 
 fn folder(path: &Path) -> anyhow::Result<Input> {
     let shown = path.display();
-    let cannot_list = || format!("cannot list the folder {shown}");
-    let mut scripts = Vec::new();
-    let mut settings = None;
-    let mut empty = true;
-    for entry in std::fs::read_dir(path).with_context(cannot_list)? {
-        let entry = entry.with_context(cannot_list)?;
-        empty = false;
-        let path = entry.path();
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if name == SETTINGS_FILE {
-            settings = Some(path);
-        } else if is_part_of_animation(&path) && !path.is_dir() {
-            scripts.push((name, ScriptFile::at(path)));
-        }
-    }
-    if empty {
+    let Folder { scripts, settings, not_read, is_empty } =
+        Folder::list(path).with_context(|| format!("cannot list the folder {shown}"))?;
+    if is_empty {
         anyhow::bail!("the folder {shown} is empty: expected scene scripts (*.txt)");
     }
     if scripts.is_empty() {
-        anyhow::bail!("the folder {shown} holds no scene scripts (*.txt)");
+        let near = not_read.first().map(|not| format!("; {}: {not}", not.path.display())).unwrap_or_default();
+        anyhow::bail!("the folder {shown} holds no scene scripts (*.txt){near}");
     }
-    scripts.sort_by(|(a, _), (b, _)| natural_cmp(script_name(a).unwrap_or(a), script_name(b).unwrap_or(b)));
-    Ok(Input { scripts: scripts.into_iter().map(|(_, script)| script).collect(), settings })
+    let scripts = scripts.into_iter().map(|(_, path)| ScriptFile::at(path)).collect();
+    Ok(Input { scripts, settings, not_read })
 }

@@ -1,16 +1,22 @@
-//! Stopping when told to (Ctrl-C, SIGTERM): the first time in order, the second time at once.
+//! Stopping on a signal (Ctrl-C, SIGTERM, SIGHUP): the first time in order, the second time at once.
 //!
 //! In order means that long work polls [`flag`] (or asks [`stopping`]), comes back early, and drops its temporary files
-//! on the way out. At once means that only the files [`protect`]ed at that moment are removed.
-//! SIGHUP keeps its default, so that `nohup` works.
+//! on the way out. At once means that only those files are removed. What the system may let us wait for without end (a
+//! terminal, a pipe) is done by [`wait_for`], which comes back at the first signal.
+//! Signals that were ignored when the program started stay ignored: `nohup`, and `&` in a script, ask for that.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 static STOPPING: AtomicBool = AtomicBool::new(false);
 static SIGNAL: AtomicI32 = AtomicI32::new(0);
-static TEMPORARY: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+static FOLDERS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Between two looks at whether a signal has come.
+const LOOK: Duration = Duration::from_millis(20);
 
 /// Starts listening. A write beyond a file size limit becomes an error instead of the program's death.
 ///
@@ -18,13 +24,17 @@ static TEMPORARY: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 /// When the system refuses a handler.
 #[cfg(unix)]
 pub(crate) fn listen() -> std::io::Result<()> {
-    use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
-    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGXFSZ])?;
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let wanted =
+        [SIGHUP, SIGINT, SIGTERM, SIGXFSZ].into_iter().filter(|signal| !is_ignored(*signal, &status));
+    let mut signals = signal_hook::iterator::Signals::new(wanted)?;
     std::thread::Builder::new().name("signals".into()).spawn(move || {
         for signal in signals.forever().filter(|signal| *signal != SIGXFSZ) {
             if SIGNAL.swap(signal, Ordering::SeqCst) != 0 {
-                for path in &*temporary() {
-                    let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
+                rayfold_files::remove_unfinished();
+                for folder in &*folders() {
+                    let _ = std::fs::remove_dir_all(folder);
                 }
                 std::process::exit(exit_code());
             }
@@ -40,12 +50,23 @@ pub(crate) fn listen() -> std::io::Result<()> {
     Ok(())
 }
 
+/// Says whether a signal was ignored at the start, by Linux's `/proc/self/status`: bits counted from 1, in hexadecimal.
+/// A system without that file gives SIGHUP its default, so that `nohup` works.
+#[cfg(unix)]
+fn is_ignored(signal: i32, status: &str) -> bool {
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    match mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()) {
+        Some(mask) => mask >> (signal - 1) & 1 == 1,
+        None => signal == signal_hook::consts::SIGHUP,
+    }
+}
+
 /// Has all work come back early: the run has failed.
 pub(crate) fn stop() {
     STOPPING.store(true, Ordering::SeqCst);
 }
 
-/// Lets work begin again after a failure that was told; not after a signal.
+/// Lets work begin again after a failure that was reported; not after a signal.
 pub(crate) fn go_on() {
     STOPPING.store(false, Ordering::SeqCst);
     if signalled() {
@@ -63,7 +84,7 @@ pub(crate) fn flag() -> &'static AtomicBool {
     &STOPPING
 }
 
-/// A signal told the run to stop.
+/// A signal asked the run to stop.
 pub(crate) fn signalled() -> bool {
     SIGNAL.load(Ordering::SeqCst) != 0
 }
@@ -73,22 +94,59 @@ pub(crate) fn exit_code() -> i32 {
     128 + SIGNAL.load(Ordering::SeqCst)
 }
 
-/// A file or a folder that must not outlive the run, until this guard is dropped.
+/// A folder that must not outlive the run, until this guard is dropped.
 #[derive(Debug)]
 pub(crate) struct Protected(PathBuf);
 
-/// Has a second signal remove `path`.
-pub(crate) fn protect(path: &Path) -> Protected {
-    temporary().push(path.to_path_buf());
-    Protected(path.to_path_buf())
+/// Has a second signal remove `folder`.
+pub(crate) fn protect(folder: &Path) -> Protected {
+    folders().push(folder.to_path_buf());
+    Protected(folder.to_path_buf())
+}
+
+fn folders() -> MutexGuard<'static, Vec<PathBuf>> {
+    FOLDERS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Drop for Protected {
     fn drop(&mut self) {
-        temporary().retain(|path| *path != self.0);
+        folders().retain(|folder| *folder != self.0);
     }
 }
 
-fn temporary() -> MutexGuard<'static, Vec<PathBuf>> {
-    TEMPORARY.lock().unwrap_or_else(PoisonError::into_inner)
+/// Does what may wait for somebody else on a thread of its own, which is left alone when a signal comes: nothing else ends
+/// the reading of a terminal.
+///
+/// # Errors
+/// When a signal came first, or the system refuses a thread.
+pub(crate) fn wait_for<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> anyhow::Result<T> {
+    let (sender, receiver) = mpsc::channel();
+    std::thread::Builder::new().name("waiting".into()).spawn(move || {
+        let _ = sender.send(work());
+    })?;
+    loop {
+        match receiver.recv_timeout(LOOK) {
+            Ok(done) => return Ok(done),
+            Err(RecvTimeoutError::Timeout) if !signalled() => {}
+            Err(_) => anyhow::bail!("interrupted"),
+        }
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ignored_signals_are_those_of_the_mask() {
+        let status = "Name:\trayfold\nSigBlk:\t0000000000000000\nSigIgn:\t0000000000001001\nSigCgt:\t0\n";
+        let ignored: Vec<i32> = (1..=64).filter(|signal| is_ignored(*signal, status)).collect();
+        assert_eq!(ignored, [1, 13]);
+        assert!(is_ignored(1, "") && !is_ignored(2, "") && !is_ignored(15, ""));
+    }
+
+    #[test]
+    fn work_that_is_done_is_handed_back() {
+        assert_eq!(wait_for(|| 7).unwrap(), 7);
+    }
 }

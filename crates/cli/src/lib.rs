@@ -23,7 +23,6 @@ mod interrupt;
 #[cfg(feature = "network")]
 mod network;
 mod outcome;
-mod output;
 mod plan;
 mod playback;
 mod progress;

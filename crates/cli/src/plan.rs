@@ -7,7 +7,9 @@ use std::ops::RangeInclusive;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use rayfold_scene::{AnimationSettings, Depth, Limits, SETTINGS_FILE, Samples, Scene, Screen, Script};
+use rayfold_scene::{
+    AnimationSettings, Depth, Limits, SETTINGS_FILE, Samples, Scene, Screen, Script, Severity,
+};
 use rayfold_tracer::{CutLight, Exposure, Precision, RenderOptions};
 
 use crate::console::Console;
@@ -138,6 +140,9 @@ impl Plan {
             (faults, part)
         })?;
         let mut faults = Faults::default();
+        for not_read in &input.not_read {
+            faults.conflict(&not_read.path, Severity::Warning, not_read);
+        }
         let settings = input.settings.as_ref().map(|path| faults.settings(path));
         let mut parts = Vec::with_capacity(parsed.len());
         for (found, part) in parsed {
@@ -185,6 +190,11 @@ impl Plan {
     /// How many frames are to be drawn.
     pub(crate) fn len(&self) -> u64 {
         self.selected.end() + 1 - self.selected.start()
+    }
+
+    /// How many frames there are, drawn or not.
+    pub(crate) fn total(&self) -> u64 {
+        self.parts.iter().map(|part| part.frames as u64).sum()
     }
 
     /// # Errors

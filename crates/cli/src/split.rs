@@ -4,13 +4,13 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use rayfold_scene::{Limits, SETTINGS_FILE};
+use rayfold_files::OutputFile;
+use rayfold_scene::{Limits, Name};
 
 use crate::console::Console;
 use crate::input::Input;
 use crate::interrupt;
 use crate::outcome::Outcome;
-use crate::output::OutputFile;
 use crate::survey::Faults;
 use crate::values;
 use crate::wording::number;
@@ -76,7 +76,8 @@ fn refuse_strangers(folder: &Path, ours: &BTreeSet<String>) -> anyhow::Result<()
         std::fs::read_dir(folder).with_context(|| format!("cannot list the folder {}", folder.display()))?;
     for entry in entries {
         let name = entry?.file_name().to_string_lossy().into_owned();
-        if (name.ends_with(".txt") || name == SETTINGS_FILE) && !ours.contains(&name) {
+        let is_part = matches!(Name::of(&name), Name::Script(_) | Name::Settings);
+        if is_part && !ours.contains(&name) {
             anyhow::bail!(
                 "{} already holds {name}, which would be part of the same animation: expected a folder without scripts",
                 folder.display()

@@ -48,6 +48,9 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     args.threads.start()?;
     let project = Project::open(&args.path)?;
+    for not_read in &project.not_read {
+        console.warn(format_args!("{}: {not_read}", not_read.path.display()));
+    }
     let page = Page::get(&mut |line| console.note(line))?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)

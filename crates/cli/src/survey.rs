@@ -1,6 +1,7 @@
 //! Looking at all scripts before anything is done with any of them, so that all faults are told in one go.
 
 use std::fmt::Display;
+use std::io::Read;
 use std::path::Path;
 
 use anyhow::Context;
@@ -20,7 +21,7 @@ pub(crate) struct Faults {
     pub(crate) diagnostics: Vec<Diagnostic>,
     /// Files that could not be read.
     pub(crate) unreadable: Vec<anyhow::Error>,
-    /// Why scripts that are fine by themselves are no animation together.
+    /// Why scripts that are fine by themselves are no animation together, and files that are not read.
     pub(crate) conflicts: Vec<Conflict>,
     /// How many files have an error.
     pub(crate) bad: usize,
@@ -28,7 +29,7 @@ pub(crate) struct Faults {
     pub(crate) files: usize,
 }
 
-/// Why scripts are no animation together.
+/// Why scripts are no animation together, or a file is not read.
 #[derive(Debug, Serialize)]
 pub(crate) struct Conflict {
     /// As the user named them.
@@ -70,9 +71,11 @@ impl Faults {
     /// Reads a folder's settings and notes what is wrong with them; they are `None` when they are of no use.
     pub(crate) fn settings(&mut self, path: &Path) -> Option<AnimationSettings> {
         let name = path.display().to_string();
-        let parsed = std::fs::read(path)
+        let mut text = Vec::new();
+        let parsed = rayfold_files::open(path)
+            .and_then(|mut file| file.read_to_end(&mut text))
             .with_context(|| format!("cannot read {name}"))
-            .map(|text| parse_settings(&name, &text))
+            .map(|_| parse_settings(&name, &text))
             .map(|parsed| (parsed.settings, parsed.diagnostics));
         self.sort_out(parsed)
     }

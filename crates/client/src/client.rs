@@ -1,6 +1,6 @@
 //! Who uses a bucket, and what every use needs of it. The uses are one module each.
 
-use rayfold_pipeline::keys::Animation;
+use rayfold_pipeline::keys::{Animation, Uploaded};
 use rayfold_pipeline::store::{ListRequest, Listing, Store};
 use rayfold_pipeline::{Clock, found};
 
@@ -41,8 +41,9 @@ impl<'a, S: Store, C: Clock> Client<'a, S, C> {
         // A GET, whose refusal says more than that of a HEAD.
         let has_manifest = found(self.store.get_range(&animation.manifest(), 0..1).await)?.is_some();
         if !has_manifest {
-            let page = self.store.list(ListRequest::level(animation.scripts())).await?;
-            if page.objects.is_empty() {
+            let page = self.list(ListRequest::level(animation.scripts())).await?;
+            let mut objects = page.objects.iter();
+            if !objects.any(|object| Uploaded::of(&object.key, object.size).animation().is_some()) {
                 return Err(Error::NoAnimation(animation.clone()));
             }
         }

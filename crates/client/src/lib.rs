@@ -38,7 +38,7 @@ pub use error::{Error, Result};
 pub use fetch::{FetchedFrame, FrameKey, Frames, Output, frames};
 pub use file::{Content, File};
 pub use remove::{Contents, Removing};
-pub use status::{Obstacle, frame_name, obstacles};
+pub use status::{Misplaced, Obstacle, Overview, frame_name, obstacles};
 pub use submit::{Preview, Sending, Submission, Submitted, settings_with_frames};
 pub use watch::{Ended, Waiting, Watch};
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use rayfold_pipeline::Clock;
-use rayfold_pipeline::keys::{Animation, Key};
+use rayfold_pipeline::keys::{Animation, Key, Uploaded, goes_with};
 use rayfold_pipeline::manifest::Status;
 use rayfold_pipeline::store::{ListRequest, Store};
 
@@ -27,7 +27,7 @@ pub enum Removing {
 /// What the bucket holds of an animation, by key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Contents {
-    /// The folder's scripts and settings.
+    /// The folder's scripts and settings, also those that are misnamed, and what systems have left beside them.
     pub scripts: Vec<String>,
     /// What was made of them: frames, the GIF, the manifest.
     pub made: Vec<String>,
@@ -39,7 +39,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
     /// # Errors
     /// [`Error::NoAnimation`], and those of the store.
     pub async fn contents(&self, animation: &Animation) -> Result<Contents> {
-        let scripts = self.keys_of(animation, &[animation.scripts()]).await?;
+        let scripts = self.uploaded_of(animation).await?;
         // Listed before anything goes: whoever may not see all of an animation removes nothing of it.
         let made = self.made_of(animation).await?;
         if scripts.is_empty() && made.is_empty() {
@@ -72,6 +72,16 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
             self.delete(&rest, |done| told(Removing::Deleted(removed + done))).await?;
             removed += rest.len() as u64;
         }
+    }
+
+    /// The scripts and settings, also those that are misnamed, and what systems have left beside them.
+    async fn uploaded_of(&self, animation: &Animation) -> Result<Vec<String>> {
+        let listed = self.list(ListRequest::all(animation.scripts())).await?.objects;
+        let all = listed.iter().filter_map(|object| Uploaded::of(&object.key, object.size).animation());
+        let mut others: Vec<Animation> = all.filter(|other| other != animation).collect();
+        others.dedup();
+        let ours = listed.into_iter().filter(|object| goes_with(animation, &object.key, &others));
+        Ok(ours.map(|object| object.key).collect())
     }
 
     /// Everything but the scripts.
@@ -140,6 +150,40 @@ mod tests {
         assert_eq!(last, Some(Removing::Deleted(removed)));
         assert!(removed as usize >= before - others.len() && told.contains(&Removing::WaitingForFunctions));
         assert!(matches!(client.remove(&film, |_| {}).await, Err(Error::NoAnimation(name)) if name == film));
+    }
+
+    #[tokio::test]
+    async fn what_systems_have_left_beside_the_scripts_goes_with_them() {
+        let world = filled().await;
+        for name in [
+            "",
+            "._1.txt",
+            ".ipynb_checkpoints/1.txt",
+            "__MACOSX/._1.txt",
+            "Thumbs.db",
+            "3.TXT",
+            "sub/.DS_Store",
+        ] {
+            world.put(&format!("scripts/film/{name}"), "").await;
+        }
+        let others = [
+            "scripts/film/notes.md",
+            "scripts/film/two/",
+            "scripts/film/two/._1.txt",
+            "scripts/films/._1.txt",
+        ];
+        for key in others {
+            world.put(key, "").await;
+        }
+        world.client().remove(&world.film(), |_| {}).await.unwrap();
+        let mut left = others.map(String::from).to_vec();
+        left.extend(["scripts/film/two/1.txt", "scripts/films/1.txt"].map(String::from));
+        left.sort();
+        assert_eq!(world.keys("scripts/").await, left);
+        // Of an animation of which nothing but a marker is there, too.
+        world.put("scripts/marked/", "").await;
+        let marked = Animation::new("marked").unwrap();
+        assert_eq!(world.client().remove(&marked, |_| {}).await.unwrap(), 1);
     }
 
     #[tokio::test]

@@ -1,15 +1,38 @@
 //! Where the animations of a bucket stand.
 
+use std::collections::BTreeSet;
+
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 use rayfold_pipeline::Clock;
-use rayfold_pipeline::keys::{Animation, Key, MANIFESTS, SCRIPTS};
+use rayfold_pipeline::keys::{Animation, Key, MANIFESTS, SCRIPTS, Uploaded, misplaced as misplaced_because};
 use rayfold_pipeline::manifest::{Frame, FrameState, Manifest, Reason};
-use rayfold_pipeline::store::{ListRequest, Store};
+use rayfold_pipeline::store::{ListRequest, Listed, Listing, Store};
 use rayfold_scene::SETTINGS_FILE;
 
 use crate::client::{Client, SIDE_BY_SIDE};
 use crate::error::{Error, Result};
 use crate::watch::Watch;
+
+/// How many slashes before `scripts/` are looked behind.
+const MOST_SLASHES: usize = 4;
+
+/// What a bucket holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Overview {
+    /// The animations by name: those that have a manifest, and folders of scripts that have none yet.
+    pub animations: Vec<Animation>,
+    /// What is meant as a part of an animation and belongs to none.
+    pub misplaced: Vec<Misplaced>,
+}
+
+/// An object of which nothing is drawn because of its place.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Misplaced {
+    /// Its key.
+    pub key: String,
+    /// What would be right.
+    pub problem: &'static str,
+}
 
 /// Something that keeps an animation from being done.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,31 +73,64 @@ pub fn frame_name(frame: &Frame) -> String {
 }
 
 impl<'a, S: Store, C: Clock> Client<'a, S, C> {
-    /// The animations of the bucket by name: those that have a manifest, and folders of scripts that have none yet.
+    /// The animations of the bucket, and what belongs to none of them.
+    ///
+    /// # Errors
+    /// Those of the store.
+    pub async fn overview(&self) -> Result<Overview> {
+        let manifests = self.list(ListRequest::all(MANIFESTS)).await?.objects;
+        let of_manifests = manifests.iter().filter_map(|object| match object.key.parse() {
+            Ok(Key::Manifest { animation }) => Some(animation),
+            _ => None,
+        });
+        let mut animations: BTreeSet<Animation> = of_manifests.collect();
+        let mut misplaced = Vec::new();
+        let mut objects = self.list(ListRequest::all(SCRIPTS)).await?.objects;
+        objects.extend(self.beside_scripts().await?);
+        for Listed { key, size, .. } in objects {
+            match misplaced_because(&key, size) {
+                Some(problem) => misplaced.push(Misplaced { key, problem }),
+                None => animations.extend(Uploaded::of(&key, size).animation()),
+            }
+        }
+        Ok(Overview { animations: animations.into_iter().collect(), misplaced })
+    }
+
+    /// Objects below folders that are called almost like that of the scripts.
+    async fn beside_scripts(&self) -> Result<Vec<Listed>> {
+        let mut found = Vec::new();
+        let mut levels = vec![String::new()];
+        while let Some(level) = levels.pop() {
+            // Some may list no more of a bucket than its scripts and manifests.
+            let Some(listed) = self.list_if_allowed(ListRequest::level(level)).await? else { continue };
+            found.extend(listed.objects.into_iter().filter(|object| object.key.contains('\\')));
+            for folder in listed.prefixes.into_iter().filter(|folder| folder != SCRIPTS) {
+                let name = folder.trim_matches('/');
+                if name.is_empty() && folder.len() < MOST_SLASHES {
+                    levels.push(folder);
+                } else if name.eq_ignore_ascii_case(SCRIPTS.trim_matches('/')) {
+                    let below = self.list_if_allowed(ListRequest::all(folder)).await?;
+                    found.extend(below.into_iter().flat_map(|below| below.objects));
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    async fn list_if_allowed(&self, request: ListRequest) -> Result<Option<Listing>> {
+        match self.list(request).await {
+            Ok(listing) => Ok(Some(listing)),
+            Err(Error::Store(rayfold_pipeline::Error::Refused { .. })) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The animations of the bucket by name.
     ///
     /// # Errors
     /// Those of the store.
     pub async fn animations(&self) -> Result<Vec<Animation>> {
-        let manifests = self.list(ListRequest::all(MANIFESTS)).await?.objects;
-        let mut names: Vec<Animation> = manifests
-            .iter()
-            .filter_map(|object| match object.key.parse() {
-                Ok(Key::Manifest { animation }) => Some(animation),
-                _ => None,
-            })
-            .collect();
-        for folder in self.list(ListRequest::level(SCRIPTS)).await?.prefixes {
-            let name = folder.trim_start_matches(SCRIPTS).trim_end_matches('/');
-            let is_below =
-                |known: &Animation| known.as_str() == name || known.as_str().starts_with(&format!("{name}/"));
-            if !names.iter().any(is_below)
-                && let Ok(name) = Animation::new(name)
-            {
-                names.push(name);
-            }
-        }
-        names.sort();
-        Ok(names)
+        Ok(self.overview().await?.animations)
     }
 
     /// A first look at each of these animations, in their order, and whether it is behind their scripts.
@@ -130,6 +186,49 @@ mod tests {
         }
         assert_eq!(world.keys("manifests/film.json~").await.len(), 3);
         assert_eq!(world.client().animations().await.unwrap(), [world.film()]);
+    }
+
+    /// A folder's marker was an animation, for ever new.
+    #[tokio::test]
+    async fn what_systems_leave_makes_no_animation_and_what_is_misplaced_is_named() {
+        let world = World::new();
+        for key in [
+            "scripts/film/1.txt",
+            "scripts/near/3.TXT",
+            "scripts/notes/readme.md",
+            "scripts/hidden/._1.txt",
+            "scripts/__MACOSX/film/._1.txt",
+            "scripts/.git/1.txt",
+        ] {
+            world.put(key, "frame").await;
+        }
+        world.put("scripts/marked/", "").await;
+        let misplaced = [
+            "scripts/1.txt",
+            "scripts//h/1.txt",
+            "scripts/a\\b/1.txt",
+            "Scripts/film/1.txt",
+            "/scripts/film/1.txt",
+            "//scripts/film/1.TXT",
+            "scripts\\film\\1.txt",
+        ];
+        for key in misplaced {
+            world.put(key, "frame").await;
+        }
+        let overview = world.client().overview().await.unwrap();
+        let names: Vec<&str> = overview.animations.iter().map(Animation::as_str).collect();
+        assert_eq!(names, ["film", "near"]);
+        let mut found: Vec<&str> =
+            overview.misplaced.iter().map(|misplaced| misplaced.key.as_str()).collect();
+        found.sort_unstable();
+        let mut misplaced = misplaced;
+        misplaced.sort_unstable();
+        assert_eq!(found, misplaced);
+        let no = |name| Animation::new(name).unwrap();
+        for name in ["marked", "hidden", "notes"] {
+            let error = world.client().must_exist(&no(name)).await.unwrap_err();
+            assert!(matches!(error, Error::NoAnimation(_)), "{name}");
+        }
     }
 
     /// "Done, GIF current" stood there while the functions could not read what had been uploaded.

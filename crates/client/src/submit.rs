@@ -193,7 +193,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         let listing = self.list(ListRequest::level(animation.scripts())).await?;
         let there: BTreeMap<String, Listed> =
             listing.objects.into_iter().map(|object| (object.key.clone(), object)).collect();
-        let is_ours = |key: &&String| key.ends_with(".txt") || **key == animation.settings();
+        let is_ours = |key: &&String| matches!(key.parse(), Ok(Key::Script { .. } | Key::Settings { .. }));
         let surplus = there.keys().filter(is_ours).filter(|key| !files.contains_key(*key)).cloned();
         let mut difference = Difference { surplus: surplus.collect(), ..Difference::default() };
         let looks = files.iter().map(|(key, file)| {

@@ -269,7 +269,8 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         let now: BTreeMap<_, _> =
             listing.objects.into_iter().map(|object| (object.key, object.etag)).collect();
         let gone = versions.iter().find(|(key, version)| now.get(*key) != Some(*version));
-        let new = now.keys().find(|key| key.ends_with(".txt") && !versions.contains_key(*key));
+        let is_script = |key: &str| matches!(key.parse(), Ok(Key::Script { .. }));
+        let new = now.keys().find(|key| is_script(key) && !versions.contains_key(*key));
         match gone.map(|(key, _)| key).or(new) {
             Some(key) => Err(Error::ChangedMeanwhile { key: key.clone() }),
             None => Ok(()),

@@ -1,6 +1,7 @@
 //! The render function: an event a frame.
 
 use rayfold_pipeline::Error;
+use rayfold_pipeline::keys::{SCRIPTS, Uploaded};
 use rayfold_pipeline::render::{Outcome as Came, Rendered, render_frame};
 use rayfold_pipeline::store::Store;
 use serde_json::Value;
@@ -32,9 +33,17 @@ pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value)
 
 /// Works on one event.
 async fn record<S: Store>(context: &Context<S>, call: &Call, key: String) -> Result<String, Error> {
+    if key.starts_with(SCRIPTS) && Uploaded::of(&key, 0) == Uploaded::Nothing {
+        return Ok("nothing that is read".into());
+    }
     let rendered = render_frame(&context.invocation(&context.policy, call), &context.renderer, &key).await?;
     let what = described(&rendered.outcome);
-    log(call, &rendered, &what);
+    match rendered.outcome {
+        Came::NearMiss(problem) => {
+            tracing::warn!(request_id = %call.request_id, animation = %rendered.animation, key, problem, "not read");
+        }
+        _ => log(call, &rendered, &what),
+    }
     Ok(what)
 }
 
@@ -42,6 +51,7 @@ fn described(outcome: &Came) -> String {
     match outcome {
         Came::Gone => "gone".into(),
         Came::Settings => "settings".into(),
+        Came::NearMiss(_) => "not read".into(),
         Came::Superseded => "superseded".into(),
         Came::Present => "present".into(),
         Came::Drawn => "drawn".into(),

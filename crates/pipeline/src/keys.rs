@@ -15,7 +15,7 @@ use std::fmt;
 use std::num::NonZeroU64;
 use std::str::FromStr;
 
-use rayfold_scene::SETTINGS_FILE;
+use rayfold_scene::{Name, SETTINGS_FILE};
 use serde::{Deserialize, Serialize};
 
 use crate::store::ETag;
@@ -23,9 +23,11 @@ use crate::{Error, Result};
 
 mod band;
 mod event;
+mod names;
 
 pub use band::Band;
 pub use event::decode_event_key;
+pub use names::{Uploaded, goes_with, misplaced};
 
 /// The longest key below `scripts/`, in bytes: S3 allows 1,024, and a receipt's key adds a tag to the script's.
 pub const LONGEST_SCRIPT_KEY: usize = 900;
@@ -483,27 +485,24 @@ impl FromStr for Receipt {
 }
 
 fn script(text: &str, rest: &str) -> Result<Key> {
-    let Some((animation, file)) = rest.rsplit_once('/') else {
-        return Err(Error::key(
-            text,
-            "a script lies in a folder, which is the animation: scripts/<animation>/<name>.txt",
-        ));
+    let class = match Name::below_scripts(rest, 0) {
+        class @ (Name::Script(_) | Name::Settings) => class,
+        Name::NearMiss(problem) | Name::Misplaced(problem) => return Err(Error::key(text, problem)),
+        Name::Ignored => return Err(Error::key(text, "what systems leave in folders is ignored")),
+        Name::Other => return Err(Error::key(text, "neither a script (.txt) nor animation.json")),
     };
     if text.len() > LONGEST_SCRIPT_KEY {
         return Err(Error::key(text, "the key is longer than 900 bytes"));
     }
-    let animation = Animation::new(animation).map_err(|error| match error {
+    let animation = Animation::new(rest.rsplit_once('/').map_or("", |(animation, _)| animation));
+    let animation = animation.map_err(|error| match error {
         Error::Key { problem, .. } => Error::key(text, problem),
         other => other,
     })?;
-    if file == SETTINGS_FILE {
-        return Ok(Key::Settings { animation });
-    }
-    match file.strip_suffix(".txt") {
-        Some("") => Err(Error::key(text, "the script has no name before its ending")),
-        Some(name) => Ok(Key::Script { animation, name: ScriptName(name.to_owned()) }),
-        None => Err(Error::key(text, "neither a script (.txt) nor animation.json")),
-    }
+    Ok(match class {
+        Name::Script(name) => Key::Script { animation, name: ScriptName(name.to_owned()) },
+        _ => Key::Settings { animation },
+    })
 }
 
 /// `<animation>/<name>@<tag>/<file>`, cut at the slashes.

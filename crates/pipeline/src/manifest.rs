@@ -69,6 +69,9 @@ pub struct Head {
     /// Files that are meant as scripts but have a key that the pipeline cannot take.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rejected: Vec<Rejected>,
+    /// Files that are not read because they are not called as scripts and settings are.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<Rejected>,
     /// Why this generation gives no GIF though all its frames are there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refusal: Option<Fault>,
@@ -178,7 +181,7 @@ pub struct Reason {
     pub omitted: usize,
 }
 
-/// A file that is meant as a script but cannot be one.
+/// A file that is meant as a script but cannot be one, or is not called as one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rejected {
     /// Its key.
@@ -247,6 +250,7 @@ impl Manifest {
             && a.generation == b.generation
             && a.settings == b.settings
             && a.rejected == b.rejected
+            && a.warnings == b.warnings
             && a.excess == b.excess
             && receipt(&a.refusal) == receipt(&b.refusal)
             && self.frames.len() == other.frames.len()

@@ -8,7 +8,7 @@ use futures_util::future::try_join;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 
 use crate::invocation::{Invocation, Known};
-use crate::keys::{Animation, Key, Part, Receipt, ScriptName, Tag};
+use crate::keys::{Animation, Key, Part, Receipt, ScriptName, Tag, Uploaded};
 use crate::manifest::{Fault, FrameState, MOST_SETTINGS_BYTES, Manifest, Reason, Rejected, Settings};
 use crate::reconcile::{MARK_EVERY, ReceiptFound, Results, ScriptFound, Scripts, reconcile};
 use crate::store::{ETag, ListRequest, Listed, Listing, Object, Store};
@@ -76,21 +76,25 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         marks: &[ScriptName],
     ) -> Result<(Scripts, Option<ETag>)> {
         let bounds = marks.iter().map(|name| animation.script(name)).collect();
-        let (mut scripts, mut rejected) = (Scripts::default(), Vec::new());
+        let (mut scripts, mut rejected, mut warnings) = (Scripts::default(), Vec::new(), Vec::new());
         let mut settings = None;
         for listed in self.list_level(animation.scripts(), bounds).await? {
-            match listed.key.parse() {
-                Ok(Key::Script { name, .. }) => {
+            match Uploaded::of(&listed.key, listed.size) {
+                Uploaded::Script(_, name) => {
                     scripts.found.push(ScriptFound { name, version: listed.etag, modified: listed.modified });
                 }
-                Ok(Key::Settings { .. }) => settings = Some(listed.etag),
-                Err(Error::Key { key, problem }) if key.ends_with(".txt") => {
-                    rejected.push(Rejected { key, problem: problem.to_owned() });
+                Uploaded::Settings(_) => settings = Some(listed.etag),
+                Uploaded::Rejected(_, problem) => {
+                    rejected.push(Rejected { key: listed.key, problem: problem.to_owned() });
                 }
-                _ => {}
+                Uploaded::NearMiss(_, problem) => {
+                    warnings.push(Rejected { key: listed.key, problem: problem.to_owned() });
+                }
+                Uploaded::Misplaced(_) | Uploaded::Nothing => {}
             }
         }
-        scripts.rejected = bounded(rejected, animation.scripts());
+        scripts.rejected = bounded(rejected, animation.scripts(), "that no script can have");
+        scripts.warnings = bounded(warnings, animation.scripts(), "of files that are not read");
         Ok((scripts, settings))
     }
 
@@ -275,13 +279,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
 }
 
 /// The first ones, and of the others how many there are.
-fn bounded(mut rejected: Vec<Rejected>, folder: String) -> Vec<Rejected> {
+fn bounded(mut rejected: Vec<Rejected>, folder: String, which: &str) -> Vec<Rejected> {
     let more = rejected.len().saturating_sub(MOST_REJECTED);
     rejected.truncate(MOST_REJECTED);
     if more > 0 {
         let keys = if more == 1 { "key" } else { "keys" };
-        rejected
-            .push(Rejected { key: folder, problem: format!("{more} more {keys} that no script can have") });
+        rejected.push(Rejected { key: folder, problem: format!("{more} more {keys} {which}") });
     }
     rejected
 }

@@ -26,6 +26,8 @@ pub struct Scripts {
     pub found: Vec<ScriptFound>,
     /// What is meant as a script but cannot be one.
     pub rejected: Vec<Rejected>,
+    /// What is not read because of its name.
+    pub warnings: Vec<Rejected>,
 }
 
 /// A script in a listing.
@@ -142,6 +144,7 @@ pub fn reconcile(
         failed,
         settings: settings.clone(),
         rejected: scripts.rejected.clone(),
+        warnings: scripts.warnings.clone(),
         refusal: refusal.filter(|_| status == Status::Refused),
         excess: None,
         removed_at: None,

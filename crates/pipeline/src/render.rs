@@ -17,7 +17,7 @@ use futures_util::stream::{self, StreamExt, TryStreamExt};
 
 use crate::fold::{Age, Folded};
 use crate::invocation::{Glimpse, Invocation};
-use crate::keys::{Animation, Band, Key, Part, Receipt, ScriptName, Tag};
+use crate::keys::{Animation, Band, Key, Part, Receipt, ScriptName, Tag, Uploaded};
 use crate::manifest::{Fact, Reason};
 use crate::observe::{Standing, standing};
 use crate::store::{ETag, ListRequest, Object, Store};
@@ -97,7 +97,7 @@ pub enum Drawing {
 pub struct Rendered {
     /// The animation.
     pub animation: Animation,
-    /// The script; `None` for an event of `animation.json`.
+    /// The script; `None` for an event of `animation.json` or of a file that is not read.
     pub script: Option<ScriptName>,
     /// What came of it.
     pub outcome: Outcome,
@@ -114,6 +114,8 @@ pub enum Outcome {
     Gone,
     /// The event was about settings.
     Settings,
+    /// The event was about a file that is not read, because of what is wrong with its name.
+    NearMiss(&'static str),
     /// A part of a version that is no longer current: another event draws the current one.
     Superseded,
     /// The result was there already.
@@ -156,6 +158,9 @@ pub async fn render_frame<S: Store, C: Clock, R: Renderer>(
     renderer: &R,
     key: &str,
 ) -> Result<Rendered> {
+    if let Uploaded::NearMiss(animation, problem) = Uploaded::of(key, 0) {
+        return invocation.follow_near_miss(animation, problem).await;
+    }
     match key.parse()? {
         Key::Settings { animation } => invocation.follow_settings(animation).await,
         other => match Subject::of(other) {
@@ -246,6 +251,7 @@ impl Outcome {
             Outcome::Drawn | Outcome::Split(_) | Outcome::Faulty(_) => Age::New,
             Outcome::Gone
             | Outcome::Settings
+            | Outcome::NearMiss(_)
             | Outcome::Superseded
             | Outcome::Present
             | Outcome::Cut(_)
@@ -264,6 +270,14 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let stages =
             Stages { read: read.since(start), fold: self.clock.now().since(read), ..Stages::default() };
         Ok(Rendered { animation, script: None, outcome: Outcome::Settings, folded, stages })
+    }
+
+    /// Folds, so that the manifest warns of the file at once, or no longer does.
+    async fn follow_near_miss(&self, animation: Animation, problem: &'static str) -> Result<Rendered> {
+        let start = self.clock.now();
+        let folded = self.fold(&animation, &Fact::Fold, Age::Old).await?;
+        let stages = Stages { fold: self.clock.now().since(start), ..Stages::default() };
+        Ok(Rendered { animation, script: None, outcome: Outcome::NearMiss(problem), folded, stages })
     }
 
     async fn render<R: Renderer>(&self, renderer: &R, subject: Subject) -> Result<Rendered> {

@@ -13,13 +13,13 @@ use futures_util::stream::{self, StreamExt, TryStreamExt};
 
 use crate::assemble::{Due, due, new_gif};
 use crate::invocation::{Invocation, Known};
-use crate::keys::{Animation, Key, MANIFESTS, Part, Receipt, SCRIPTS, ScriptName, Tag};
+use crate::keys::{Animation, Key, MANIFESTS, Part, Receipt, SCRIPTS, ScriptName, Tag, Uploaded};
 use crate::manifest::{Fault, Frame, FrameState, Manifest, Reason, Status};
 use crate::observe::Observation;
 use crate::reconcile::ReceiptFound;
 use crate::store::{ETag, ListRequest, Store};
 use crate::wakings::Wakings;
-use crate::{Clock, Error, Result, Timestamp};
+use crate::{Clock, Result, Timestamp};
 
 /// How many animations are visited side by side.
 const VISITS: usize = 8;
@@ -81,25 +81,20 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let mut set_aside = Vec::new();
         for prefix in [SCRIPTS, MANIFESTS] {
             for listed in self.list_ranges(ListRequest::all(prefix), Vec::new()).await? {
-                match listed.key.parse::<Key>() {
-                    Ok(
-                        Key::Script { animation, .. }
-                        | Key::Settings { animation }
-                        | Key::Manifest { animation },
-                    ) => {
+                match listed.key.parse() {
+                    Ok(Key::Manifest { animation }) => {
                         animations.insert(animation);
+                        continue;
                     }
-                    Ok(Key::SetAside { .. }) if self.is_old(listed.modified) => set_aside.push(listed.key),
-                    Err(Error::Key { problem, .. }) if listed.key.ends_with(".txt") => {
-                        match listed.key[prefix.len()..]
-                            .rsplit_once('/')
-                            .map(|(above, _)| Animation::new(above))
-                        {
-                            Some(Ok(animation)) => drop(animations.insert(animation)),
-                            _ => swept.rejected.push((listed.key, problem)),
-                        }
+                    Ok(Key::SetAside { .. }) if self.is_old(listed.modified) => {
+                        set_aside.push(listed.key);
+                        continue;
                     }
                     _ => {}
+                }
+                match Uploaded::of(&listed.key, listed.size) {
+                    Uploaded::Misplaced(problem) => swept.rejected.push((listed.key, problem)),
+                    uploaded => animations.extend(uploaded.animation()),
                 }
             }
         }
@@ -143,7 +138,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let is_right = stands.map(|known| &known.manifest.head).is_some_and(|head| {
             due(head, gif.as_ref()) == Due::Nothing && new_gif(head, gif.as_ref()).is_none()
         });
-        let nothing_at_all = known.is_none() && head.status == Status::Empty && gif.is_none();
+        let is_empty = head.status == Status::Empty && head.warnings.is_empty();
+        let nothing_at_all = known.is_none() && is_empty && gif.is_none();
         if (!is_right || is_healed || visit.given_up > 0) && !nothing_at_all {
             self.claim(&claimable(&observation.manifest, known.as_ref())).await?;
             visit.claimed = true;

@@ -20,6 +20,7 @@ mod form;
 mod language;
 mod limits;
 pub mod model;
+mod name;
 mod natural;
 mod parse;
 mod report;
@@ -40,7 +41,8 @@ pub use model::{
     Glass, Instance, InvalidValue, Lamp, Lens, Light, Look, Material, Object, Parameter, Pattern, Pinhole,
     Placement, Plane, Samples, Scene, Screen, Shine, Shutter, Sphere, Tone, Torus, Triangle, Weight,
 };
-pub use natural::{SETTINGS_FILE, natural_cmp, script_name};
+pub use name::{Name, SETTINGS_FILE, script_name};
+pub use natural::natural_cmp;
 pub use parse::{Parsed, parse, parse_curve};
 pub use script::{Script, ShotSummary};
 pub use settings::{AnimationSettings, ParsedSettings, parse_settings};

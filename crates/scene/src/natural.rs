@@ -1,20 +1,6 @@
-//! Which files of a folder are its scripts, and their order: the one in which people number files.
+//! The order of scripts: the one in which people number files.
 
 use std::cmp::Ordering;
-
-/// The file beside a folder's scripts that says how to show them.
-pub const SETTINGS_FILE: &str = "animation.json";
-
-/// The name of the script that a file of a folder is: the file's name without `.txt`. `None` for files that are no
-/// scripts. Names, not files' names, are what [`natural_cmp`] orders: `f` comes before `f-1`, though `f.txt` would not.
-///
-/// ```
-/// assert_eq!(rayfold_scene::script_name("frame07.txt"), Some("frame07"));
-/// assert_eq!(rayfold_scene::script_name("notes.md"), None);
-/// ```
-pub fn script_name(file: &str) -> Option<&str> {
-    file.strip_suffix(".txt").filter(|name| !name.is_empty())
-}
 
 /// Compares names so that `f2` comes before `f10`: digits in a row count as one number, of any length, and everything
 /// else by its bytes.
@@ -87,14 +73,6 @@ mod tests {
     #[test]
     fn a_name_comes_before_its_extensions() {
         check(&["", "f", "f.txt", "f1", "fa", "ä"]);
-    }
-
-    #[test]
-    fn scripts_are_ordered_without_their_ending() {
-        let name = |file| script_name(file).unwrap();
-        assert!(natural_cmp(name("f.txt"), name("f-1.txt")).is_lt());
-        assert!(natural_cmp(name("f.txt"), name("f 1.txt")).is_lt());
-        assert_eq!([".txt", "f.TXT", "f.txt~", SETTINGS_FILE].map(script_name), [None; 4]);
     }
 
     proptest! {

@@ -16,13 +16,8 @@ pub enum Error {
         source: io::Error,
     },
     /// A file cannot be written.
-    #[error("cannot write {}", path.display())]
-    Write {
-        /// Which.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    Write(#[from] rayfold_files::Error),
     /// A folder without a script.
     #[error("the folder {} holds no scene scripts (*.txt)", path.display())]
     NoScripts {

@@ -4,24 +4,23 @@
 //! what somebody else wrote meanwhile: then it is in [`Saved::Conflict`] until it is said whose text stays.
 
 use std::cell::{OnceCell, RefCell};
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use rayfold_files::{Folder, NotRead, OutputFile};
 use rayfold_scene::{AnimationSettings, Diagnostic, Limits, Script, natural_cmp, parse, script_name};
 use serde::Serialize;
 
 use crate::document::{Document, Splice};
 use crate::error::{Error, words};
-use crate::files::{TEXT, read, write_new, write_whole};
+use crate::files::{TEXT, read};
 use crate::frame::Frame;
 use crate::line::Line;
 use crate::settings::Settings;
 use crate::tracks::{Tracks, tracks};
 
-/// Bytes of a new script's name; file systems take 255, and hidden names beside it are longer.
+/// Bytes of a new script's name; file systems take 255, and a receipt in a bucket adds to it.
 const NAME: usize = 200;
 
 /// Faults of a script that are told one by one.
@@ -78,6 +77,8 @@ pub struct Project {
     pub name: String,
     /// In their order in the animation; never empty.
     pub files: Vec<Opened>,
+    /// What in the folder looks like a part of the animation and is not read.
+    pub not_read: Vec<NotRead>,
     settings: Settings,
     /// The folder, where one was opened.
     folder: Option<PathBuf>,
@@ -101,18 +102,14 @@ impl Project {
         let name = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
         let name = name.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let read = |source| Error::Read { path: path.to_path_buf(), source };
-        let mut paths = Vec::new();
+        let (mut paths, mut not_read) = (Vec::new(), Vec::new());
         if path.is_dir() {
-            for entry in fs::read_dir(path).map_err(read)? {
-                let entry = entry.map_err(read)?;
-                let name = entry.file_name().to_string_lossy().into_owned();
-                if name.ends_with(".txt") && entry.path().is_file() {
-                    paths.push((name, entry.path()));
-                }
+            let listed = Folder::list(path).map_err(read)?;
+            not_read = listed.not_read;
+            for (_, path) in listed.scripts {
+                let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                paths.push((name, path));
             }
-            paths.sort_by(|(a, _), (b, _)| {
-                natural_cmp(script_name(a).unwrap_or(a), script_name(b).unwrap_or(b))
-            });
             if paths.is_empty() {
                 return Err(Error::NoScripts { path: path.to_path_buf() });
             }
@@ -132,7 +129,7 @@ impl Project {
             .collect::<Result<_, Error>>()?;
         let folder = path.is_dir().then(|| path.to_path_buf());
         let settings = Settings::open(folder.as_deref())?;
-        Ok(Self { name, files, settings, folder })
+        Ok(Self { name, files, not_read, settings, folder })
     }
 
     /// What is said of the whole animation.
@@ -192,8 +189,7 @@ impl Project {
         let Some(folder) = &self.folder else {
             return Err(refused("one script was opened, and nothing beside it may be written"));
         };
-        let stem = script_name(name).filter(|stem| !stem.is_empty() && !stem.starts_with('.'));
-        let is_plain = stem.is_some()
+        let is_plain = script_name(name).is_some()
             && name.len() <= NAME
             && !name.chars().any(|c| c.is_control() || "/\\:".contains(c));
         if !is_plain {
@@ -204,9 +200,8 @@ impl Project {
         if (held + text.len()) as u64 > TEXT {
             return Err(Error::TooLarge { path, limit: TEXT });
         }
-        write_new(&path, text).map_err(|error| match error.kind() {
-            io::ErrorKind::AlreadyExists => refused("there is such a file already"),
-            _ => Error::Write { path: path.clone(), source: error },
+        OutputFile::write_new(&path, text).map_err(|error| {
+            if error.is_taken() { refused("there is such a file already") } else { error.into() }
         })?;
         let order = |name: &str, other: &str| {
             natural_cmp(script_name(name).unwrap_or(name), script_name(other).unwrap_or(other))
@@ -420,12 +415,12 @@ impl Opened {
                 self.changed = None;
                 Saved::Yes
             }
-            Ok(_) => match write_whole(&self.path, &text) {
+            Ok(_) => match OutputFile::write(&self.path, &text, true) {
                 Ok(()) => {
                     (self.on_disk, self.changed) = (Some(text), None);
                     Saved::Yes
                 }
-                Err(error) => self.failed(&error),
+                Err(error) => self.failed(&error.into()),
             },
             Err(error) => self.failed(&error),
         };
@@ -435,6 +430,8 @@ impl Opened {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn set(at: usize, text: &str) -> Vec<Splice> {
@@ -528,11 +525,7 @@ mod tests {
             (fs::read_to_string(&path).unwrap().as_str(), project.files[0].saved()),
             ("a\n", Saved::Failed)
         );
-        assert!(
-            project.files[0].failure().ends_with("the file is read-only"),
-            "{}",
-            project.files[0].failure()
-        );
+        assert!(project.files[0].failure().ends_with("it is read-only"), "{}", project.files[0].failure());
         fs::set_permissions(&path, writable).unwrap();
         project.save(true);
         assert_eq!((fs::read_to_string(&path).unwrap().as_str(), project.files[0].failure()), ("mine\n", ""));

@@ -5,12 +5,13 @@
 
 use std::path::{Path, PathBuf};
 
+use rayfold_files::OutputFile;
 use rayfold_scene::{AnimationSettings, SETTINGS_FILE, parse_settings};
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
 use crate::error::Error;
-use crate::files::{read, write_whole};
+use crate::files::read;
 use crate::line::written;
 
 /// What is said of the whole animation, and where.
@@ -56,7 +57,7 @@ impl Settings {
             && next != there
         {
             let text = with_fps(held.as_deref().unwrap_or_default(), fps);
-            write_whole(path, &text)?;
+            OutputFile::write(path, &text, true)?;
             self.on_disk = Some(text);
         } else {
             self.on_disk = held;

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use image::RgbImage;
+use rayfold_files::OutputFile;
 use rayfold_scene::Script;
 use rayfold_tracer::{Exposure, RenderOptions, precision, reference, render_frame};
 
@@ -47,7 +48,7 @@ pub(super) fn run(folder: &Path, quick: bool) -> Result<()> {
         })
         .collect::<Result<_>>()?;
     let path = folder.join("accuracy-examples.md");
-    std::fs::write(&path, report(&rows, quick)?).with_context(|| path.display().to_string())
+    Ok(OutputFile::write(&path, report(&rows, quick)?, false)?)
 }
 
 fn compared(name: &'static str, script: &Script, most: usize) -> Result<Row> {

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
+use rayfold_files::OutputFile;
 use rayfold_tracer::MAX_BOUNCES;
 
 use crate::backends;
@@ -70,7 +71,7 @@ pub fn run(args: &Args) -> Result<()> {
         introduction(args.quick) + &cost + &plots + &tables(&comparisons)?
     };
     let path = args.output.join("accuracy.md");
-    std::fs::write(&path, report).with_context(|| path.display().to_string())
+    Ok(OutputFile::write(&path, report, false)?)
 }
 
 fn introduction(quick: bool) -> String {
@@ -264,5 +265,5 @@ fn hard_cases(args: &Args) -> Result<()> {
         report.write(&folder)?;
     }
     let path = args.output.join("hard-cases.md");
-    std::fs::write(&path, report.page(NAIVE)?).with_context(|| path.display().to_string())
+    Ok(OutputFile::write(&path, report.page(NAIVE)?, false)?)
 }

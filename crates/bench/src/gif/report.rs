@@ -11,6 +11,7 @@ use super::programs::{Program, RIVAL};
 use super::sets::NOISE;
 use super::{CROP, FPS, Held, JUDGED, Measured, Outcome};
 use crate::plot::{Labels, Series, columns, log_log};
+use rayfold_files::OutputFile;
 
 /// Sets and places of which crops are shown: left, top.
 pub(super) const CROPS: [(&str, u32, u32); 3] =
@@ -163,7 +164,7 @@ pub(super) fn write(
         }
     }
     plots(&beside, results)?;
-    std::fs::write(folder.join("gif.md"), text)?;
+    OutputFile::write(folder.join("gif.md"), text, false)?;
     Ok(())
 }
 
@@ -272,14 +273,14 @@ fn crops(set: &Measured) -> anyhow::Result<Option<(RgbImage, Vec<&str>)>> {
 
 /// As small as it gets: the repository keeps it.
 fn save(image: &RgbImage, path: &Path) -> anyhow::Result<()> {
-    let file = std::io::BufWriter::new(std::fs::File::create(path)?);
-    PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Up).write_image(
+    let mut file = Vec::new();
+    PngEncoder::new_with_quality(&mut file, CompressionType::Best, FilterType::Up).write_image(
         image.as_raw(),
         image.width(),
         image.height(),
         ExtendedColorType::Rgb8,
     )?;
-    Ok(())
+    Ok(OutputFile::write(path, file, false)?)
 }
 
 fn plots(folder: &Path, results: &[Measured]) -> anyhow::Result<()> {

@@ -14,6 +14,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use fastrand::Rng;
 use image::RgbImage;
+use rayfold_files::OutputFile;
 use rayfold_scene::Scene;
 use rayfold_tracer::{RenderOptions, reference, render};
 use rayon::prelude::*;
@@ -72,7 +73,7 @@ pub fn run(args: &Args) -> Result<()> {
     if !args.check {
         std::fs::create_dir_all(&args.output)?;
         let path = args.output.join("metamorphic.md");
-        std::fs::write(&path, &report).with_context(|| path.display().to_string())?;
+        OutputFile::write(&path, &report, false)?;
     }
     let unexplained: usize = found.iter().map(|found| found.unexplained).sum();
     anyhow::ensure!(unexplained == 0, "{unexplained} pixels are not explained");

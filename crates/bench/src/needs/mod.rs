@@ -13,6 +13,7 @@ use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Context, Result, ensure};
+use rayfold_files::OutputFile;
 use rayon::prelude::*;
 
 use self::parts::{Build, PARTS, builds, uses};
@@ -101,7 +102,7 @@ pub fn run(args: &Args) -> Result<()> {
     if !args.check && args.only.is_empty() {
         std::fs::create_dir_all(&args.output)?;
         let path = args.output.join("needs.md");
-        std::fs::write(&path, &report).with_context(|| path.display().to_string())?;
+        OutputFile::write(&path, &report, false)?;
     }
     let beyond: Vec<_> = rows.iter().filter(|row| row.is_beyond()).map(Row::told).collect();
     ensure!(beyond.is_empty(), "scenes execute over {MOST} % more than they need: {}", beyond.join("; "));

@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use rayfold_files::OutputFile;
 use rayfold_local::{Functions, Plan, Platform, StoreKind};
 use rayfold_scene::{Limits, parse};
 use rayfold_tracer::{RenderOptions, render};
@@ -88,8 +89,7 @@ pub fn run(args: &Args) -> Result<()> {
     let plot = format!("{name}-timeline.svg");
     timeline::plot(&args.output.join(&plot), scenes.last().context("no scene")?)?;
     let path = args.output.join(format!("{name}.md"));
-    std::fs::write(&path, report::text(args.store, &scenes, load.trim(), &plot)?)
-        .with_context(|| path.display().to_string())
+    Ok(OutputFile::write(&path, report::text(args.store, &scenes, load.trim(), &plot)?, false)?)
 }
 
 async fn measure(args: &Args) -> Result<Vec<Scene>> {

@@ -7,6 +7,7 @@ use anyhow::Result;
 use super::measure::{Agreement, Args, Drawn};
 use super::scenes::EFFECTS;
 use crate::plot::{Labels, Series, log_log};
+use rayfold_files::OutputFile;
 
 const WAYS: [(&str, &str); 4] = [
     ("adaptive", "adaptive"),
@@ -79,7 +80,7 @@ pub(super) fn write(
         log_log(&folder.join(&file), &labels, &series)?;
         writeln!(page, "![{}: {}]({file})\n", effect.name, effect.about)?;
     }
-    std::fs::write(folder.join("sampling.md"), page.trim_end().to_owned() + "\n")?;
+    OutputFile::write(folder.join("sampling.md"), page.trim_end().to_owned() + "\n", false)?;
     Ok(())
 }
 

@@ -10,6 +10,7 @@ use super::mitsuba::{self, Truth};
 use super::works::{PEER, WORKS};
 use crate::plot::{Labels, Series, log_log};
 use crate::speed::{self, povray};
+use rayfold_files::OutputFile;
 
 /// The errors at which times are given.
 const ERRORS: [f64; 4] = [2.0, 1.0, 0.5, 0.25];
@@ -63,7 +64,7 @@ pub(super) fn write(
         log_log(&args.output.join(&file), &labels, &series)?;
         writeln!(page, "\n![{}]({file})\n", work.about)?;
     }
-    std::fs::write(args.output.join("time-to-error.md"), page.trim_end().to_owned() + "\n")?;
+    OutputFile::write(args.output.join("time-to-error.md"), page.trim_end().to_owned() + "\n", false)?;
     Ok(())
 }
 

@@ -8,8 +8,9 @@ pub mod shapes;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use image::RgbImage;
+use rayfold_files::OutputFile;
 use rayfold_scene::Scene;
 use rayfold_tracer::{Drawing, RenderOptions};
 
@@ -87,7 +88,7 @@ pub fn run(args: &Args) -> Result<()> {
     report += "\n";
     report += &rest;
     let path = args.output.join("speed.md");
-    std::fs::write(&path, report).with_context(|| path.display().to_string())
+    Ok(OutputFile::write(&path, report, false)?)
 }
 
 /// What a peer takes for each second of ours.

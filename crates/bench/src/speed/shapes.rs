@@ -8,6 +8,7 @@ use anyhow::{Context, Result};
 use fastrand::Rng;
 use glam::{DMat3, DVec3};
 use image::RgbImage;
+use rayfold_files::OutputFile;
 use rayfold_scene::model::{Finish, Glass, Pattern, Shine, Weight};
 use rayfold_scene::{
     Coefficients, Cone, Cuboid, Cylinder, Disc, Instance, Lamp, Material, Object, Placement, Plane, Scene,
@@ -112,7 +113,7 @@ pub fn run(args: &Args) -> Result<()> {
         rows.push(one.install(|| measured(subject, args))?);
     }
     let path = args.output.join("shapes.md");
-    std::fs::write(&path, report(args, &rows)?).with_context(|| path.display().to_string())?;
+    OutputFile::write(&path, report(args, &rows)?, false)?;
     write_csv(args, &rows)
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use rayfold_client::{FetchedFrame, Frames, Output, frame_name, frames};
+use rayfold_files::{OutputFile, probe};
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Manifest, Status};
 
@@ -12,7 +13,6 @@ use super::age::Age;
 use super::{BucketArgs, Client, Watch, address, named, parse_animation, report, with_bucket};
 use crate::console::Console;
 use crate::outcome::{Outcome, Usage};
-use crate::output::{OutputFile, probe};
 use crate::progress::Progress;
 use crate::render::target::{Container, Format, Pattern, Place, Target};
 use crate::wording::{Size, number};
@@ -211,6 +211,7 @@ async fn fetch_frames(
         pattern.range(first.number, last.number),
         number(done, "frame")
     ));
+    pattern.warn_of_older(manifest.head.total, console);
     if !missing.is_empty() {
         let names: Vec<String> = missing.into_iter().map(frame_name).collect();
         console.warn(format_args!("not drawn, and not fetched: {}", named(&names)));

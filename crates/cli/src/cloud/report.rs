@@ -1,7 +1,7 @@
 //! What a manifest says, for people.
 
 use rayfold_client::{Obstacle, obstacles};
-use rayfold_pipeline::manifest::Manifest;
+use rayfold_pipeline::manifest::{Manifest, Rejected};
 
 use crate::console::Console;
 use crate::wording::number;
@@ -21,8 +21,11 @@ fn missing_scripts(manifest: &Manifest) -> u64 {
     manifest.head.missing() - manifest.head.pending
 }
 
-/// Shows everything that keeps the animation from being done.
+/// Shows everything that keeps the animation from being done, and what is not read because of its name.
 pub(crate) fn show_faults(manifest: &Manifest, console: &Console) {
+    for Rejected { key, problem } in &manifest.head.warnings {
+        console.warn(format_args!("{key}: not read: {problem}"));
+    }
     for rejected in &manifest.head.rejected {
         console.fault(&rejected.key, &rejected.problem);
     }

@@ -3,23 +3,24 @@
 use std::fmt::Write;
 use std::time::Duration;
 
-use rayfold_client::{Obstacle, obstacles};
+use rayfold_client::{Obstacle, Overview, obstacles};
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Head, Reason};
 use serde::Serialize;
 
 use super::age::Age;
-use super::{BucketArgs, Client, Watch, parse_animation, report, with_bucket};
+use super::{BucketArgs, Client, MOST_NAMED, Watch, named, parse_animation, report, with_bucket};
 use crate::console::{Console, Format, visible};
 use crate::outcome::Outcome;
-use crate::wording::Size;
+use crate::wording::{Size, number};
 
 /// Between two looks at a whole bucket.
 const APART: Duration = Duration::from_secs(2);
 
 /// Show where the animations of a bucket stand
 ///
-/// Without ANIMATION: all of them, a line each. With one: also every frame that failed, with its reason.
+/// Without ANIMATION: all of them, a line each, and how many objects belong to none. With one: also every frame that
+/// failed, with its reason, and every file that is not read because of its name.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -48,6 +49,22 @@ pub(crate) struct Args {
 #[derive(Serialize)]
 struct Report<'a> {
     animations: Vec<Entry<'a>>,
+    /// Only where the whole bucket was looked at.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    misplaced: Option<Misplaced<'a>>,
+}
+
+/// Objects that belong to no animation, of which the first are named.
+#[derive(Serialize)]
+struct Misplaced<'a> {
+    count: usize,
+    named: Vec<MisplacedEntry<'a>>,
+}
+
+#[derive(Serialize)]
+struct MisplacedEntry<'a> {
+    key: &'a str,
+    problem: &'a str,
 }
 
 #[derive(Serialize)]
@@ -64,7 +81,7 @@ struct Entry<'a> {
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Known<'a> {
-    Seen(&'a Head),
+    Seen(Box<Head>),
     /// No function has looked at it yet, or what it wrote cannot be read.
     New {
         animation: &'a Animation,
@@ -97,20 +114,28 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
             if watches.iter().all(|watch| watch.manifest().is_none()) {
                 client.must_exist(animation).await?;
             }
-            show(&watches, args.format, console)?;
+            show(&watches, None, args.format, console)?;
             show_faults(&watches, args.format, console);
             Ok(Outcome::Done)
         }
         (None, false) => {
-            let watches = client.look(&client.animations().await?).await?;
-            show(&watches, args.format, console)?;
+            let overview = client.overview().await?;
+            let watches = client.look(&overview.animations).await?;
+            show(&watches, Some(&overview), args.format, console)?;
+            if args.format == Format::Text {
+                warn_of_misplaced(&overview, console);
+            }
             Ok(Outcome::Done)
         }
         (None, true) => {
             let mut last = String::new();
             loop {
-                let watches = client.look(&client.animations().await?).await?;
-                show_if_new(&watches, args.format, &mut last, console)?;
+                let overview = client.overview().await?;
+                let watches = client.look(&overview.animations).await?;
+                let is_new = show_if_new(&watches, Some(&overview), args.format, &mut last, console)?;
+                if is_new && args.format == Format::Text {
+                    warn_of_misplaced(&overview, console);
+                }
                 tokio::time::sleep(APART).await;
             }
         }
@@ -129,7 +154,7 @@ async fn follow(
     loop {
         watches[0].look_for().await?;
         watches[0].compare().await?;
-        show_if_new(&watches, format, &mut last, console)?;
+        show_if_new(&watches, None, format, &mut last, console)?;
         if watches[0].is_settled() {
             show_faults(&watches, format, console);
             return Ok(if watches[0].is_current() { Outcome::Done } else { Outcome::Failed });
@@ -138,32 +163,55 @@ async fn follow(
     }
 }
 
-fn show(watches: &[Watch<'_>], format: Format, console: &Console) -> anyhow::Result<()> {
+fn show(
+    watches: &[Watch<'_>],
+    overview: Option<&Overview>,
+    format: Format,
+    console: &Console,
+) -> anyhow::Result<()> {
     match format {
         Format::Text => console.print(table(watches, true)),
-        Format::Json => console.print(document(watches, false)?),
+        Format::Json => console.print(document(watches, overview, false)?),
     }
 }
 
-/// Shows what is not what was shown last, which time alone does not make it.
+/// Shows what is not what was shown last, which time alone does not make it; says whether it was.
 fn show_if_new(
     watches: &[Watch<'_>],
+    overview: Option<&Overview>,
     format: Format,
     last: &mut String,
     console: &Console,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<bool> {
     let now = match format {
-        Format::Text => table(watches, false),
-        Format::Json => document(watches, true)?,
-    };
-    if now != *last {
-        match format {
-            Format::Text => console.print(table(watches, true))?,
-            Format::Json => console.print(&now)?,
+        Format::Text => {
+            let misplaced = overview.map_or(0, |overview| overview.misplaced.len());
+            table(watches, false) + &misplaced.to_string()
         }
-        *last = now;
+        Format::Json => document(watches, overview, true)?,
+    };
+    if now == *last {
+        return Ok(false);
     }
-    Ok(())
+    match format {
+        Format::Text => console.print(table(watches, true))?,
+        Format::Json => console.print(&now)?,
+    }
+    *last = now;
+    Ok(true)
+}
+
+/// Says how many objects belong to no animation, and names the first.
+fn warn_of_misplaced(overview: &Overview, console: &Console) {
+    if overview.misplaced.is_empty() {
+        return;
+    }
+    let names = overview.misplaced.iter().map(|misplaced| misplaced.key.clone()).collect::<Vec<_>>();
+    console.warn(format_args!(
+        "{} misplaced, of which nothing is drawn: {}: expected scripts/<animation>/<name>.txt",
+        number(names.len() as u64, "object"),
+        named(&names)
+    ));
 }
 
 fn show_faults(watches: &[Watch<'_>], format: Format, console: &Console) {
@@ -192,8 +240,13 @@ fn table(watches: &[Watch<'_>], with_age: bool) -> String {
             Some(gif) => format!("last GIF of {}{}", Size(gif.size), age.unwrap_or_default()),
             None => "no GIF".to_owned(),
         };
+        let warnings = match manifest.head.warnings.len() as u64 {
+            0 => String::new(),
+            n => format!("; {}", number(n, "warning")),
+        };
         let behind = if watch.is_behind() { "; newer scripts wait to be seen" } else { "" };
-        let _ = writeln!(text, "{name:width$}  {status:9}  {}, {gif}{behind}", report::count(manifest));
+        let _ =
+            writeln!(text, "{name:width$}  {status:9}  {}, {gif}{warnings}{behind}", report::count(manifest));
     }
     text
 }
@@ -207,10 +260,11 @@ fn unknown(watch: &Watch<'_>) -> (&'static str, &'static str) {
     }
 }
 
-fn document(watches: &[Watch<'_>], one_line: bool) -> anyhow::Result<String> {
+fn document(watches: &[Watch<'_>], overview: Option<&Overview>, one_line: bool) -> anyhow::Result<String> {
     let entries = watches.iter().map(|watch| Entry {
         known: match watch.manifest() {
-            Some(manifest) => Known::Seen(&manifest.head),
+            // The manifest's own record of the GIF has the name of the field that says more of it.
+            Some(manifest) => Known::Seen(Box::new(Head { gif: None, ..manifest.head.clone() })),
             None => Known::New { animation: watch.animation(), status: unknown(watch).0 },
         },
         behind: watch.is_behind(),
@@ -226,7 +280,15 @@ fn document(watches: &[Watch<'_>], one_line: bool) -> anyhow::Result<String> {
             obstacles.map(|Obstacle { what, reason }| FaultEntry { what, reason }).collect()
         }),
     });
-    let report = Report { animations: entries.collect() };
+    let misplaced = overview.map(|Overview { misplaced, .. }| Misplaced {
+        count: misplaced.len(),
+        named: misplaced
+            .iter()
+            .take(MOST_NAMED)
+            .map(|misplaced| MisplacedEntry { key: &misplaced.key, problem: misplaced.problem })
+            .collect(),
+    });
+    let report = Report { animations: entries.collect(), misplaced };
     let text = if one_line { serde_json::to_string(&report) } else { serde_json::to_string_pretty(&report) };
     Ok(text? + "\n")
 }

@@ -8,8 +8,9 @@ use anyhow::Context;
 use rayfold_client::{
     Content, Ended, Error, File, Preview, Sending, Submission, Submitted, Waiting, settings_with_frames,
 };
+use rayfold_files::probe;
 use rayfold_pipeline::keys::{Animation, ScriptName};
-use rayfold_scene::Limits;
+use rayfold_scene::{Limits, script_name};
 use rayon::prelude::*;
 
 use super::{
@@ -18,7 +19,6 @@ use super::{
 use crate::console::{Console, visible};
 use crate::input::Input;
 use crate::outcome::{Outcome, Usage};
-use crate::output::probe;
 use crate::plan::{Plan, Wishes};
 use crate::progress::Progress;
 use crate::render::target::must_be_gif;
@@ -188,7 +188,7 @@ fn submission(
     for path in input.scripts.iter().filter_map(|script| script.path()) {
         let name = path.file_name().and_then(|name| name.to_str());
         let name = name.with_context(|| format!("the name of {} is not UTF-8", path.display()))?;
-        let name = ScriptName::new(name.trim_end_matches(".txt"))?;
+        let name = ScriptName::new(script_name(name).unwrap_or(name))?;
         if name.as_str().len() > LONGEST_NAME_ON_MINIO {
             console.note(format_args!(
                 "{name}.txt: on S3 it is drawn; on MinIO, which keeps objects as files, a name of more than \

@@ -15,6 +15,7 @@ use rayfold_scene::Screen;
 use serde::Serialize;
 
 use crate::console::{Console, Format};
+use crate::interrupt;
 use crate::outcome::Outcome;
 use crate::values;
 use measure::measure;
@@ -138,7 +139,9 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
 
 fn read(file: Option<&PathBuf>) -> anyhow::Result<Prices> {
     let Some(path) = file else { return Ok(Prices::built_in()?) };
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let place = path.clone();
+    let text = interrupt::wait_for(move || std::fs::read_to_string(place))?;
+    let text = text.with_context(|| format!("cannot read {}", path.display()))?;
     serde_json::from_str(&text).with_context(|| format!("{} holds no prices", path.display()))
 }
 

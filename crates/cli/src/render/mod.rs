@@ -3,12 +3,14 @@
 //! Everything is checked before the first frame is drawn, and nothing is written when a script has an error. Frames
 //! are drawn ahead of the encoder within a bound ([`crate::ahead`]), so that memory does not grow with their number.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::Context;
 use clap::ValueEnum;
 use image::RgbImage;
+use rayfold_files::{OutputFile, probe};
 use rayfold_gif::Plays;
 use rayfold_scene::{AnimationSettings, Camera, Limits, Samples, Screen};
 use rayfold_tracer::{Precision, RenderOptions};
@@ -18,7 +20,6 @@ use crate::console::Console;
 use crate::input::{Input, is_stdin};
 use crate::interrupt;
 use crate::outcome::{Outcome, Usage};
-use crate::output::{OutputFile, probe};
 use crate::plan::{Job, Plan, Wishes};
 use crate::playback::Playback;
 use crate::progress::Progress;
@@ -185,6 +186,8 @@ fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<(
     match target {
         Target::Animation(_, Place::File(path)) | Target::Image(path, _) => probe(path)?,
         Target::Animation(_, Place::StandardOutput) => {}
+        // Where all frames are there already nothing is written.
+        Target::Images(..) if args.skip_existing => {}
         Target::Images(pattern, _) => pattern.probe(wishes.frames.0.unwrap_or(1))?,
     }
     let limits = Limits { max_pixels: args.max_pixels, ..Limits::default() };
@@ -316,6 +319,9 @@ fn images(
             if skip_existing && is_drawn(&path, format, plan.scene(&job)?.screen) {
                 return Ok(Drawn::Skipped);
             }
+            if skip_existing {
+                probe(&path)?;
+            }
             let file = format.encode(&draw(plan, &job)?)?;
             OutputFile::write(path, &file, false)?;
             files.fetch_add(1, Ordering::Relaxed);
@@ -341,13 +347,15 @@ fn images(
         number(plan.len(), "frame"),
         Size(bytes)
     ));
+    pattern.warn_of_older(plan.total(), console);
     Ok(())
 }
 
 /// There is a whole image of this size.
 fn is_drawn(path: &Path, format: Format, screen: Screen) -> bool {
-    let file = std::fs::read(path).ok();
-    let image = file.and_then(|file| format.decode(&file));
+    let mut file = Vec::new();
+    let read = rayfold_files::open(path).and_then(|mut from| from.read_to_end(&mut file));
+    let image = read.ok().and_then(|_| format.decode(&file));
     image.is_some_and(|image| image.dimensions() == (screen.width(), screen.height()))
 }
 

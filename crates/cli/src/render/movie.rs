@@ -1,17 +1,18 @@
 //! An animation as a whole: frames in order, into the container that was asked for, to a file or to standard output.
 
-use std::io::{self, BufWriter, IsTerminal, Stdout, Write};
+use std::io::{self, BufWriter, IsTerminal, Write};
 use std::time::Duration;
 
 use image::RgbImage;
+use rayfold_files::OutputFile;
 use rayfold_gif::{Encoder, Settings};
 
 use super::apng::{Apng, MOST_FPS};
 use super::target::{Container, Movie, Place};
 use super::y4m::Y4m;
 use crate::console::Console;
+use crate::interrupt;
 use crate::outcome::Usage;
-use crate::output::{OutputError, OutputFile};
 use crate::wording::{Size, number};
 
 /// Bytes that are collected before they are written.
@@ -23,10 +24,12 @@ pub(crate) enum MovieError {
     /// Whoever reads standard output has had enough.
     #[error("the reader of standard output has closed it")]
     Closed,
+    #[error("cannot write to standard output: it is closed, or /dev/null that is open for reading too")]
+    NoStandardOutput,
     #[error("cannot write to standard output")]
     StandardOutput(#[source] io::Error),
     #[error(transparent)]
-    Output(#[from] OutputError),
+    Output(#[from] rayfold_files::Error),
     #[error(transparent)]
     Gif(rayfold_gif::Error),
 }
@@ -163,7 +166,7 @@ impl Failure {
 
 fn error_at(place: &Place, source: io::Error) -> MovieError {
     match place {
-        Place::File(path) => OutputError::Io { path: path.clone(), source }.into(),
+        Place::File(path) => rayfold_files::Error::Io { path: path.clone(), source }.into(),
         Place::StandardOutput if source.kind() == io::ErrorKind::BrokenPipe => MovieError::Closed,
         Place::StandardOutput => MovieError::StandardOutput(source),
     }
@@ -177,7 +180,7 @@ struct Sink {
 
 enum To {
     File(OutputFile),
-    StandardOutput(Stdout),
+    StandardOutput,
 }
 
 impl Sink {
@@ -188,24 +191,52 @@ impl Sink {
                 let message = "an animation is nothing for a terminal: pipe it to a program, or write a file";
                 return Err(Usage(message.into()).into());
             }
-            Place::StandardOutput => To::StandardOutput(io::stdout()),
+            Place::StandardOutput if is_closed() => return Err(MovieError::NoStandardOutput.into()),
+            Place::StandardOutput => To::StandardOutput,
         };
         Ok(Self { to, bytes: 0 })
     }
 
-    fn finish(self) -> Result<(), OutputError> {
+    fn finish(self) -> Result<(), rayfold_files::Error> {
         match self.to {
             To::File(file) => file.finish(true),
-            To::StandardOutput(_) => Ok(()),
+            To::StandardOutput => Ok(()),
         }
     }
+}
+
+/// Says whether the program was started without a standard output, as by `>&-`. The language's runtime then puts
+/// `/dev/null` in its place, open for reading and writing; a shell's `> /dev/null` is open for writing alone.
+#[cfg(target_os = "linux")]
+fn is_closed() -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let device = |path: &str| std::fs::metadata(path).ok().map(|metadata| metadata.rdev());
+    let is_null =
+        device("/dev/null").is_some_and(|null| null != 0 && device("/proc/self/fd/1") == Some(null));
+    let info = std::fs::read_to_string("/proc/self/fdinfo/1").unwrap_or_default();
+    let flags = info.lines().find_map(|line| line.strip_prefix("flags:"));
+    let flags = flags.and_then(|flags| u32::from_str_radix(flags.trim(), 8).ok());
+    is_null && flags.is_some_and(|flags| flags & 0o3 == 0o2)
+}
+
+/// Elsewhere there is no way to see it.
+#[cfg(not(target_os = "linux"))]
+fn is_closed() -> bool {
+    false
 }
 
 impl Write for Sink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = match &mut self.to {
             To::File(file) => file.write(bytes)?,
-            To::StandardOutput(out) => out.write(bytes)?,
+            To::StandardOutput => {
+                let piece = bytes.to_vec();
+                let mut out = io::stdout();
+                // A reader may take its time for ever.
+                interrupt::wait_for(move || out.write_all(&piece).and_then(|()| out.flush()))
+                    .map_err(io::Error::other)??;
+                bytes.len()
+            }
         };
         self.bytes += written as u64;
         Ok(written)
@@ -214,7 +245,7 @@ impl Write for Sink {
     fn flush(&mut self) -> io::Result<()> {
         match &mut self.to {
             To::File(file) => file.flush(),
-            To::StandardOutput(out) => out.flush(),
+            To::StandardOutput => Ok(()),
         }
     }
 }

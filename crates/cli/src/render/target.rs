@@ -4,10 +4,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use image::{ExtendedColorType, ImageEncoder, ImageFormat, RgbImage};
+use rayfold_files::probe;
 use rayfold_gif::Plays;
 
+use crate::console::Console;
 use crate::outcome::Usage;
-use crate::output::probe;
+use crate::wording::number;
 
 /// What OUT asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -145,9 +147,9 @@ impl Pattern {
         match self.folder.ancestors().find(is_there) {
             // The folders in between are made, so that only the nearest one must take something.
             Some(nearest) if nearest != self.folder => {
-                let name = self.path(number);
-                let name = name.file_name().unwrap_or_default();
-                Ok(probe(&nearest.join(name))?)
+                let path = self.path(number);
+                let name = path.file_name().unwrap_or_default();
+                Ok(probe(&nearest.join(name)).map_err(|error| error.about(path))?)
             }
             _ => Ok(probe(&self.path(number))?),
         }
@@ -173,6 +175,33 @@ impl Pattern {
             from.display().to_string()
         } else {
             format!("{} to {}", from.display(), to.display())
+        }
+    }
+
+    /// The numbers of files that are there of frames behind the last one, in order: an earlier run had more.
+    pub(crate) fn beyond(&self, last: u64) -> Vec<u64> {
+        let folder = if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder };
+        let names = folder.read_dir().into_iter().flatten().flatten().map(|entry| entry.file_name());
+        let mut numbers: Vec<u64> = names
+            .filter_map(|name| {
+                let digits = name.to_str()?.strip_prefix(&self.before)?.strip_suffix(&self.after)?;
+                let number = digits.parse().ok().filter(|number| *number > last)?;
+                (self.path(number).file_name() == Some(&name)).then_some(number)
+            })
+            .collect();
+        numbers.sort_unstable();
+        numbers
+    }
+
+    /// Warns of files that an earlier run has left of frames behind the last one.
+    pub(crate) fn warn_of_older(&self, last: u64, console: &Console) {
+        let older = self.beyond(last);
+        if let (Some(&first), Some(&end)) = (older.first(), older.last()) {
+            console.warn(format_args!(
+                "{} of an earlier run left beside them: {}",
+                number(older.len() as u64, "frame"),
+                self.range(first, end)
+            ));
         }
     }
 
@@ -303,6 +332,20 @@ mod tests {
         std::fs::write(folder.path().join("file"), "").unwrap();
         let below_a_file = images(folder.path().join("file/%d.png").to_str().unwrap());
         assert!(below_a_file.probe(1).is_err() && below_a_file.make_folder().is_err());
+    }
+
+    #[test]
+    fn files_of_frames_behind_the_last_one_are_found_by_their_exact_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let pattern = images(folder.path().join("a%03d.png").to_str().unwrap());
+        assert!(pattern.beyond(0).is_empty());
+        for name in
+            ["a009.png", "a010.png", "a1000.png", "a0011.png", "a12.png", "b013.png", "a014.tif", "a-15.png"]
+        {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        assert_eq!(pattern.beyond(9), [10, 1000]);
+        assert!(images(folder.path().join("no/%d.png").to_str().unwrap()).beyond(1).is_empty());
     }
 
     #[test]

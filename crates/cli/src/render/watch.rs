@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
@@ -86,8 +87,9 @@ fn state(path: &Path) -> Option<State> {
     if metadata.len() > SMALL {
         return Some(State::Large { size: metadata.len(), modified: metadata.modified().ok() });
     }
-    let mut hasher = DefaultHasher::new();
-    std::fs::read(path).ok()?.hash(&mut hasher);
+    let (mut hasher, mut text) = (DefaultHasher::new(), Vec::new());
+    rayfold_files::open(path).and_then(|mut file| file.read_to_end(&mut text)).ok()?;
+    text.hash(&mut hasher);
     Some(State::Small { hash: hasher.finish() })
 }
 

@@ -171,9 +171,13 @@ fn script_keys_say_what_is_wrong() {
     rejects("scripts//b.txt", "an animation's name has an empty segment");
     rejects("scripts/./b.txt", "an animation's name has a segment . or ..");
     rejects("scripts/a/../b.txt", "an animation's name has a segment . or ..");
-    rejects("scripts/a/.txt", "the script has no name before its ending");
+    rejects("scripts/a/.txt", "what systems leave in folders is ignored");
+    rejects("scripts/a/.old.txt", "what systems leave in folders is ignored");
+    rejects("scripts/__MACOSX/a/b.txt", "what systems leave in folders is ignored");
+    rejects("scripts/a/b.TXT", "expected the ending .txt in small letters");
+    rejects("scripts/a/b\\c.txt", "the key has a backslash: folders are separated by /");
     rejects("scripts/a/b.jpg", "neither a script (.txt) nor animation.json");
-    rejects("scripts/a/", "neither a script (.txt) nor animation.json");
+    rejects("scripts/a/", "what systems leave in folders is ignored");
     rejects(
         "scripts/b.txt",
         "a script lies in a folder, which is the animation: scripts/<animation>/<name>.txt",

@@ -212,7 +212,7 @@ mod tests {
             version: ETag::new("v"),
             modified: crate::Timestamp(0),
         });
-        let scripts = Scripts { found: found.collect(), rejected: Vec::new() };
+        let scripts = Scripts { found: found.collect(), ..Scripts::default() };
         let mut manifest = reconcile(&animation, &scripts, &Results::default(), &Settings::absent());
         let frames = std::mem::take(&mut manifest.frames).into_iter().enumerate();
         manifest.frames = frames

@@ -17,7 +17,7 @@ fn manifest(names: &[&str], removed_at: Option<u64>) -> Manifest {
         version: ETag::new("v"),
         modified: Timestamp(0),
     });
-    let scripts = Scripts { found: found.collect(), rejected: Vec::new() };
+    let scripts = Scripts { found: found.collect(), ..Scripts::default() };
     let animation = Animation::new("film").unwrap();
     let mut manifest = reconcile(&animation, &scripts, &Results::default(), &Settings::absent());
     manifest.head.removed_at = removed_at.map(Timestamp);
@@ -57,6 +57,7 @@ fn changes() -> Vec<(&'static str, bool, Manifest)> {
     change("a rejected file", true, &|m| m.head.rejected[0].key.push('x'));
     change("what is wrong with it", true, &|m| m.head.rejected[0].problem.push('x'));
     change("excess", true, &|m| m.head.excess = None);
+    change("warnings", true, &|m| m.head.warnings.clear());
     change("refusal", true, &|m| m.head.refusal = None);
     change("refusal's receipt", true, &|m| m.head.refusal = Some(fault("other", None)));
     change("frames", true, &|m| drop(m.frames.pop()));
@@ -80,6 +81,8 @@ fn full() -> Manifest {
     let fault = |receipt: &str| Fault { receipt: ETag::new(receipt), reason: None };
     manifest.head.rejected =
         vec![Rejected { key: "scripts/film/.txt".to_owned(), problem: "no name".to_owned() }];
+    manifest.head.warnings =
+        vec![Rejected { key: "scripts/film/3.TXT".to_owned(), problem: "its ending".to_owned() }];
     manifest.head.excess = Some(Reason::new("too many"));
     manifest.head.refusal = Some(fault("r"));
     manifest.frames[1].state = FrameState::Failed(fault("f"));

@@ -44,15 +44,49 @@ async fn of_many_keys_that_no_script_can_have_the_first_are_named_and_the_others
     }
 }
 
+/// An editor's copy failed the animation, and a script in capitals made it shorter without a word.
 #[tokio::test]
-async fn files_that_are_meant_as_scripts_are_named_and_others_are_not() {
+async fn what_systems_leave_counts_for_nothing_and_what_is_misnamed_is_a_warning() {
     let world = World::new();
-    world.put("scripts/film/notes.md", "");
-    world.put("scripts/film/.txt", "");
+    for ignored in ["notes.md", ".txt", ".old.txt", "._1.txt", ".#1.txt", "Thumbs.db", ""] {
+        world.put(&format!("scripts/film/{ignored}"), "");
+    }
+    let warned = ["3.TXT", "5.txt ", "a\\6.txt", "animation.JSON"].map(|name| format!("scripts/film/{name}"));
+    for near_miss in &warned {
+        world.put(near_miss, "frame 9");
+    }
     world.upload("1.txt", "frame 1").await;
     let head = world.manifest().head;
-    let rejected: Vec<_> = head.rejected.iter().map(|rejected| rejected.key.as_str()).collect();
-    assert_eq!((rejected, head.total, head.status), (vec!["scripts/film/.txt"], 1, Status::Failed));
+    let warnings: Vec<_> = head.warnings.iter().map(|warning| warning.key.as_str()).collect();
+    assert_eq!((warnings, head.rejected), (warned.iter().map(String::as_str).collect(), Vec::new()));
+    assert_eq!((head.total, head.status), (1, Status::Done));
+}
+
+#[tokio::test]
+async fn a_misnamed_file_is_in_the_manifest_as_soon_as_it_comes_and_until_it_goes() {
+    let world = World::new();
+    let key = "scripts/film/3.TXT";
+    let named =
+        || world.manifest().head.warnings.iter().map(|warning| warning.key.clone()).collect::<Vec<_>>();
+    assert!(matches!(world.upload("3.TXT", "frame 3").await, Outcome::NearMiss(_)));
+    assert_eq!((named(), world.manifest().head.status), (vec![key.to_owned()], Status::Empty));
+    world.upload("1.txt", "frame 1").await;
+    assert_eq!((named(), world.manifest().head.status), (vec![key.to_owned()], Status::Done));
+    world.store.bucket.lock().unwrap().delete(key);
+    world.render(key).await;
+    assert!(named().is_empty());
+}
+
+#[tokio::test]
+async fn of_many_misnamed_files_the_first_are_named_and_the_others_counted() {
+    let world = World::new();
+    for number in 0..250 {
+        world.put(&format!("scripts/film/{number:03}.TXT"), "");
+    }
+    world.upload("1.txt", "frame 1").await;
+    let warnings = world.manifest().head.warnings;
+    assert_eq!((warnings.len(), warnings[0].key.as_str()), (101, "scripts/film/000.TXT"));
+    assert_eq!(warnings[100].problem, "150 more keys of files that are not read");
 }
 
 #[tokio::test]

@@ -38,12 +38,17 @@ async fn a_sweep_visits_whatever_is_uploaded_or_has_a_manifest() {
     for key in [
         "scripts/a/1.txt",
         "scripts/b/animation.json",
-        "scripts/c/.txt",
+        "scripts/c/3.TXT",
         "manifests/d.json",
         "scripts/1.txt",
         "scripts/notes.md",
+        // What systems leave makes no animation.
+        "scripts/e/",
+        "scripts/f/.old.txt",
+        "scripts/g/.ipynb_checkpoints/1.txt",
+        "scripts/__MACOSX/a/._1.txt",
     ] {
-        world.put(key, "{}");
+        world.put(key, if key.ends_with('/') { "" } else { "{}" });
     }
     for left in [None, Some(60 * MINUTE)] {
         world.deadline = left.map(|left| world.store.clock.now().after(left));

@@ -1,0 +1,123 @@
+//! Temporary files: their names, and the removal of those that a killed run left behind.
+//!
+//! A temporary file is locked as long as its run writes it, and the system frees the lock when the run ends, however it
+//! ends. Only files with a name of ours are touched.
+
+use std::collections::HashSet;
+use std::fs::{File, TryLockError};
+use std::hash::{BuildHasher, RandomState};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, SystemTime};
+
+const BEFORE: &str = ".rayfold-";
+const AFTER: &str = ".part";
+const DIGITS: usize = 12;
+
+/// How long ago a temporary file was written last before it counts as left behind, if nobody holds its lock. A file is
+/// locked right after it is made, so that any span would do that is longer than that takes.
+const AGE: Duration = Duration::from_secs(60 * 60);
+
+/// The same on file systems that have no locks, where a run may still be writing: a frame of days is not known.
+const AGE_WITHOUT_LOCKS: Duration = Duration::from_secs(7 * 24 * 60 * 60);
+
+/// A name that no other run takes, too short for any file system to refuse.
+pub(crate) fn temporary_name() -> String {
+    let random = RandomState::new().hash_one(std::process::id());
+    format!("{BEFORE}{:0DIGITS$x}{AFTER}", random >> (64 - 4 * DIGITS))
+}
+
+fn is_temporary(name: &str) -> bool {
+    let random = name.strip_prefix(BEFORE).and_then(|rest| rest.strip_suffix(AFTER));
+    let is_digit = |byte: u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte);
+    random.is_some_and(|random| random.len() == DIGITS && random.bytes().all(is_digit))
+}
+
+/// Removes what killed runs left in a folder; looks once a run. What cannot be removed stays.
+pub(crate) fn remove_leftovers(folder: &Path) {
+    static SEEN: Mutex<Option<HashSet<PathBuf>>> = Mutex::new(None);
+    let mut seen = SEEN.lock().unwrap_or_else(PoisonError::into_inner);
+    if seen.get_or_insert_default().insert(folder.to_path_buf()) {
+        drop(seen);
+        remove_older(folder, SystemTime::now());
+    }
+}
+
+fn remove_older(folder: &Path, now: SystemTime) {
+    let Ok(entries) = folder.read_dir() else { return };
+    for entry in entries.flatten() {
+        let is_ours = entry.file_name().to_str().is_some_and(is_temporary);
+        // Of a link that is called so, the link's own type counts.
+        if is_ours && entry.file_type().is_ok_and(|of| of.is_file()) && is_abandoned(&entry.path(), now) {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
+fn is_abandoned(path: &Path, now: SystemTime) -> bool {
+    let Ok(modified) = path.metadata().and_then(|metadata| metadata.modified()) else { return false };
+    let age = now.duration_since(modified).unwrap_or_default();
+    if age < AGE {
+        return false;
+    }
+    match File::open(path).map(|file| file.try_lock()) {
+        Ok(Ok(())) => true,
+        Ok(Err(TryLockError::WouldBlock)) => false,
+        // A mode of 0200 hides the file from us, not from its writer.
+        Ok(Err(TryLockError::Error(_))) | Err(_) => age >= AGE_WITHOUT_LOCKS,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn made(folder: &Path, name: &str, age: Duration) -> File {
+        let file = File::create(folder.join(name)).unwrap();
+        file.set_modified(SystemTime::now() - age).unwrap();
+        file
+    }
+
+    #[test]
+    fn names_are_short_ours_and_never_the_same() {
+        let names: HashSet<String> = (0..1_000).map(|_| temporary_name()).collect();
+        assert_eq!(names.len(), 1_000);
+        assert!(names.iter().all(|name| is_temporary(name) && name.len() < 30), "{names:?}");
+        for other in
+            [".rayfold-.part", ".rayfold-0123456789ab", "rayfold-0123456789ab.part", ".a.gif.1-1.part"]
+        {
+            assert!(!is_temporary(other), "{other}");
+        }
+    }
+
+    #[test]
+    fn what_a_killed_run_left_goes_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path();
+        let (old, young) = (AGE + Duration::from_secs(9), AGE - Duration::from_secs(9));
+        drop(made(path, ".rayfold-000000000001.part", old));
+        drop(made(path, ".rayfold-000000000002.part", young));
+        let running = made(path, ".rayfold-000000000003.part", old * 1_000);
+        running.try_lock().unwrap();
+        drop(made(path, ".rayfold-theirs.part", old));
+        drop(made(path, ".p.gif.1-1.part", old));
+        std::fs::create_dir(path.join(".rayfold-000000000004.part")).unwrap();
+        remove_older(path, SystemTime::now());
+        let mut names: Vec<_> =
+            path.read_dir().unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        assert_eq!(
+            names,
+            [
+                ".p.gif.1-1.part",
+                ".rayfold-000000000002.part",
+                ".rayfold-000000000003.part",
+                ".rayfold-000000000004.part",
+                ".rayfold-theirs.part",
+            ]
+        );
+        drop(running);
+        remove_older(path, SystemTime::now());
+        assert!(!path.join(".rayfold-000000000003.part").exists(), "its run has ended");
+    }
+}

@@ -1,0 +1,288 @@
+//! Writing: a temporary file that takes its place when it is whole.
+
+use std::fs::{File, Metadata, OpenOptions};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use crate::input::kind;
+use crate::leftover::{remove_leftovers, temporary_name};
+
+/// How many links may lead to one another, as the kernel counts.
+const MOST_LINKS: usize = 40;
+
+/// How many random names are tried; a second one is already unlikely.
+const MOST_NAMES: usize = 16;
+
+/// Why a file could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The folder that the file should lie in is not there.
+    #[error("cannot write {}: the folder {} does not exist", path.display(), folder.display())]
+    NoFolder {
+        /// The file.
+        path: PathBuf,
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// What the file should lie in is no folder.
+    #[error("cannot write {}: {} is no folder", path.display(), folder.display())]
+    NotAFolder {
+        /// The file.
+        path: PathBuf,
+        /// What is no folder.
+        folder: PathBuf,
+    },
+    /// Its place is taken by what a file must not replace.
+    #[error("cannot write {}: it is {what}", path.display())]
+    Taken {
+        /// The file.
+        path: PathBuf,
+        /// What stands there.
+        what: &'static str,
+    },
+    /// The system says no.
+    #[error("cannot write {}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+impl Error {
+    /// The same about another file, for which this one stood.
+    #[must_use]
+    pub fn about(mut self, file: PathBuf) -> Self {
+        match &mut self {
+            Self::NoFolder { path, .. }
+            | Self::NotAFolder { path, .. }
+            | Self::Taken { path, .. }
+            | Self::Io { path, .. } => *path = file,
+        }
+        self
+    }
+
+    /// Says whether there is such a file already, which [`OutputFile::write_new`] does not replace.
+    pub fn is_taken(&self) -> bool {
+        matches!(self, Self::Io { source, .. } if source.kind() == io::ErrorKind::AlreadyExists)
+    }
+}
+
+/// A file on its way. Dropping it unfinished removes what was written.
+#[derive(Debug)]
+pub struct OutputFile {
+    /// As the user named it, for messages.
+    path: PathBuf,
+    place: PathBuf,
+    temporary: Temporary,
+    file: File,
+}
+
+/// A temporary file's name, which is gone from the folder when this is dropped.
+#[derive(Debug)]
+struct Temporary(PathBuf);
+
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+impl OutputFile {
+    /// Begins to write `path`. An existing file stays as it is until [`finish`](Self::finish), and its mode and owner are
+    /// kept. A symbolic link is followed, also to a file that is not there yet.
+    ///
+    /// # Errors
+    /// When the folder is missing or not writable, or `path` is a folder, a device or a read-only file.
+    pub fn create(path: impl AsRef<Path>) -> Result<Self, Error> {
+        let path = path.as_ref();
+        let taken = |what| Error::Taken { path: path.to_path_buf(), what };
+        let failed = |source| Error::Io { path: path.to_path_buf(), source };
+        let existing = path.metadata().ok();
+        if let Some(existing) = &existing {
+            match kind(existing.file_type()) {
+                Some("a folder") => return Err(taken("a folder")),
+                Some(_) => return Err(taken("not a regular file")),
+                None => {}
+            }
+        }
+        let place = follow_links(path).map_err(failed)?;
+        if place.file_name().is_none() {
+            return Err(taken("not the name of a file"));
+        }
+        let folder = folder_of(&place);
+        if !folder.is_dir() && folder.symlink_metadata().is_ok() {
+            return Err(Error::NotAFolder { path: path.to_path_buf(), folder: folder.to_path_buf() });
+        }
+        if !folder.is_dir() {
+            return Err(Error::NoFolder { path: path.to_path_buf(), folder: folder.to_path_buf() });
+        }
+        match place.symlink_metadata() {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(failed(error)),
+            _ => {}
+        }
+        if let Some(existing) = &existing {
+            // Renaming would replace it all the same.
+            if existing.permissions().readonly() {
+                return Err(taken("read-only"));
+            }
+            OpenOptions::new().write(true).open(&place).map_err(failed)?;
+        }
+        remove_leftovers(folder);
+        let (temporary, file) = Temporary::create(folder, existing.as_ref()).map_err(failed)?;
+        Ok(Self { path: path.to_path_buf(), place, temporary, file })
+    }
+
+    /// Puts the file in its place. `durable`: only after the disk has it, which takes milliseconds a file.
+    ///
+    /// # Errors
+    /// When the last bytes cannot be written or the file cannot be renamed.
+    pub fn finish(self, durable: bool) -> Result<(), Error> {
+        self.settle(durable, |temporary, place| std::fs::rename(temporary, place))
+    }
+
+    fn settle(self, durable: bool, put: impl Fn(&Path, &Path) -> io::Result<()>) -> Result<(), Error> {
+        let Self { path, place, temporary, file } = self;
+        let synced = if durable { file.sync_all() } else { Ok(()) };
+        // The lock is held until the file has its name. Some systems do not rename open files.
+        let file = if cfg!(unix) { Some(file) } else { None };
+        let put = synced.and_then(|()| put(&temporary.0, &place));
+        drop(file);
+        put.map_err(|source| Error::Io { path, source })
+    }
+
+    /// Writes a whole file.
+    ///
+    /// # Errors
+    /// See [`create`](Self::create) and [`finish`](Self::finish).
+    pub fn write(path: impl AsRef<Path>, bytes: impl AsRef<[u8]>, durable: bool) -> Result<(), Error> {
+        Self::with(path.as_ref(), bytes.as_ref())?.finish(durable)
+    }
+
+    /// Writes a whole file that is not there yet, and never replaces another.
+    ///
+    /// # Errors
+    /// See [`write`](Self::write); [`Error::is_taken`] when there is such a file.
+    pub fn write_new(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Error> {
+        let path = path.as_ref();
+        if path.symlink_metadata().is_ok() {
+            return Err(Error::Io { path: path.to_path_buf(), source: io::ErrorKind::AlreadyExists.into() });
+        }
+        Self::with(path, bytes)?.settle(true, |temporary, place| {
+            // Unlike a rename it refuses a name that is taken. Some file systems have no second names.
+            match std::fs::hard_link(temporary, place) {
+                Err(error) if error.kind() != io::ErrorKind::AlreadyExists && !place.exists() => {
+                    std::fs::rename(temporary, place)
+                }
+                linked => linked,
+            }
+        })
+    }
+
+    fn with(path: &Path, bytes: &[u8]) -> Result<Self, Error> {
+        let mut out = Self::create(path)?;
+        out.write_all(bytes).map_err(|source| Error::Io { path: path.to_path_buf(), source })?;
+        Ok(out)
+    }
+}
+
+impl Write for OutputFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Temporary {
+    /// Makes a file in a folder, with the mode and owner that an existing one has, or that any new file gets.
+    fn create(folder: &Path, existing: Option<&Metadata>) -> io::Result<(Self, File)> {
+        let mut options = OpenOptions::new();
+        options.write(true).create_new(true);
+        #[cfg(unix)]
+        if existing.is_some() {
+            use std::os::unix::fs::OpenOptionsExt;
+            // Nobody else reads it before it has the mode of the file that it replaces.
+            options.mode(0o600);
+        }
+        let mut tries = 0;
+        let (path, file) = loop {
+            let path = folder.join(temporary_name());
+            tries += 1;
+            match options.open(&path) {
+                Ok(file) => break (path, file),
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists && tries < MOST_NAMES => {}
+                Err(error) => return Err(error),
+            }
+        };
+        unfinished().push(path.clone());
+        let temporary = Self(path);
+        // Where there are no locks, leftovers are told by their age alone.
+        let _ = file.try_lock();
+        if let Some(existing) = existing {
+            #[cfg(unix)]
+            {
+                use std::os::unix::fs::{MetadataExt, fchown};
+                let ours = file.metadata()?;
+                if (ours.uid(), ours.gid()) != (existing.uid(), existing.gid()) {
+                    // Only root may give a file away.
+                    let _ = fchown(&file, Some(existing.uid()), Some(existing.gid()));
+                }
+            }
+            file.set_permissions(existing.permissions())?;
+        }
+        Ok((temporary, file))
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        // After a rename there is no such file, and its name is nobody else's.
+        let _ = std::fs::remove_file(&self.0);
+        unfinished().retain(|path| *path != self.0);
+    }
+}
+
+/// Says now what [`OutputFile::create`] would say later, so that no work is done in vain.
+///
+/// # Errors
+/// When no file can be written at `path`.
+pub fn probe(path: &Path) -> Result<(), Error> {
+    OutputFile::create(path).map(drop)
+}
+
+/// Removes the temporary files of this program, which is about to end without dropping anything.
+pub fn remove_unfinished() {
+    for path in &*unfinished() {
+        let _ = std::fs::remove_file(path);
+    }
+}
+
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The path that a symbolic link leads to, whether or not there is such a file.
+fn follow_links(path: &Path) -> io::Result<PathBuf> {
+    if let Ok(place) = path.canonicalize() {
+        return Ok(place);
+    }
+    let mut place = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        match place.read_link() {
+            Ok(target) => place = folder_of(&place).join(target),
+            Err(_) => return Ok(place),
+        }
+    }
+    Err(io::Error::other("its links lead in a circle"))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+#[cfg(test)]
+mod tests;
