@@ -154,11 +154,17 @@ fn each_part(shape: &Shape, mut each: impl FnMut(Surface)) {
 /// each step of a test.
 const WRITTEN: f64 = 1.0 / 16.0;
 
+/// How many times what is seen from the eye they may be: farther away the roundings of the script's numbers are large for what is
+/// seen, and surfaces are where the numbers say.
+const FARTHEST: f64 = (1u64 << 19) as f64;
+
 /// The largest numbers that take part in where an object lies, along each axis, as lengths of the kernels: seen from the eye, and
 /// with less weight those of its line, of its group and of the eye.
 fn sizes(object: &Object, geometry: &Geometry) -> DVec3 {
     let center = geometry.center;
-    (numbers(object, center) + WRITTEN * (numbers(object, DVec3::ZERO) + center.abs())) * geometry.scale
+    let seen = numbers(object, center);
+    let written = WRITTEN * (numbers(object, DVec3::ZERO) + center.abs());
+    (seen + written.min(DVec3::splat(FARTHEST * seen.max_element()))) * geometry.scale
 }
 
 /// The same for coordinates whose origin is `center`.
