@@ -4,7 +4,7 @@
 //! then by where they lie. What stands together is compared pair by pair, as far as one lies over the other.
 
 use glam::DVec3;
-use rayfold_scene::{Instance, Object, Scene};
+use rayfold_scene::{Object, Scene};
 
 use super::surface::{ASIDE, Flat, Plain, SAME, Surface};
 use crate::fast::geometry::Geometry;
@@ -150,41 +150,51 @@ fn each_part(shape: &Shape, mut each: impl FnMut(Surface)) {
     }
 }
 
-/// The largest numbers that take part in where an object lies, along each axis: those of its line, of its group and of the
-/// eye, as lengths of the kernels.
+/// The part of the numbers of the script that rounding errors are relative to: those are rounded once or twice, and not in
+/// each step of a test.
+const WRITTEN: f64 = 1.0 / 16.0;
+
+/// How many times what is seen from the eye they may be: farther away the roundings of the script's numbers are large for what is
+/// seen, and surfaces are where the numbers say.
+const FARTHEST: f64 = (1u64 << 19) as f64;
+
+/// The largest numbers that take part in where an object lies, along each axis, as lengths of the kernels: seen from the eye, and
+/// with less weight those of its line, of its group and of the eye.
 fn sizes(object: &Object, geometry: &Geometry) -> DVec3 {
-    let numbers = match object {
-        Object::Instance(instance) => of_group(instance),
-        object => of_line(object),
-    };
-    (numbers + geometry.center.abs()) * geometry.scale
+    let center = geometry.center;
+    let seen = numbers(object, center);
+    let written = WRITTEN * (numbers(object, DVec3::ZERO) + center.abs());
+    (seen + written.min(DVec3::splat(FARTHEST * seen.max_element()))) * geometry.scale
 }
 
-fn of_group(instance: &Instance) -> DVec3 {
+/// The same for coordinates whose origin is `center`.
+fn numbers(object: &Object, center: DVec3) -> DVec3 {
+    let Object::Instance(instance) = object else { return of_line(object, center) };
     let placement = instance.placement();
     let rotation = placement.rotation();
-    let local = placement.scale() * of_line(instance.object());
+    let local = placement.scale() * of_line(instance.object(), DVec3::ZERO);
     let turned =
         rotation.x_axis.abs() * local.x + rotation.y_axis.abs() * local.y + rotation.z_axis.abs() * local.z;
-    placement.translation().abs() + turned
+    (placement.translation() - center).abs() + turned
 }
 
-fn of_line(object: &Object) -> DVec3 {
+fn of_line(object: &Object, center: DVec3) -> DVec3 {
+    let far = |point: DVec3| (point - center).abs();
     // How far a circle square to a direction reaches along each axis.
     let circle = |direction: DVec3| {
         let direction = direction.normalize_or_zero();
         (1.0 - direction * direction).max(DVec3::ZERO).map(f64::sqrt)
     };
-    let of_ends = |[a, b]: [DVec3; 2], radius: f64| a.abs().max(b.abs()) + radius * circle(b - a);
+    let of_ends = |[a, b]: [DVec3; 2], radius: f64| far(a).max(far(b)) + radius * circle(b - a);
     match object {
-        Object::Sphere(o) => o.center().abs() + o.radius(),
-        Object::Triangle(o) => o.vertices().iter().fold(DVec3::ZERO, |most, v| most.max(v.abs())),
-        Object::Cuboid(o) => o.min().abs().max(o.max().abs()),
-        Object::Plane(o) => o.point().abs(),
-        Object::Disc(o) => o.center().abs() + o.radius() * circle(o.normal()),
+        Object::Sphere(o) => far(o.center()) + o.radius(),
+        Object::Triangle(o) => o.vertices().iter().fold(DVec3::ZERO, |most, v| most.max(far(*v))),
+        Object::Cuboid(o) => far(o.min()).max(far(o.max())),
+        Object::Plane(o) => far(o.point()),
+        Object::Disc(o) => far(o.center()) + o.radius() * circle(o.normal()),
         Object::Cylinder(o) => of_ends(o.ends(), o.radius()),
         Object::Cone(o) => of_ends(o.ends(), o.radii()[0].max(o.radii()[1])),
-        Object::Torus(o) => o.center().abs() + o.radius() * circle(o.normal()) + o.thickness(),
+        Object::Torus(o) => far(o.center()) + o.radius() * circle(o.normal()) + o.thickness(),
         // None is in another.
         Object::Instance(_) => DVec3::ZERO,
     }
@@ -196,7 +206,7 @@ mod tests {
 
     use glam::DMat3;
     use rayfold_scene::{
-        Camera, Cuboid, Cylinder, Disc, Material, Placement, Screen, Sphere, Torus, Triangle,
+        Camera, Cuboid, Cylinder, Disc, Instance, Material, Placement, Screen, Sphere, Torus, Triangle,
     };
 
     use super::*;
