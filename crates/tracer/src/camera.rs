@@ -41,7 +41,8 @@ impl Axis {
 
     /// From the first of so many pixels to the last; a single one lies in the middle.
     fn between(from: f64, to: f64, pixels: u32, single: Single) -> Self {
-        if pixels == 1 {
+        // For its distance a window may be so small that nothing is left of it.
+        if pixels == 1 || from == to {
             let step = match single {
                 Single::IsAPoint => 0.0,
                 Single::IsAll => to - from,
