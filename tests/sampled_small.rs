@@ -220,6 +220,27 @@ fn a_star_that_drifts_is_there_in_every_frame() {
     }
 }
 
+/// Two pixels and more from one moment that is looked at to the next.
+#[test]
+fn stars_that_are_fast_leave_traces_without_gaps() {
+    for way in [2.0, 30.0, 90.0] {
+        let mut text = "Screen 64 48\nLook 0 0 5 0 0 0 40\nShutter .5\nFrames 3\n".to_owned();
+        for k in 0..12 {
+            let y = 3.3 * f64::from(k) - 18.0;
+            writeln!(text, "Sphere .45 (1:-{way} 3:{way}) (1:{y:.1} 3:{:.1}) -60 1 1 1 0 0 0", y + 2.0)
+                .unwrap();
+        }
+        text.push_str("Trace\n");
+        let script = script(&text);
+        let exact = light(&frame(&script, 1, 256, 0.0));
+        for error in [4.0, 1.0] {
+            let share = light(&frame(&script, 1, 256, error)) / exact;
+            println!("{way}, an error of {error}: {share:.3} of {exact}");
+            assert!((0.95..=1.05).contains(&share), "{way} {error}: {share} of {exact}");
+        }
+    }
+}
+
 #[test]
 fn a_fence_far_away_stands_whole() {
     let mut text =
