@@ -106,11 +106,11 @@ impl Gauge {
                 let of_girth = if far > 0.0 { girth / (far * eye.pixel) } else { f64::INFINITY };
                 // What reaches behind the eye has no outline of few points.
                 let is_ahead = points.iter().all(|p| ahead(p) > 1e-6 * p.distance(eye.at));
-                let on_screen = |p: &DVec3| {
-                    let way = *p - eye.at;
-                    DVec2::new(way.dot(eye.right), way.dot(eye.up)) / (ahead(p) * eye.pixel)
-                };
-                if is_ahead { across(points.iter().map(on_screen)).min(of_girth) } else { of_girth }
+                if is_ahead {
+                    across(points.iter().map(|p| self.on_screen(*p))).min(of_girth)
+                } else {
+                    of_girth
+                }
             }
         };
         let counts = |width: f64| if *is_flat && width < VANISHING { f64::INFINITY } else { width };
@@ -127,6 +127,20 @@ impl Gauge {
             counts(across(flat) / self.pixel(middle))
         });
         Width { seen, least: lit.fold(seen, f64::min) }
+    }
+
+    /// Where a point is seen, in pixels.
+    fn on_screen(&self, p: DVec3) -> DVec2 {
+        let Some(eye) = self.eye else { return p.truncate() };
+        let way = p - eye.at;
+        DVec2::new(way.dot(eye.right), way.dot(eye.up)) / (-way.dot(eye.back) * eye.pixel)
+    }
+
+    /// By how many pixels an object moves from here to another moment, at most; 0 where that is not a number.
+    pub(super) fn drift(&self, hull: &Hull, other: &Self, later: &Hull) -> f64 {
+        let pairs = hull.points.iter().zip(&later.points);
+        let drifts = pairs.map(|(p, q)| self.on_screen(*p).distance(other.on_screen(*q)));
+        drifts.filter(|drift| drift.is_finite()).fold(0.0, f64::max)
     }
 
     /// The width of a highlight on a curved object.

@@ -89,8 +89,11 @@ impl<'a> Scouts<'a> {
         let step = moments.len().div_ceil(most);
         let options = RenderOptions { precision: Precision::F64, sampler: Sampler::default(), ..*options };
         let mut all = vec![];
-        for moment in moments.iter().skip(step / 2).step_by(step) {
-            for (without, with, marks) in pairs(moment) {
+        let moments: Vec<&Scene> = moments.iter().skip(step / 2).step_by(step).collect();
+        for (k, moment) in moments.iter().enumerate() {
+            let near = [k.checked_sub(1), Some(k + 1)].into_iter().flatten();
+            let near: Vec<&Scene> = near.filter_map(|k| moments.get(k).copied()).collect();
+            for (without, with, marks) in pairs(moment, &near) {
                 let ready = |scene| ready(scene, options);
                 if let (Some(without), Some(with)) = (ready(without)?, ready(with)?) {
                     all.push(Pair { without, with, marks });
@@ -144,9 +147,17 @@ impl Marks {
 /// Two scenes without narrow objects and with stand-ins for them.
 type Compared = (Scene, Scene, Marks);
 
-/// What is compared of a scene, if anything is.
-fn pairs(scene: &Scene) -> Vec<Compared> {
+/// What is compared of a scene, if anything is; `near` is what it is at the moments before and after.
+fn pairs(scene: &Scene, near: &[&Scene]) -> Vec<Compared> {
     let gauge = Gauge::new(scene);
+    let near: Vec<(&Scene, Gauge)> = near.iter().map(|scene| (*scene, Gauge::new(scene))).collect();
+    let drift = |at: usize| {
+        let Some(here) = hull(&scene.objects[at]) else { return 0.0 };
+        let drifts = near
+            .iter()
+            .filter_map(|(scene, other)| Some(gauge.drift(&here, other, &hull(scene.objects.get(at)?)?)));
+        drifts.fold(0.0, f64::max)
+    };
     let widths = widths(&scene.objects, &gauge);
     let of = |object: &Object| object.material().finish().copied().unwrap_or_default();
     let is_indirect = !scene.lights.is_empty()
@@ -158,18 +169,18 @@ fn pairs(scene: &Scene) -> Vec<Compared> {
                 || pattern.is_some_and(|pattern| is_mirror(pattern.other.mirror()))
         });
     let mut pairs = vec![];
-    pairs.extend(pair(scene, &gauge, &widths, (NARROW, WIDER), false));
+    pairs.extend(pair(scene, (&gauge, &widths, &drift), (NARROW, WIDER), false));
     if is_indirect {
-        pairs.extend(pair(scene, &gauge, &widths, (NARROW_INDIRECTLY, WIDER_INDIRECTLY), true));
+        pairs.extend(pair(scene, (&gauge, &widths, &drift), (NARROW_INDIRECTLY, WIDER_INDIRECTLY), true));
     }
     pairs
 }
 
-/// What is narrower than so many pixels, and so many pixels wider.
+/// What is narrower than so many pixels, and so many pixels wider. `drift` is by how many pixels an object moves until the next
+/// moment that is looked at.
 fn pair(
     scene: &Scene,
-    gauge: &Gauge,
-    widths: &[Width],
+    (gauge, widths, drift): (&Gauge, &[Width], &dyn Fn(usize) -> f64),
     (narrow, wider): (f64, f64),
     is_indirect: bool,
 ) -> Option<Compared> {
@@ -177,10 +188,12 @@ fn pair(
     let (mut stand_ins, mut floors) = (vec![], vec![]);
     let mut widener = Widener::new(gauge, wider);
     let mut is_any = false;
-    for (object, width) in scene.objects.iter().zip(widths) {
+    for (at, (object, width)) in scene.objects.iter().zip(widths).enumerate() {
         if width.least < narrow {
-            let made = widener.stand_ins(object);
-            let wanted = SEEN / width.seen;
+            let drift = drift(at);
+            let made = widener.stand_ins(object, 0.5 * drift);
+            // What moves is in a pixel for a part of the time.
+            let wanted = SEEN * (1.0 + drift * MOMENTS as f64) / width.seen;
             let floor = FLOORS.iter().position(|&floor| f64::from(floor) >= wanted).unwrap_or(ALL);
             floors.extend(made.iter().map(|_| floor as u8));
             stand_ins.extend(made);

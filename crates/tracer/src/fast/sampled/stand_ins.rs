@@ -30,9 +30,11 @@ impl<'a> Widener<'a> {
         Self { gauge, pixels, material, made: vec![] }
     }
 
-    /// Those of an object.
-    pub(super) fn stand_ins(&mut self, object: &Object) -> Vec<Object> {
+    /// Those of an object, wider by some pixels more.
+    pub(super) fn stand_ins(&mut self, object: &Object, more: f64) -> Vec<Object> {
+        self.pixels += more;
         self.widen(object);
+        self.pixels -= more;
         core::mem::take(&mut self.made)
     }
 
