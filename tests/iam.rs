@@ -19,7 +19,7 @@ use stage::stores::on_every_store;
 const BUCKET: &str = "films";
 
 /// One of each kind, and some that the pipeline knows nothing of.
-const KEYS: [&str; 21] = [
+const KEYS: [&str; 23] = [
     "scripts/a/1.txt",
     "scripts/a/animation.json",
     "parts/a/1@v-p1/2.json",
@@ -33,7 +33,9 @@ const KEYS: [&str; 21] = [
     "frames/a/1@v-p1.2-of-3.band",
     "frames/a/1@v-p1/2.cut-3",
     "frames/a/1@v-p1/2.2-of-3.band",
+    "frames/a/@assembler.json",
     "manifests/a.json",
+    "manifests/a.json~0123456789abcdef",
     "assemblies/a/1-g.json",
     "retries/a/1@v-p1/1",
     "checkpoints/a.state",
@@ -69,36 +71,40 @@ fn allowed(role: &str) -> Vec<(&'static str, Vec<&'static str>)> {
             .collect()
     };
     let errors = ["frames/a/1@v-p1.error.json", "frames/a/1@v-p1/2.error.json"];
+    let receipts = || keys(&["frames/"]).into_iter().filter(|key| !key.ends_with('/'));
+    // All but the assembler's lease.
+    let results: Vec<&str> = receipts().filter(|key| !key.ends_with("@assembler.json")).collect();
+    let frames: Vec<&str> = receipts().filter(|key| key.ends_with(".png")).collect();
     let bands = ["frames/a/1@v-p1.2-of-3.band", "frames/a/1@v-p1/2.2-of-3.band"];
     match role {
         "render" => vec![
             ("list", keys(&["scripts/", "parts/", "frames/"])),
             ("read", [keys(&["scripts/", "parts/", "manifests/"]), errors.to_vec(), bands.to_vec()].concat()),
-            ("put", keys(&["parts/", "frames/", "manifests/", "assemblies/"])),
-            ("upload", keys(&["parts/", "frames/", "manifests/", "assemblies/"])),
+            ("put", [keys(&["parts/", "manifests/", "assemblies/"]), results.clone()].concat()),
+            ("upload", [keys(&["parts/", "manifests/", "assemblies/"]), results].concat()),
             ("delete", vec![]),
         ],
         "assemble" => {
             let written = keys(&["manifests/", "animations/", "retries/", "assemblies/", "checkpoints/"]);
-            let written = [written, errors.to_vec()].concat();
+            let written = [written, errors.to_vec(), vec!["frames/a/@assembler.json"]].concat();
             vec![
                 ("list", keys(&["scripts/", "parts/", "frames/", "manifests/", "retries/"])),
                 ("read", keys(&["scripts/", "frames/", "manifests/", "checkpoints/", "animations/"])),
                 ("put", written.clone()),
                 ("upload", written),
-                ("delete", keys(&["parts/", "frames/", "checkpoints/", "animations/"])),
+                ("delete", keys(&["parts/", "frames/", "manifests/a.json~", "checkpoints/", "animations/"])),
             ]
         }
         "viewer" => vec![
             ("list", keys(&["scripts/", "manifests/"])),
-            ("read", keys(&["frames/", "manifests/", "animations/"])),
+            ("read", [keys(&["manifests/", "animations/"]), frames].concat()),
             ("put", vec![]),
             ("upload", vec![]),
             ("delete", vec![]),
         ],
         "uploader" => vec![
             ("list", keys(&["scripts/", "manifests/"])),
-            ("read", keys(&["scripts/", "frames/", "manifests/", "animations/"])),
+            ("read", [keys(&["scripts/", "manifests/", "animations/"]), frames].concat()),
             ("put", keys(&["scripts/"])),
             ("upload", keys(&["scripts/"])),
             ("delete", keys(&["scripts/"])),

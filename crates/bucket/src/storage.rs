@@ -126,7 +126,7 @@ impl Storage {
             let _ = wait.recv_timeout(REOPENING);
             open = read(&self.current).clone()?;
         }
-        Snapshot::of_database(open).map_err(|error| Unavailable::Failed(error.to_string().into()))
+        open.kept_snapshot().map_err(|error| Unavailable::Failed(error.to_string().into()))
     }
 
     /// Runs a function on the tables, alone; on return its changes are on the disk. What it gives may say that it changed

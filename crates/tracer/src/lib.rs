@@ -44,7 +44,7 @@ use rayfold_scene::{Scene, Script};
 pub use sampling::Sampler;
 
 /// Raised whenever any scene's pixels change, so that a picture can be known to be out of date.
-pub const PIXEL_VERSION: u32 = 2;
+pub const PIXEL_VERSION: u32 = 3;
 
 /// How often light is mirrored before the mirror term is dropped, where a script does not say it.
 pub const MAX_BOUNCES: u32 = 5;

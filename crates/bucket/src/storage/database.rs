@@ -82,6 +82,11 @@ impl Open {
         Ok(transaction.commit()?)
     }
 
+    /// The rows as they are, which can be read also when the store opens the database anew.
+    pub(super) fn kept_snapshot(self: Arc<Self>) -> Result<Snapshot, redb::Error> {
+        Ok(self.snapshot()?.keeping(self))
+    }
+
     /// Brings everything to the disk, in a state that opens at once; it is there if [`Open::has_room`].
     pub(super) fn commit_durably(
         &self,

@@ -381,7 +381,7 @@ impl Copy {
             disk.set_lenient(lenient);
             // Nothing is kept in memory, so that each read is compared.
             let (open, applied) = Open::with_cache(disk.clone(), !lenient, 0)?;
-            let rows = Snapshot::of_database(Arc::new(open))?;
+            let rows = Arc::new(open).kept_snapshot()?;
             disk.set_lenient(false);
             Ok((disk, rows, applied))
         };

@@ -3,12 +3,12 @@
 //! Knows no record: what a row means is `records`' business. A batch remembers every row that it changes, so that the
 //! journal can be written before the database.
 
+use std::any::Any;
 use std::sync::Arc;
 
 use redb::{ReadOnlyTable, ReadTransaction, ReadableTable, StorageError, TableDefinition, WriteTransaction};
 
 use super::bodies::{BodyId, NewBody};
-use super::database::Open;
 
 /// A row's key and value.
 pub(crate) type Row = (Vec<u8>, Vec<u8>);
@@ -121,7 +121,7 @@ pub(crate) trait View {
 pub(crate) struct Snapshot {
     tables: [Read; Table::ALL.len()],
     /// Its database: closed, it would answer nothing more.
-    _database: Option<Arc<Open>>,
+    _database: Option<Arc<dyn Any + Send + Sync>>,
 }
 
 impl Snapshot {
@@ -132,9 +132,9 @@ impl Snapshot {
         Ok(Self { tables, _database: None })
     }
 
-    /// The same, which can be read also when the database is opened anew.
-    pub(super) fn of_database(database: Arc<Open>) -> Result<Self, redb::Error> {
-        Ok(Self { _database: Some(database.clone()), ..database.snapshot()? })
+    /// Keeps the database open for as long as this snapshot is read, also when the store opens it anew.
+    pub(super) fn keeping(self, database: Arc<dyn Any + Send + Sync>) -> Self {
+        Self { _database: Some(database), ..self }
     }
 }
 

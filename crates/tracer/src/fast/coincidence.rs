@@ -18,11 +18,12 @@ use rayfold_scene::{Material, Object, Scene};
 
 use self::touching::{MEANT, faces_blur, ring_on_plane, ring_on_sphere};
 use super::bounds::{Bounds, join};
-use super::geometry::{Geometry, View};
+use super::geometry::Geometry;
 use super::placed::{Face, Placed};
 use super::real::Real;
 use super::shapes::{Shape, Solid};
 use super::tree::{Branches, Part};
+use super::view::View;
 
 /// Surfaces nearer than this to each other, in roundoffs of their coordinates, may be met at one distance.
 const ONE_SURFACE: f64 = 6.0;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use rayfold_scene::model::unit;
-use rayfold_scene::{Camera, Lamp, Light, Object, Scene, Screen};
+use rayfold_scene::{Camera, Lamp, Light, Object, Scene};
 
 use super::bodies;
 use super::bounds::{Bounds, join};
@@ -20,21 +20,11 @@ use super::planes;
 use super::shapes::{Shape, Solid, reach};
 use super::shared::SharedSurfaces;
 use super::tree::{Branches, Copies, Part, group};
-use crate::camera::{Axis, Single, grid, look_grid};
+use super::view::{View, middle, view};
+use crate::RenderError;
 use crate::parallel::map;
 use crate::sampling::places::spread;
 use crate::scale::below_inverse;
-use crate::{Precision, RenderError, RenderOptions};
-
-/// Where the rays of the pixels come from.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum View {
-    /// The eye is the origin; `right`, `up` and `back` are orthonormal. The ray of column `i` and row `j` (from the
-    /// bottom) goes along `x.at(i)·right + y.at(j)·up - back`.
-    Pinhole { right: DVec3, up: DVec3, back: DVec3, x: Axis, y: Axis },
-    /// The ray starts at `corner + (i·pixel, j·pixel, 0)` and goes along `(0, 0, -1)`.
-    Parallel { corner: DVec3, pixel: f64 },
-}
 
 /// A scene, recentred and scaled.
 #[derive(Clone, Debug)]
@@ -137,21 +127,6 @@ impl Geometry {
         self
     }
 
-    /// With the objects that share surfaces.
-    pub(super) fn with_shared_surfaces(mut self, scene: &Scene) -> Self {
-        self.shared = SharedSurfaces::find(&self, scene);
-        self
-    }
-
-    /// The same for single precision where that was asked for: where it is chosen, no surfaces are shared but those that it
-    /// meets at the same distance bit for bit.
-    pub(super) fn with_shared_surfaces_if_single(self, scene: &Scene, options: &RenderOptions) -> Self {
-        match options.precision {
-            Precision::F32 => self.with_shared_surfaces(scene),
-            Precision::Auto | Precision::F64 => self,
-        }
-    }
-
     /// How near to the origin a solid's surface comes, at least.
     pub(super) fn nearest(&self) -> f64 {
         let of = |solids: &[Solid]| solids.iter().map(|s| s.shape.nearest()).fold(f64::INFINITY, f64::min);
@@ -195,27 +170,4 @@ fn lamps(scene: &Scene) -> impl Iterator<Item = &Lamp> {
         Light::Lamp(lamp) => Some(lamp),
         Light::Directional(_) => None,
     })
-}
-
-fn middle(screen: Screen) -> DVec3 {
-    DVec3::new(f64::from(screen.width()), f64::from(screen.height()), 0.0) / 2.0
-}
-
-/// Where the rays of a scene's pixels come from, in lengths of `scale`.
-pub(super) fn view(scene: &Scene, scale: f64) -> View {
-    match &scene.camera {
-        Camera::Orthographic => View::Parallel { corner: -middle(scene.screen) * scale, pixel: scale },
-        Camera::Pinhole(pinhole) => {
-            let (right, up, back) = pinhole.basis();
-            let from = pinhole.lower_left() / pinhole.distance();
-            let to = pinhole.upper_right() / pinhole.distance();
-            let (x, y) = grid(from, to, scene.screen, Single::of(scene));
-            View::Pinhole { right, up, back, x, y }
-        }
-        Camera::Look(look) => {
-            let (right, up, back) = look.basis();
-            let (x, y) = look_grid(look, scene.screen);
-            View::Pinhole { right, up, back, x, y }
-        }
-    }
 }

@@ -54,6 +54,7 @@ mod ties;
 mod tile;
 mod tone;
 mod tree;
+mod view;
 mod waiting;
 mod window;
 

@@ -15,12 +15,13 @@ use rayfold_scene::Scene;
 use super::beyond::is_needed;
 use super::bodies;
 use super::coincidence::surfaces_blur;
-use super::geometry::{Geometry, View};
+use super::geometry::Geometry;
 use super::glass::SURFACES_OF_ONE;
 use super::placed::{Placed, Sight};
 use super::real::Real;
 use super::rounding::OFFSET;
 use super::shapes::{Shape, Solid};
+use super::view::View;
 use crate::camera::Axis;
 use crate::{Precision, RenderOptions};
 

@@ -8,9 +8,9 @@ use fearless_simd::prelude::*;
 use glam::DVec3;
 use rayfold_scene::model::unit;
 
-use super::geometry::View;
 use super::real::{Lanes, Real, Vec3, splat};
 use super::rounding::TURNED;
+use super::view::View;
 use crate::camera::Axis;
 
 /// The rays of a view.

@@ -2,30 +2,20 @@
 //!
 //! Two objects may have a part of their surfaces in common: a label and its bottle, a picture and the wall it hangs on. A
 //! ray meets each at a distance of its own, some roundoffs apart, so that the nearest hit alone would be a matter of chance.
-//! Before the first pixel the pairs of such objects are found by their numbers, in `f64` ([`SharedSurfaces::find`]). When a
+//! Before the first pixel the pairs of such objects are found by their numbers, in `f64` (`pairs`). When a
 //! ray has met an object of a pair, those that come before it are asked again: the first that is met within the bound on
-//! the rounding errors of both is what the ray meets ([`SharedSurfaces::settle`]). So what is seen depends on neither the
+//! the rounding errors of both is what the ray meets (`settle`). So what is seen depends on neither the
 //! order in which objects are looked for nor what is looked for besides.
 //!
 //! Objects whose hits are the same bit for bit need no pair: faces that are square to an axis, and triangles whose planes
 //! have the same numbers.
 
 mod pairs;
+mod settle;
 mod surface;
 
-use fearless_simd::Simd;
-use fearless_simd::prelude::*;
-
-use self::pairs::Pair;
 pub(super) use self::surface::{Flat, Plain, Ring, Side, Surface};
-use super::beyond::Beyond;
-use super::bounce::{Hits, Queue};
-use super::features::Features;
-use super::geometry::Geometry;
-use super::packet::{self, Nearest, Ray};
-use super::prepare::{Entry, Prepared};
-use super::real::{Lanes, Real, Vec3, constant, splat};
-use super::surfaces::surface;
+use super::real::Real;
 
 /// How far apart hits may be that count as equal, in roundoffs of the numbers of both objects and of the distance: as far as
 /// surfaces may lie apart that are meant to be one ([`surface::SAME`]), and as far again as the tests of bodies may err.
@@ -50,18 +40,22 @@ struct Earlier {
     size: f64,
 }
 
+/// Two objects that share a surface, by their positions in the script.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Pair {
+    first: u32,
+    second: u32,
+    /// How large the numbers are that say where the surface lies.
+    size: f64,
+}
+
 impl SharedSurfaces {
-    /// The objects of a scene that share surfaces, if there are any.
-    pub(super) fn find(geometry: &Geometry, scene: &rayfold_scene::Scene) -> Option<Self> {
-        let pairs = pairs::find(geometry, scene);
-        if pairs.is_empty() {
-            return None;
-        }
-        let count = scene.objects.len();
+    /// The objects of a scene of `count` that share surfaces, by their pairs, sorted by the second object and then by the first.
+    fn of_pairs(pairs: &[Pair], count: usize) -> Self {
         let mut starts = vec![0u32; count + 1];
         let mut sizes = vec![0f64; count];
         let mut earlier = Vec::with_capacity(pairs.len());
-        for &Pair { first, second, size } in &pairs {
+        for &Pair { first, second, size } in pairs {
             starts[second as usize + 1] += 1;
             earlier.push(Earlier { order: first, size });
             for order in [first, second] {
@@ -71,7 +65,7 @@ impl SharedSurfaces {
         for at in 0..count {
             starts[at + 1] += starts[at];
         }
-        Some(Self { starts, earlier, sizes })
+        Self { starts, earlier, sizes }
     }
 
     /// Those that share a surface with an object and come before it.
@@ -83,133 +77,6 @@ impl SharedSurfaces {
     /// surface.
     fn offset<E: Real>(&self, order: E) -> E {
         E::narrow(EQUAL * E::ROUNDOFF * self.sizes[order.to_index()])
-    }
-
-    /// Makes of the nearest hits of a packet those that count.
-    #[inline(never)]
-    pub(super) fn settle<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
-        &self,
-        simd: S,
-        scene: &Prepared<E>,
-        ray: Ray<S, E>,
-        nearest: &mut Nearest<S, E>,
-    ) {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                let found = *nearest;
-                let mut orders = [E::narrow(0.0); 16];
-                found.order.store_slice(&mut orders[..Lanes::<S, E>::LEN]);
-                let hit = found.hit(simd);
-                let mut rest = hit.to_bitmask();
-                while rest != 0 {
-                    let order = orders[rest.trailing_zeros() as usize];
-                    let mut open = hit & found.order.simd_eq(splat::<S, E>(simd, order));
-                    rest &= !open.to_bitmask();
-                    let earlier = self.earlier(order.to_index());
-                    if earlier.is_empty() {
-                        continue;
-                    }
-                    let entry = &scene.entries[order.to_index()];
-                    let normal = surface::<S, E, F, EYE>(simd, scene, entry, ray, found.distance).normal;
-                    let climb = normal.dot(ray.direction).abs();
-                    let along = found.distance * constant::<S, E>(simd, EQUAL * E::ROUNDOFF);
-                    for Earlier { order, size } in earlier {
-                        let mut met = Nearest::none(simd);
-                        meet_one::<S, E, F, EYE>(simd, scene, &scene.entries[*order as usize], ray, &mut met);
-                        let apart = (met.distance - found.distance).abs() * climb;
-                        let slack = along + constant::<S, E>(simd, EQUAL * E::ROUNDOFF * size);
-                        let equal = open & met.hit(simd) & apart.simd_le(slack);
-                        nearest.distance = equal.select(met.distance, nearest.distance);
-                        nearest.order = equal.select(met.order, nearest.order);
-                        open &= !equal;
-                        if !open.any_true() {
-                            break;
-                        }
-                    }
-                }
-            },
-        );
-    }
-
-    /// Makes of the nearest hits of a queue those that count.
-    #[inline(never)]
-    pub(super) fn settle_all<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
-        &self,
-        simd: S,
-        scene: &Prepared<E>,
-        queue: &Queue<E>,
-        hits: &mut Hits<E>,
-    ) {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                for &(at, _) in &hits.packets {
-                    let lanes = at..at + Lanes::<S, E>::LEN;
-                    let origin = if EYE { Vec3::zero(simd) } else { Vec3::load(simd, &queue.origin, at) };
-                    let ray = Ray { origin, direction: Vec3::load(simd, &queue.direction, at) };
-                    let mut nearest = Nearest {
-                        distance: Lanes::<S, E>::from_slice(simd, &hits.distance.0[lanes.clone()]),
-                        order: Lanes::<S, E>::from_slice(simd, &hits.order.0[lanes.clone()]),
-                    };
-                    self.settle::<S, E, F, EYE>(simd, scene, ray, &mut nearest);
-                    nearest.distance.store_slice(&mut hits.distance.0[lanes.clone()]);
-                    nearest.order.store_slice(&mut hits.order.0[lanes]);
-                }
-            },
-        );
-    }
-
-    /// Lets the rays that go on from the hits of a queue start off all that shares the surface there.
-    pub(super) fn lift<E: Real>(&self, hits: &mut Hits<E>, lanes: usize) {
-        let Hits { distance, order, start, normal, sides, packets, .. } = hits;
-        for &(at, _) in &*packets {
-            for lane in at..at + lanes {
-                if distance.0[lane].widen() >= E::narrow(E::FAR).widen() {
-                    continue;
-                }
-                let offset = self.offset(order.0[lane]);
-                for axis in 0..3 {
-                    start[axis].0[lane] += normal[axis].0[lane] * offset;
-                }
-                sides[0].0[lane] += offset;
-            }
-        }
-    }
-
-    /// The same for a surface where rays meet the object of this order.
-    pub(super) fn lifted<S: Simd, E: Real>(
-        &self,
-        simd: S,
-        surface: packet::Surface<S, E>,
-        order: E,
-    ) -> packet::Surface<S, E> {
-        let offset = splat::<S, E>(simd, self.offset(order));
-        packet::Surface {
-            start: surface.normal.scale_add(offset, surface.start),
-            offset: surface.offset + offset,
-            ..surface
-        }
-    }
-}
-
-/// Offers where rays meet one object.
-#[inline(always)]
-fn meet_one<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
-    simd: S,
-    scene: &Prepared<E>,
-    entry: &Entry<E>,
-    ray: Ray<S, E>,
-    nearest: &mut Nearest<S, E>,
-) {
-    let index = entry.index as usize;
-    if entry.is_body {
-        if let Some(bodies) = scene.beyond.as_ref().and_then(Beyond::bodies) {
-            bodies.meet_one(simd, index, ray, nearest);
-        }
-    } else {
-        let only = (F::one_of_these(entry.kind), index..index + 1);
-        scene.shapes.meet::<S, F::By, EYE>(simd, only, ray, None, nearest);
     }
 }
 

@@ -4,12 +4,12 @@
 use glam::DVec3;
 
 use super::candidates::Picked;
-use super::geometry::View;
 use super::kind::Row;
 use super::lists::{LONGEST, Lists, Rectangle};
 use super::placed::Placed;
 use super::rounding::BOUNDS;
 use super::shapes::Shape;
+use super::view::View;
 use super::window::{Grid, axes};
 use crate::camera::Axis;
 

@@ -6,11 +6,11 @@
 
 use glam::DVec3;
 
-use super::geometry::View;
 use super::lens::Lens;
 use super::placed::Placed;
 use super::rounding::BOUNDS;
 use super::shapes::Shape;
+use super::view::View;
 use crate::camera::Axis;
 
 /// How an image is cut into tiles, and what a tile's rays are.

@@ -27,12 +27,13 @@ use super::dispatch::on;
 #[cfg(all(target_arch = "x86_64", feature = "narrow"))]
 use super::features::Unfitted;
 use super::features::{Fitted, Kernel};
-use super::geometry::{Geometry, View};
+use super::geometry::Geometry;
 use super::lens::Aperture;
 use super::prepare::Prepared;
 use super::real::Real;
 use super::shape::Robust;
 use super::shapes::Shape;
+use super::view::View;
 use super::window::{Grid, Window};
 use crate::parallel::{CHANNELS, image, whole_bands};
 use crate::sampling::film::{self, Band, Film, First, Wanted};

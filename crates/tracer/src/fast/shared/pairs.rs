@@ -7,8 +7,10 @@ use glam::DVec3;
 use rayfold_scene::{Object, Scene};
 
 use super::surface::{ASIDE, Flat, Plain, SAME, Surface};
+use super::{Pair, SharedSurfaces};
 use crate::fast::geometry::Geometry;
 use crate::fast::shapes::Shape;
+use crate::{Precision, RenderOptions};
 
 /// Parts that are compared at most: in a crowd of so many that all lie in one place, rounding decides about the rest.
 const MAX_COMPARED: usize = 1 << 25;
@@ -21,15 +23,6 @@ const TOGETHER: f64 = 1.0 / (1u64 << 32) as f64;
 
 /// How many times the rounding error of a place that of a direction may be: it grows as a part is small for its distance.
 const SMALL: f64 = 1024.0;
-
-/// Two objects that share a surface, by their positions in the script.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Pair {
-    pub(super) first: u32,
-    pub(super) second: u32,
-    /// How large the numbers are that say where the surface lies.
-    pub(super) size: f64,
-}
 
 /// A part of an object's surface.
 struct Part {
@@ -49,8 +42,30 @@ impl Part {
     }
 }
 
+impl Geometry {
+    /// With the objects that share surfaces.
+    pub(in crate::fast) fn with_shared_surfaces(mut self, scene: &Scene) -> Self {
+        let pairs = find(&self, scene);
+        self.shared = (!pairs.is_empty()).then(|| SharedSurfaces::of_pairs(&pairs, scene.objects.len()));
+        self
+    }
+
+    /// The same for single precision where that was asked for: where it is chosen, no surfaces are shared but those that it
+    /// meets at the same distance bit for bit.
+    pub(in crate::fast) fn with_shared_surfaces_if_single(
+        self,
+        scene: &Scene,
+        options: &RenderOptions,
+    ) -> Self {
+        match options.precision {
+            Precision::F32 => self.with_shared_surfaces(scene),
+            Precision::Auto | Precision::F64 => self,
+        }
+    }
+}
+
 /// The pairs of a scene, sorted by the second object and then by the first.
-pub(super) fn find(geometry: &Geometry, scene: &Scene) -> Vec<Pair> {
+fn find(geometry: &Geometry, scene: &Scene) -> Vec<Pair> {
     let material = scene.objects.first().map(Object::material);
     let is_plain = geometry.bodies.is_empty() && !geometry.is_finished;
     if is_plain && scene.objects.iter().all(|object| Some(object.material()) == material) {
