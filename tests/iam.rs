@@ -19,7 +19,7 @@ use stage::stores::on_every_store;
 const BUCKET: &str = "films";
 
 /// One of each kind, and some that the pipeline knows nothing of.
-const KEYS: [&str; 23] = [
+const KEYS: [&str; 25] = [
     "scripts/a/1.txt",
     "scripts/a/animation.json",
     "parts/a/1@v-p1/2.json",
@@ -33,6 +33,8 @@ const KEYS: [&str; 23] = [
     "frames/a/1@v-p1.2-of-3.band",
     "frames/a/1@v-p1/2.cut-3",
     "frames/a/1@v-p1/2.2-of-3.band",
+    "frames/a/1@v-p1.begun-2",
+    "frames/a/1@v-p1/2.begun-2",
     "frames/a/@assembler.json",
     "manifests/a.json",
     "manifests/a.json~0123456789abcdef",

@@ -164,7 +164,7 @@ impl<E: Real> Prepared<E> {
             Arc::new(Tree::new(branches, solids, |place| entries[solids[place].order as usize].index))
         });
         let pixels = if scene.samples.most() > 1 { None } else { Pixels::of(&geometry.view) };
-        let shapes = Shapes::new(solids, sorted, tree.clone(), pixels);
+        let shapes = Shapes::new(solids, sorted, tree.clone().map(|tree| tree as _), pixels);
         let alone = match (&solids[..], &geometry.view) {
             ([solid], View::Pinhole { .. }) if grid.lens.is_none() => {
                 !needs.mirrors && shapes.is_seen_from_outside(solid.shape.kind(), 0)

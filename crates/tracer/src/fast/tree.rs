@@ -18,7 +18,7 @@ use super::crowds::Crowds;
 use super::kind::Kind;
 use super::placed::Placed;
 use super::real::Real;
-use super::shapes::Solid;
+use super::shapes::{Neighbours, Solid};
 use crate::parallel::map;
 
 /// Objects of a leaf at most.
@@ -367,9 +367,10 @@ impl<E: Real> Tree<E> {
         };
         Self { nodes: place.iter().map(node).collect() }
     }
+}
 
-    /// Whether `is` holds of the objects of any leaf whose box has this one within it.
-    pub(super) fn any_around(&self, (min, max): Bounds, is: impl Fn(Kind, Range<usize>) -> bool) -> bool {
+impl<E: Real> Neighbours for Tree<E> {
+    fn any_around(&self, (min, max): Bounds, is: &dyn Fn(Kind, Range<usize>) -> bool) -> bool {
         let mut pending = vec![0];
         while let Some(at) = pending.pop() {
             let node: &Node<E> = &self.nodes[at];

@@ -7,6 +7,8 @@ pub(super) mod instance;
 pub(super) mod sphere;
 pub(super) mod triangle;
 
+use std::fmt::Debug;
+use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -27,7 +29,6 @@ use super::predicate::Corners;
 use super::rays::Pixels;
 use super::real::{Lanes, Mask, Real, Vec3};
 use super::shape::{Aim, Items, Obstructs, Tests};
-use super::tree::Tree;
 use crate::parallel::map;
 
 /// A shape in the kernels' coordinates.
@@ -194,9 +195,17 @@ struct Exact<E> {
     solids: Arc<Vec<Solid>>,
     triangles: Vec<u32>,
     /// Where triangles are, if they are many.
-    tree: Option<Arc<Tree<E>>>,
+    tree: Option<Arc<dyn Neighbours>>,
     /// If they are single rays from the eye.
     pixels: Option<Pixels>,
+    number: PhantomData<E>,
+}
+
+/// A place to look shapes up by their boxes: the tree, of which shapes know no more.
+pub(super) trait Neighbours: Debug + Send + Sync {
+    /// Whether `is` holds of the shapes of any group whose box has this one within it; they are of one kind, by their places
+    /// among those of that kind.
+    fn any_around(&self, bounds: Bounds, is: &dyn Fn(Kind, Range<usize>) -> bool) -> bool;
 }
 
 impl<E: Real> Corners for Exact<E> {
@@ -215,7 +224,7 @@ impl<E: Real> Corners for Exact<E> {
             other != at && corners.contains(&p) && corners.contains(&q) && apex.is_some_and(|apex| is(*apex))
         };
         match &self.tree {
-            Some(tree) => tree.any_around((p.min(q), p.max(q)), |kind, mut items| {
+            Some(tree) => tree.any_around((p.min(q), p.max(q)), &|kind, mut items| {
                 kind == Kind::Triangle && items.any(is_across)
             }),
             None => (0..self.triangles.len()).any(is_across),
@@ -242,7 +251,7 @@ impl<E: Real> Shapes<E> {
     pub(super) fn new(
         solids: &Arc<Vec<Solid>>,
         sorted: Sorted,
-        tree: Option<Arc<Tree<E>>>,
+        tree: Option<Arc<dyn Neighbours>>,
         pixels: Option<Pixels>,
     ) -> Self {
         Self {
@@ -251,7 +260,13 @@ impl<E: Real> Shapes<E> {
             triangles: each!(solids, &sorted.triangles, Triangle(triangle), order => {
                 Triangle::new(triangle, *order)
             }),
-            exact: Exact { solids: solids.clone(), triangles: sorted.triangles, tree, pixels },
+            exact: Exact {
+                solids: solids.clone(),
+                triangles: sorted.triangles,
+                tree,
+                pixels,
+                number: PhantomData,
+            },
         }
     }
 }
