@@ -5,7 +5,7 @@
 //! terminal, a pipe) is done by [`wait_for`], which comes back at the first signal.
 //! Signals that were ignored when the program started stay ignored: `nohup`, and `&` in a script, ask for that.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -96,10 +96,12 @@ pub(crate) fn exit_code() -> i32 {
 
 /// A folder that must not outlive the run, until this guard is dropped.
 #[derive(Debug)]
+#[cfg(all(unix, feature = "network"))]
 pub(crate) struct Protected(PathBuf);
 
 /// Has a second signal remove `folder`.
-pub(crate) fn protect(folder: &Path) -> Protected {
+#[cfg(all(unix, feature = "network"))]
+pub(crate) fn protect(folder: &std::path::Path) -> Protected {
     folders().push(folder.to_path_buf());
     Protected(folder.to_path_buf())
 }
@@ -108,6 +110,7 @@ fn folders() -> MutexGuard<'static, Vec<PathBuf>> {
     FOLDERS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+#[cfg(all(unix, feature = "network"))]
 impl Drop for Protected {
     fn drop(&mut self) {
         folders().retain(|folder| *folder != self.0);
