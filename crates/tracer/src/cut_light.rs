@@ -89,7 +89,7 @@ mod tests {
     }
 
     fn panes(count: u32, depth: u32) -> String {
-        let panes: String = (1..=count).map(|k| format!("Disc 3 0 0 -{k} 0 0 1 pane\n")).collect();
+        let panes: String = (1..=count).map(|k| format!("Disc 30 0 0 -{k} 0 0 1 pane\n")).collect();
         format!(
             "Screen 32 24\nBackground 1 1 1\nLook 0 0 5 0 0 0 20\nDepth {depth}\nMaterial pane glass 1 1 1 1\n{panes}Trace\n"
         )
