@@ -11,7 +11,7 @@ use crate::error::{Error, LONGEST_SIDE};
 use crate::quantise::Quantiser;
 use crate::state::{StateReader, StateWriter, damaged};
 use crate::thinning::{Thinning, read_size};
-use crate::timeline::{MOST_FPS, Timeline};
+use crate::timeline::{MAX_FPS, Timeline};
 
 /// How to write the animation.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,7 +107,7 @@ impl<W: Write> Encoder<W> {
     /// [`Error::FrameRate`].
     pub fn new(writer: W, settings: Settings) -> Result<Self, Error> {
         let timeline = Timeline::new(settings.fps)?;
-        let thinning = Thinning::new(settings.fps, MOST_FPS);
+        let thinning = Thinning::new(settings.fps, MAX_FPS);
         let stage = Stage::Empty(writer);
         Ok(Self { settings, thinning, timeline, pushed: 0, written: 0, duration_cs: 0, stage })
     }
@@ -248,11 +248,11 @@ impl<W: Write> Encoder<W> {
         };
         let settings = Settings { fps, plays, last_delay_cs: has_last_delay.then_some(last_delay_cs), exact };
         let (pushed, written, duration_cs, timed) = (state.u64()?, state.u64()?, state.u64()?, state.u64()?);
-        if written > timed || timed > pushed || pushed > MOST_COUNTED || duration_cs > MOST_COUNTED {
+        if written > timed || timed > pushed || pushed > MAX_COUNTED || duration_cs > MAX_COUNTED {
             return Err(damaged("it has frames that there cannot be"));
         }
         let timeline = Timeline::new(fps).map_err(|_| damaged("its frame rate is wrong"))?.after(timed);
-        let thinning = Thinning::new(fps, MOST_FPS).read(&mut state, pushed)?;
+        let thinning = Thinning::new(fps, MAX_FPS).read(&mut state, pushed)?;
         let stage = match state.u8()? {
             EMPTY => Stage::Empty(writer),
             RUNNING => {
@@ -261,7 +261,7 @@ impl<W: Write> Encoder<W> {
                     return Err(damaged("a frame that it holds has another size"));
                 }
                 let bytes = state.u64()?;
-                if bytes > MOST_COUNTED {
+                if bytes > MAX_COUNTED {
                     return Err(damaged("it is longer than there can be"));
                 }
                 let quantiser = Quantiser::read(&mut state, size, exact)?;
@@ -298,7 +298,7 @@ const EMPTY: u8 = 0;
 const RUNNING: u8 = 1;
 
 /// No animation comes to so many frames, hundredths of a second or bytes: no count of a state that is gone on with overflows.
-const MOST_COUNTED: u64 = 1 << 52;
+const MAX_COUNTED: u64 = 1 << 52;
 
 fn begin<W: Write>(
     writer: Counting<W>,

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use crate::block::{Area, Block};
 use crate::colour;
-use crate::needs::GLARING;
 use crate::stripe::{self, Layout};
+use crate::update_map::MAX_SKIPPED_ERROR;
 
 /// At most 256 colours, numbered in order of appearance.
 #[derive(Debug)]
@@ -96,7 +96,7 @@ fn change(pixels: &[[u8; 3]], before: &[[u8; 3]]) -> Change {
         for (&now, &was) in now.iter().zip(was) {
             if now != was {
                 changed += 1;
-                slightly += usize::from(colour::level_error(now, was) as f32 <= GLARING);
+                slightly += usize::from(colour::level_error(now, was) as f32 <= MAX_SKIPPED_ERROR);
             }
         }
     }

@@ -1,13 +1,13 @@
 //! Which colours a frame has, and how often.
 //!
-//! Colours are counted in a hash table: each by itself while there are at most [`MOST_BINS`], else together with its
+//! Colours are counted in a hash table: each by itself while there are at most [`MAX_BINS`], else together with its
 //! neighbours in cells of 2, 4 or 8 levels a channel. A frame with so many colours has a palette whose colours are farther
 //! apart than that.
 
 use rayon::prelude::*;
 
 /// The most bins that a histogram grows to.
-pub(crate) const MOST_BINS: usize = 1 << 14;
+pub(crate) const MAX_BINS: usize = 1 << 14;
 const EMPTY: u32 = u32::MAX;
 
 /// Counts of colours.
@@ -213,7 +213,7 @@ mod tests {
 
     #[test]
     fn few_colours_are_exact() {
-        let mut histogram = Histogram::new(MOST_BINS);
+        let mut histogram = Histogram::new(MAX_BINS);
         for k in 0..100_u8 {
             histogram.add([k, 0, 255 - k], 1 + u32::from(k));
         }
@@ -226,13 +226,13 @@ mod tests {
 
     #[test]
     fn many_colours_share_bins_and_none_is_lost() {
-        let mut histogram = Histogram::new(MOST_BINS);
+        let mut histogram = Histogram::new(MAX_BINS);
         for k in 0..200_000_u32 {
             let [a, b, c, _] = k.wrapping_mul(2_654_435_761).to_le_bytes();
             histogram.add([a, b, c], 1);
         }
         assert!(!histogram.is_exact());
-        assert!(histogram.bins().len() <= MOST_BINS);
+        assert!(histogram.bins().len() <= MAX_BINS);
         assert_eq!(histogram.bins().iter().map(|bin| bin.count).sum::<u32>(), 200_000);
     }
 }

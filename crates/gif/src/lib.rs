@@ -35,7 +35,6 @@
 //! # Ok::<(), rayfold_gif::Error>(())
 //! ```
 
-mod allowance;
 mod block;
 mod bound;
 mod colour;
@@ -45,15 +44,16 @@ mod exact;
 mod histogram;
 mod lzw;
 mod nearest;
-mod needs;
 mod palette;
 mod plan;
 mod quantise;
 mod quantised;
+mod refine_budget;
 mod state;
 mod stripe;
 mod thinning;
 mod timeline;
+mod update_map;
 
 pub use encoder::{Encoder, Plays, Settings, Summary};
 pub use error::Error;

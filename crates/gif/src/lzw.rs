@@ -5,7 +5,7 @@
 //! keeping (measured: files grow by 0 to 2 % when it is kept while it compresses as well as it did).
 
 /// The most codes that the format allows.
-const MOST_CODES: u16 = 4096;
+const MAX_CODES: u16 = 4096;
 /// Slots of the hash table: at most half of them are in use.
 const SLOTS: usize = 8192;
 /// An empty slot. No string looks like that: it would continue the last code, and the table is cleared before.
@@ -18,7 +18,7 @@ struct CodeTable {
     slots: Box<[u32; SLOTS]>,
     next: u16,
     /// For each string a set of the indices that continue it, modulo 32, one bit each.
-    continued: Box<[u32; MOST_CODES as usize]>,
+    continued: Box<[u32; MAX_CODES as usize]>,
 }
 
 impl CodeTable {
@@ -62,7 +62,7 @@ impl Writer {
         let table = CodeTable {
             slots: Box::new([EMPTY; SLOTS]),
             next: (1 << bits) + 2,
-            continued: Box::new([0; MOST_CODES as usize]),
+            continued: Box::new([0; MAX_CODES as usize]),
         };
         Self { bits, table, string: None, width: u32::from(bits) + 1, codes: Codes::default() }
     }
@@ -113,7 +113,7 @@ impl Writer {
                     u32::from(string) << 20 | u32::from(index) << 12 | u32::from(self.table.next);
                 self.table.continued[usize::from(string)] |= 1 << (index & 31);
                 self.table.next += 1;
-                if self.table.next == MOST_CODES {
+                if self.table.next == MAX_CODES {
                     self.codes.put(1 << self.bits, self.width);
                     self.table.slots.fill(EMPTY);
                     self.table.continued.fill(0);

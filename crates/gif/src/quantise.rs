@@ -11,18 +11,18 @@ use std::io;
 
 use image::RgbImage;
 
-use crate::allowance::{Allowance, Loan, Redrawn};
 use crate::block::{Area, Block};
 use crate::bound;
 use crate::colour::LocalMetric;
 use crate::error::Error;
 use crate::exact::{self, Change, Kind};
-use crate::histogram::{Histogram, MOST_BINS};
-use crate::needs::{LEFT_ERROR, LEFT_ERROR_IF_EXACT, Need, Needs, Previous};
+use crate::histogram::{Histogram, MAX_BINS};
 use crate::plan::{LossyPlan, Plan};
 use crate::quantised::Quantised;
+use crate::refine_budget::{Redrawn, RefineBudget, Reservation};
 use crate::state::{StateReader, StateWriter, damaged};
 use crate::stripe::{self, Colours, Layout, Row, Stripe};
+use crate::update_map::{EXACT_SKIP_ERROR, PixelUpdate, Previous, SKIP_ERROR, UpdateMap};
 
 /// Parts of a frame whose colours are counted in parallel.
 const PARTS: usize = 2;
@@ -43,7 +43,7 @@ pub(crate) struct Quantiser {
     prepared: Option<Prepared>,
     /// What a viewer sees after the last block.
     seen: RgbImage,
-    allowance: Allowance,
+    budget: RefineBudget,
     /// Used for each frame anew.
     parts: Vec<Histogram>,
     /// All colours of a frame.
@@ -56,7 +56,7 @@ pub(crate) struct Quantiser {
 /// What a frame is prepared in.
 #[derive(Debug)]
 struct Buffers {
-    needs: Needs,
+    updates: UpdateMap,
     /// The colours that are drawn.
     histogram: Histogram,
 }
@@ -81,7 +81,7 @@ struct Preparation<'a> {
     previous: Option<&'a Prepared>,
     drawn_error: f32,
     exact: bool,
-    allowance: &'a mut Allowance,
+    budget: &'a mut RefineBudget,
     parts: &'a mut [Histogram],
     whole: &'a mut Histogram,
     buffers: &'a mut Buffers,
@@ -94,9 +94,9 @@ impl Quantiser {
             exact,
             prepared: None,
             seen: RgbImage::default(),
-            allowance: Allowance::new(),
-            parts: (1..PARTS).map(|_| Histogram::new(MOST_BINS)).collect(),
-            whole: Histogram::new(MOST_BINS),
+            budget: RefineBudget::new(),
+            parts: (1..PARTS).map(|_| Histogram::new(MAX_BINS)).collect(),
+            whole: Histogram::new(MAX_BINS),
             spare: None,
             drawn_error: 0.0,
         }
@@ -115,7 +115,7 @@ impl Quantiser {
         if first {
             self.seen = RgbImage::new(frame.width(), frame.height());
         }
-        let Self { exact, seen, allowance, parts, whole, spare, drawn_error, .. } = self;
+        let Self { exact, seen, budget, parts, whole, spare, drawn_error, .. } = self;
         let mut buffers = spare.take().unwrap_or_else(Buffers::new);
         let mut preparation = Preparation {
             pixels: pixels_of(&frame),
@@ -123,7 +123,7 @@ impl Quantiser {
             previous: previous.as_ref(),
             drawn_error: *drawn_error,
             exact: *exact,
-            allowance,
+            budget,
             parts,
             whole,
             buffers: &mut buffers,
@@ -157,8 +157,8 @@ impl Quantiser {
         }
         self.prepared = Some(Prepared { frame, delay_cs, first, drifts, buffers, plan });
         let (previous, (block, redrawn)) = (previous?, drawn?);
-        if let Plan::Lossy(LossyPlan { loan: Some(loan), changed, .. }) = &previous.plan {
-            self.allowance.pay(loan, &redrawn, *changed);
+        if let Plan::Lossy(LossyPlan { reservation: Some(reservation), changed, .. }) = &previous.plan {
+            self.budget.commit(reservation, &redrawn, *changed);
         }
         self.spare = Some(previous.buffers);
         Some(block)
@@ -166,20 +166,21 @@ impl Quantiser {
 
     /// Looks at the frame that is drawn next once more, now that it is known what is seen before it.
     fn settle(&mut self) {
-        let Self { prepared, seen, parts, allowance, .. } = self;
-        let Some(Prepared { frame, buffers: Buffers { needs, histogram }, plan: Plan::Lossy(plan), .. }) =
-            prepared
+        let Self { prepared, seen, parts, budget, .. } = self;
+        let Some(Prepared {
+            frame, buffers: Buffers { updates, histogram }, plan: Plan::Lossy(plan), ..
+        }) = prepared
         else {
             return;
         };
         let (pixels, width) = (pixels_of(frame), frame.width() as usize);
-        if plan.loan.is_none() || !needs.draw_what_is_off(pixels, pixels_of(seen), plan.bound) {
+        if plan.reservation.is_none() || !updates.draw_what_is_off(pixels, pixels_of(seen), plan.bound) {
             return;
         }
-        let mut loan = plan.loan.take();
-        *plan = LossyPlan::new(pixels, width, &mut loan, plan.bound, needs, histogram, parts);
-        if let Some(loan) = loan {
-            allowance.give_back(&loan);
+        let mut reservation = plan.reservation.take();
+        *plan = LossyPlan::new(pixels, width, &mut reservation, plan.bound, updates, histogram, parts);
+        if let Some(reservation) = reservation {
+            budget.release(&reservation);
         }
         if plan.area.is_some() {
             self.drawn_error = plan.level_error;
@@ -198,7 +199,7 @@ impl Quantiser {
 const LOSSLESS: u8 = 0;
 const LOSSY: u8 = 1;
 /// With pixels that stay refined out of a loan.
-const LOSSY_WITH_LOAN: u8 = 2;
+const LOSSY_WITH_RESERVATION: u8 = 2;
 
 impl Quantiser {
     /// Writes down what later blocks depend on. Nothing before the first frame.
@@ -206,16 +207,16 @@ impl Quantiser {
         let Some(Prepared { frame, delay_cs, first, drifts, buffers, plan }) = &self.prepared else {
             return Ok(());
         };
-        self.allowance.write(state)?;
+        self.budget.write(state)?;
         state.f32(self.drawn_error)?;
         state.u16(*delay_cs)?;
         state.bytes(&[u8::from(*first), u8::from(*drifts)])?;
         match plan {
             Plan::Lossless(_) => state.bytes(&[LOSSLESS])?,
-            Plan::Lossy(LossyPlan { loan: None, .. }) => state.bytes(&[LOSSY])?,
-            Plan::Lossy(LossyPlan { loan: Some(loan), bound, .. }) => {
-                state.bytes(&[LOSSY_WITH_LOAN, *bound])?;
-                loan.write(state)?;
+            Plan::Lossy(LossyPlan { reservation: None, .. }) => state.bytes(&[LOSSY])?,
+            Plan::Lossy(LossyPlan { reservation: Some(reservation), bound, .. }) => {
+                state.bytes(&[LOSSY_WITH_RESERVATION, *bound])?;
+                reservation.write(state)?;
             }
         }
         state.bytes(self.seen.as_raw())?;
@@ -225,9 +226,9 @@ impl Quantiser {
                 now.iter().zip(seen).map(|(now, seen)| now.wrapping_sub(*seen)).collect();
             state.bytes(&differences)?;
         }
-        for needs in buffers.needs.pixels.chunks(frame.width() as usize) {
-            let needs: Vec<u8> = needs.iter().map(|need| need.to_byte()).collect();
-            state.bytes(&needs)?;
+        for updates in buffers.updates.pixels.chunks(frame.width() as usize) {
+            let updates: Vec<u8> = updates.iter().map(|update| update.to_byte()).collect();
+            state.bytes(&updates)?;
         }
         Ok(())
     }
@@ -239,11 +240,11 @@ impl Quantiser {
         exact: bool,
     ) -> Result<Self, Error> {
         let mut quantiser =
-            Self { allowance: Allowance::read(state)?, drawn_error: state.f32()?, ..Self::new(exact) };
+            Self { budget: RefineBudget::read(state)?, drawn_error: state.f32()?, ..Self::new(exact) };
         let (delay_cs, first, drifts) = (state.u16()?, state.u8()? != 0, state.u8()? != 0);
         let kind = state.u8()?;
-        let (bound, loan) = match kind {
-            LOSSY_WITH_LOAN => (state.u8()?, Some(Loan::read(state)?)),
+        let (bound, reservation) = match kind {
+            LOSSY_WITH_RESERVATION => (state.u8()?, Some(Reservation::read(state)?)),
             _ => (bound::NONE, None),
         };
         let pixels = width as usize * height as usize;
@@ -256,21 +257,23 @@ impl Quantiser {
             RgbImage::from_raw(width, height, levels).ok_or_else(|| damaged("its size is wrong"))
         };
         let (frame, seen) = (image(frame)?, image(seen)?);
-        let needs = state.bytes(pixels)?.into_iter().map(Need::of_byte).collect::<Option<Vec<_>>>();
-        let needs =
-            Needs::decided(width as usize, needs.ok_or_else(|| damaged("a pixel needs what there is not"))?);
-        let mut buffers = Buffers { needs, ..Buffers::new() };
+        let updates = state.bytes(pixels)?.into_iter().map(PixelUpdate::of_byte).collect::<Option<Vec<_>>>();
+        let updates = UpdateMap::decided(
+            width as usize,
+            updates.ok_or_else(|| damaged("a pixel needs what there is not"))?,
+        );
+        let mut buffers = Buffers { updates, ..Buffers::new() };
         let plan = match kind {
             LOSSLESS => {
                 let few = exact::few_colours(pixels_of(&frame));
                 Plan::Lossless(few.ok_or_else(|| damaged("a frame without loss has too many colours"))?)
             }
-            LOSSY | LOSSY_WITH_LOAN if loan.is_none() || !first => {
-                let Buffers { needs, histogram } = &mut buffers;
+            LOSSY | LOSSY_WITH_RESERVATION if reservation.is_none() || !first => {
+                let Buffers { updates, histogram } = &mut buffers;
                 let (pixels, parts) = (pixels_of(&frame), &mut quantiser.parts);
-                let (mut loan, width) = (loan, width as usize);
+                let (mut reservation, width) = (reservation, width as usize);
                 let plan = rayon::scope(|_| {
-                    LossyPlan::new(pixels, width, &mut loan, bound, needs, histogram, parts)
+                    LossyPlan::new(pixels, width, &mut reservation, bound, updates, histogram, parts)
                 });
                 Plan::Lossy(plan)
             }
@@ -288,39 +291,39 @@ fn rows(image: &RgbImage) -> impl Iterator<Item = &[u8]> {
 
 impl Buffers {
     fn new() -> Self {
-        Self { needs: Needs::default(), histogram: Histogram::new(MOST_BINS) }
+        Self { updates: UpdateMap::default(), histogram: Histogram::new(MAX_BINS) }
     }
 }
 
 impl Preparation<'_> {
     /// Finds out what the frame needs, and what it may use of the allowance; no loan if all of it is drawn. `seen`: what a
     /// viewer sees before the previous frame is drawn.
-    fn compare(&mut self, seen: &RgbImage) -> (Kind, Option<Loan>) {
+    fn compare(&mut self, seen: &RgbImage) -> (Kind, Option<Reservation>) {
         let Self { pixels, width, previous, drawn_error, exact, .. } = *self;
         let before = previous.map(|previous| (pixels_of(&previous.frame), previous.drifts));
         let kind = Kind::of(pixels, before, exact);
-        let needs = &mut self.buffers.needs;
+        let updates = &mut self.buffers.updates;
         let Some(previous) = previous.filter(|_| kind.few.is_none()) else {
-            needs.draw_all(width, pixels.len());
+            updates.draw_all(width, pixels.len());
             return (kind, None);
         };
-        let left_error = if kind.drifts { LEFT_ERROR_IF_EXACT } else { LEFT_ERROR };
-        let previous = previous.seen_after(seen, drawn_error, left_error);
-        let refining = kind.change != Change::Slight && self.allowance.is_left();
-        let still = needs.compare(pixels, width, previous, refining);
-        let loan = self.allowance.lend(&still, pixels.len());
-        self.allowance.waited = needs.confine(loan.least_error, self.allowance.waited);
-        (kind, Some(loan))
+        let skip_error = if kind.drifts { EXACT_SKIP_ERROR } else { SKIP_ERROR };
+        let previous = previous.seen_after(seen, drawn_error, skip_error);
+        let refining = kind.change != Change::Slight && self.budget.is_left();
+        let still = updates.compare(pixels, width, previous, refining);
+        let reservation = self.budget.reserve(&still, pixels.len());
+        self.budget.waited = updates.confine(reservation.least_error, self.budget.waited);
+        (kind, Some(reservation))
     }
 
     /// How the frame is drawn, and whether it drifts.
-    fn plan(self, (kind, loan): (Kind, Option<Loan>)) -> (Plan, bool) {
-        let Self { pixels, width, parts, whole, allowance, buffers: Buffers { needs, histogram }, .. } = self;
-        let mut loan = loan;
+    fn plan(self, (kind, reservation): (Kind, Option<Reservation>)) -> (Plan, bool) {
+        let Self { pixels, width, parts, whole, budget, buffers: Buffers { updates, histogram }, .. } = self;
+        let mut reservation = reservation;
         let plan = match kind.few {
             Some(colours) => Plan::Lossless(colours),
             None => {
-                let bound = match loan {
+                let bound = match reservation {
                     None => bound::NONE,
                     Some(_) if kind.drifts => bound::DRIFTING,
                     Some(_) => {
@@ -328,9 +331,9 @@ impl Preparation<'_> {
                         bound::of(pixels, whole)
                     }
                 };
-                let plan = LossyPlan::new(pixels, width, &mut loan, bound, needs, histogram, parts);
-                if let Some(loan) = loan {
-                    allowance.give_back(&loan);
+                let plan = LossyPlan::new(pixels, width, &mut reservation, bound, updates, histogram, parts);
+                if let Some(reservation) = reservation {
+                    budget.release(&reservation);
                 }
                 Plan::Lossy(plan)
             }
@@ -341,13 +344,13 @@ impl Preparation<'_> {
 
 impl Prepared {
     /// What the next frame is compared with. `seen`: what a viewer sees before this one is drawn.
-    fn seen_after<'a>(&'a self, seen: &'a RgbImage, error: f32, left_error: f32) -> Previous<'a> {
+    fn seen_after<'a>(&'a self, seen: &'a RgbImage, error: f32, skip_error: f32) -> Previous<'a> {
         Previous {
             frame: pixels_of(&self.frame),
-            needs: &self.buffers.needs.pixels,
+            updates: &self.buffers.updates.pixels,
             seen: pixels_of(seen),
             error,
-            left_error,
+            skip_error,
             nearest: match &self.plan {
                 Plan::Lossless(_) => None,
                 Plan::Lossy(plan) => Some((&self.buffers.histogram, &plan.quantised.nearest)),
@@ -364,13 +367,13 @@ impl Prepared {
                 (exact::draw(pixels, width, self.first, seen, colours, self.delay_cs), Vec::new())
             }
             Plan::Lossy(LossyPlan { area: None, .. }) => (Block::nothing(self.delay_cs), Vec::new()),
-            Plan::Lossy(LossyPlan { area: Some(area), quantised, changed, loan, bound, .. }) => {
+            Plan::Lossy(LossyPlan { area: Some(area), quantised, changed, reservation, bound, .. }) => {
                 let Quantised { palette, nearest, error } = &**quantised;
-                let transparent = loan.is_some().then_some(palette.colours.len() as u8);
+                let transparent = reservation.is_some().then_some(palette.colours.len() as u8);
                 let histogram = &self.buffers.histogram;
                 let (changed, error, bound) = (*changed, *error, *bound);
                 let colours = Colours { palette, nearest, histogram, transparent, changed, error, bound };
-                draw(pixels, width, *area, &self.buffers.needs.pixels, seen, colours, self.delay_cs)
+                draw(pixels, width, *area, &self.buffers.updates.pixels, seen, colours, self.delay_cs)
             }
         }
     }
@@ -394,7 +397,7 @@ fn draw(
     pixels: &[[u8; 3]],
     width: usize,
     area: Area,
-    needs: &[Need],
+    updates: &[PixelUpdate],
     seen: &mut [[u8; 3]],
     colours: Colours<'_>,
     delay_cs: u16,
@@ -415,7 +418,7 @@ fn draw(
             stripe.draw(Row {
                 pixels: &pixels[part.clone()],
                 above: &pixels[above],
-                needs: &needs[part],
+                updates: &updates[part],
                 seen: &mut seen[area.left..area.right],
             });
         }
@@ -451,7 +454,7 @@ mod tests {
             panic!("{:?}", quantiser.prepared)
         };
         assert_eq!((plan.area.map(|area| area.size()), plan.changed), (Some(64 * 64), 1.0));
-        assert!(plan.loan.is_none());
+        assert!(plan.reservation.is_none());
 
         let whole = quantiser.push(frame(48, 100), 6).unwrap();
         assert_eq!((whole.area.size(), whole.transparent, whole.delay_cs), (64 * 64, None, 5));
@@ -461,7 +464,7 @@ mod tests {
         // What is refined above it is left for a later frame, or is part of the area.
         assert!(plan.area.is_some_and(|area| area.bottom == 64 && area.top <= 48));
         assert_eq!(plan.changed, 0.25);
-        assert!(plan.loan.is_some());
+        assert!(plan.reservation.is_some());
 
         let block = quantiser.finish().unwrap();
         assert_eq!(block.delay_cs, 6);

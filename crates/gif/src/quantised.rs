@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use crate::colour::{closest, levels_off};
 use crate::histogram::{Bin, Histogram};
 use crate::nearest::{self, Nearest};
-use crate::needs::Need;
 use crate::palette::{Guesses, Palette, Sample};
+use crate::update_map::PixelUpdate;
 
 /// Mean squared error (see [`colour`](crate::colour)) up to which a palette of half as many colours is taken: it takes up
 /// half as many bytes, and the indices fewer, too.
@@ -21,9 +21,9 @@ const FEWEST: usize = 16;
 const MOST_BINS_HALVED: usize = 4096;
 
 /// The most colours that a palette takes in because of the bound.
-const MOST_ADDED: usize = 64;
+const MAX_ADDED: usize = 64;
 /// With more colours that are too far off, a palette is not mended.
-const MOST_FAR: usize = 1 << 9;
+const MAX_FAR: usize = 1 << 9;
 /// Pixels that are looked at together.
 const PART: usize = 1 << 14;
 
@@ -73,14 +73,14 @@ impl Quantised {
     /// Changes entries so that each colour that is drawn has one within `bound`; `None` if that cannot be.
     pub(crate) fn within(
         mut self,
-        (pixels, needs): (&[[u8; 3]], &[Need]),
+        (pixels, updates): (&[[u8; 3]], &[PixelUpdate]),
         histogram: &Histogram,
         bins: &[Sample],
         bound: u8,
     ) -> Option<Self> {
         let mut room = (self.palette.colours.len() + 1).next_power_of_two() - 1;
         for again in [true, true, true, true, false] {
-            let mut far = self.too_far((pixels, needs), histogram, bound)?;
+            let mut far = self.too_far((pixels, updates), histogram, bound)?;
             if far.is_empty() {
                 return Some(self);
             }
@@ -91,7 +91,7 @@ impl Quantised {
             while let Some(&rgb) = far.iter().max_by_key(|rgb| covered(**rgb, &far)) {
                 added.push(rgb);
                 far.retain(|&other| levels_off(other, rgb) > bound);
-                if added.len() > MOST_ADDED {
+                if added.len() > MAX_ADDED {
                     return None;
                 }
             }
@@ -114,7 +114,7 @@ impl Quantised {
     /// The colours that are drawn and have no entry within `bound`; `None` if there are too many.
     fn too_far(
         &self,
-        (pixels, needs): (&[[u8; 3]], &[Need]),
+        (pixels, updates): (&[[u8; 3]], &[PixelUpdate]),
         histogram: &Histogram,
         bound: u8,
     ) -> Option<Vec<[u8; 3]>> {
@@ -129,15 +129,15 @@ impl Quantised {
             histogram.bins().iter().map(Bin::colour).filter_map(far).collect()
         } else {
             let parts =
-                pixels.par_chunks(PART).zip(needs.par_chunks(PART)).flat_map_iter(|(pixels, needs)| {
-                    let drawn = pixels.iter().zip(needs).filter(|(_, need)| need.may_draw());
-                    drawn.filter_map(|(&rgb, _)| far(rgb)).take(MOST_FAR)
+                pixels.par_chunks(PART).zip(updates.par_chunks(PART)).flat_map_iter(|(pixels, updates)| {
+                    let drawn = pixels.iter().zip(updates).filter(|(_, update)| update.may_draw());
+                    drawn.filter_map(|(&rgb, _)| far(rgb)).take(MAX_FAR)
                 });
             parts.collect()
         };
         found.sort_unstable();
         found.dedup();
-        (found.len() < MOST_FAR).then_some(found)
+        (found.len() < MAX_FAR).then_some(found)
     }
 
     /// So many of the colours of the palette, without those that others can stand in for best.
@@ -170,10 +170,10 @@ impl Quantised {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::histogram::MOST_BINS;
+    use crate::histogram::MAX_BINS;
 
     fn of_fewer(colours: impl Iterator<Item = [u8; 3]>, count: u32) -> (usize, f32) {
-        let mut histogram = Histogram::new(MOST_BINS);
+        let mut histogram = Histogram::new(MAX_BINS);
         colours.for_each(|rgb| histogram.add(rgb, count));
         let bins = Sample::of_bins(&histogram);
         let Quantised { palette, nearest, error } =
@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn a_colour_that_is_too_far_off_is_taken_in_and_what_cannot_be_is_refused() {
-        let mut histogram = Histogram::new(MOST_BINS);
+        let mut histogram = Histogram::new(MAX_BINS);
         (0..400_u16).for_each(|k| histogram.add([(k / 4) as u8, (k % 4) as u8 * 8, 90], 1_000));
         histogram.add([255, 0, 255], 1);
         let bins = Sample::of_bins(&histogram);

@@ -17,14 +17,14 @@
 
 use rayon::prelude::*;
 
-use crate::allowance::Redrawn;
 use crate::block::{self, Area, Block};
 use crate::colour::{self, LocalMetric};
 use crate::histogram::Histogram;
 use crate::lzw::{Part, Writer};
 use crate::nearest::Nearest;
-use crate::needs::Need;
 use crate::palette::Palette;
+use crate::refine_budget::Redrawn;
+use crate::update_map::PixelUpdate;
 
 /// The additional squared error (see [`colour`]) that an index may have if it makes the file smaller.
 const TOLERANCE: f32 = 5.85;
@@ -47,7 +47,7 @@ const SMOOTH_BY_ERROR: f32 = 0.6;
 const SMALL: f32 = 6.0;
 /// The part of the residual that a pixel corrects for each unit of error above `SMALL`, and the largest part.
 const CORRECTED: f32 = 0.022;
-const MOST_CORRECTED: f32 = 0.8;
+const MAX_CORRECTED: f32 = 0.8;
 /// From this part of the frame on that is drawn because it changed, a pixel corrects as much as stated. Below, it corrects
 /// proportionally less, but at least `LEAST_PART` of it.
 const MUCH_CHANGED: f64 = 0.4;
@@ -55,7 +55,7 @@ const LEAST_PART: f32 = 0.4;
 /// The part of a residual that is diffused, one half of it to the right and one half down.
 const DIFFUSED: f32 = 0.8;
 /// The largest residual of a channel, in levels.
-const MOST_RESIDUAL: f32 = 24.0;
+const MAX_RESIDUAL: f32 = 24.0;
 /// The squared error that an index other than the nearest must save to begin a new string.
 const NEW_STRING: f32 = 40.0;
 /// The nearest entry is taken without comparing others if it continues the string and the residual adds at most this to
@@ -144,7 +144,7 @@ pub(crate) struct Row<'a> {
     pub(crate) pixels: &'a [[u8; 3]],
     /// Of the frame, in the row above.
     pub(crate) above: &'a [[u8; 3]],
-    pub(crate) needs: &'a [Need],
+    pub(crate) updates: &'a [PixelUpdate],
     pub(crate) seen: &'a mut [[u8; 3]],
 }
 
@@ -178,25 +178,25 @@ impl<'a> Stripe<'a> {
         self.from_above.resize(row.pixels.len(), [0.0; 3]);
         let mut diffused = [0.0; 3];
         for k in 0..row.pixels.len() {
-            let (now, need, seen) = (row.pixels[k], row.needs[k], row.seen[k]);
+            let (now, update, seen) = (row.pixels[k], row.updates[k], row.seen[k]);
             let above = self.from_above[k];
             let residual = [diffused[0] + above[0], diffused[1] + above[1], diffused[2] + above[2]];
             diffused = [0.0; 3];
-            let index = match need {
-                Need::Keep => {
+            let index = match update {
+                PixelUpdate::Keep => {
                     let transparent = transparent.unwrap_or(0);
                     self.writer.put(transparent);
                     transparent
                 }
-                Need::Either => self.kept_or_repeated(now, seen, previous),
-                Need::Refine | Need::Draw => {
+                PixelUpdate::Either => self.kept_or_repeated(now, seen, previous),
+                PixelUpdate::Refine | PixelUpdate::Draw => {
                     if last.0 != now || last.1.is_none() {
                         last = (now, Some(self.nearest(now)));
                     }
                     let Some(entry) = last.1 else { continue };
                     let levels = colour::levels(now);
                     if entry.error > SMALL && row.is_smooth(k, entry.error) {
-                        let part = ((entry.error - SMALL) * self.corrected).min(MOST_CORRECTED);
+                        let part = ((entry.error - SMALL) * self.corrected).min(MAX_CORRECTED);
                         let target = [
                             levels[0] + part * residual[0],
                             levels[1] + part * residual[1],
@@ -215,7 +215,7 @@ impl<'a> Stripe<'a> {
             previous = Some(index);
             if Some(index) != transparent {
                 let colour = self.colour(index);
-                if need == Need::Refine {
+                if update == PixelUpdate::Refine {
                     self.redrawn.count(self.metric.error(seen, colour), colour::levels_apart(seen, colour));
                 }
                 row.seen[k] = colour;
@@ -255,7 +255,7 @@ impl<'a> Stripe<'a> {
     /// `target`: the pixel's levels with the corrected part of the residual. `entry`: the palette entry nearest to the
     /// pixel itself. `new_string`: the error that another index must save to begin a new string.
     fn drawn(&mut self, row: &Row<'_>, k: usize, target: [f32; 3], entry: Nearest, new_string: f32) -> u8 {
-        let (now, need, seen) = (row.pixels[k], row.needs[k], row.seen[k]);
+        let (now, update, seen) = (row.pixels[k], row.updates[k], row.seen[k]);
         // No error and no bytes. A pixel that is seen right may also be left, which is tried below.
         if entry.error == 0.0
             && (self.colours.transparent.is_none() || now != seen)
@@ -269,12 +269,12 @@ impl<'a> Stripe<'a> {
             && self.is_within(now, seen)
         {
             let shown = form.error(target, colour::levels(seen));
-            let bound = if need == Need::Refine { MUCH_BETTER * nearest } else { nearest };
+            let bound = if update == PixelUpdate::Refine { MUCH_BETTER * nearest } else { nearest };
             if bound >= shown {
                 self.writer.put(transparent);
                 return transparent;
             }
-            if need != Need::Refine
+            if update != PixelUpdate::Refine
                 && shown <= nearest + self.tolerances[1]
                 && shown <= nearest + self.tolerance(row, k, entry)
                 && self.writer.extend(transparent)
@@ -365,22 +365,21 @@ impl Row<'_> {
 /// What a pixel passes on to each of two others: its share of the residual that reached the pixel, plus what is meant,
 /// minus what is shown.
 fn diffuse(residual: [f32; 3], meant: [f32; 3], shown: [f32; 3]) -> [f32; 3] {
-    let channel = |k: usize| {
-        (residual[k] + meant[k] - shown[k]).clamp(-MOST_RESIDUAL, MOST_RESIDUAL) * (0.5 * DIFFUSED)
-    };
+    let channel =
+        |k: usize| (residual[k] + meant[k] - shown[k]).clamp(-MAX_RESIDUAL, MAX_RESIDUAL) * (0.5 * DIFFUSED);
     [channel(0), channel(1), channel(2)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::histogram::MOST_BINS;
+    use crate::histogram::MAX_BINS;
 
     const SIDE: usize = 64;
 
     /// What is seen of a square of one colour.
     fn drawn(rgb: [u8; 3], colours: &[[u8; 3]]) -> Vec<[u8; 3]> {
-        let mut histogram = Histogram::new(MOST_BINS);
+        let mut histogram = Histogram::new(MAX_BINS);
         histogram.add(rgb, 1);
         let palette = Palette::new(colours.to_vec());
         let point = colour::point_of(rgb);
@@ -400,8 +399,8 @@ mod tests {
         let mut stripe = Stripe::new(colours, &mut writer);
         let mut seen = vec![[0; 3]; SIDE * SIDE];
         for seen in seen.chunks_mut(SIDE) {
-            let (pixels, needs) = ([rgb; SIDE], [Need::Draw; SIDE]);
-            stripe.draw(Row { pixels: &pixels, above: &pixels, needs: &needs, seen });
+            let (pixels, updates) = ([rgb; SIDE], [PixelUpdate::Draw; SIDE]);
+            stripe.draw(Row { pixels: &pixels, above: &pixels, updates: &updates, seen });
         }
         seen
     }
@@ -417,7 +416,7 @@ mod tests {
             diffuse([1.0, -2.0, 0.0], [100.0; 3], [98.0, 104.0, 100.0]),
             [3.0 * half, -6.0 * half, 0.0]
         );
-        let most = MOST_RESIDUAL * half;
+        let most = MAX_RESIDUAL * half;
         assert_eq!(diffuse([0.0; 3], [255.0, 0.0, 10.0], [0.0, 255.0, 0.0]), [most, -most, 10.0 * half]);
     }
 

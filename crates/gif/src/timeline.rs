@@ -11,7 +11,7 @@ const SHORTEST_DELAY_CS: u64 = 2;
 /// The longest delay that the format can hold, in hundredths of a second.
 const LONGEST_DELAY_CS: f64 = 65_535.0;
 /// The most frames a second that [`SHORTEST_DELAY_CS`] leaves room for.
-pub(crate) const MOST_FPS: f64 = 100.0 / SHORTEST_DELAY_CS as f64;
+pub(crate) const MAX_FPS: f64 = 100.0 / SHORTEST_DELAY_CS as f64;
 
 /// Hands out delays for frames in order.
 #[derive(Debug, Clone)]
@@ -42,7 +42,7 @@ impl Timeline {
     pub(crate) fn advance(&mut self) -> u16 {
         let k = self.next;
         self.next += 1;
-        let start = |k: u64| (k as f64 * 100.0 / self.fps.min(MOST_FPS)).round();
+        let start = |k: u64| (k as f64 * 100.0 / self.fps.min(MAX_FPS)).round();
         (start(k + 1) - start(k)).min(LONGEST_DELAY_CS) as u16
     }
 }

@@ -12,21 +12,21 @@
 
 use rayon::prelude::*;
 
-use crate::allowance::StaticPixels;
 use crate::block::Area;
 use crate::colour::{self, LocalMetric};
 use crate::histogram::Histogram;
 use crate::nearest::Nearest;
+use crate::refine_budget::StaticPixels;
 
 /// Width and height of a tile, which is drawn or left as a whole: single pixels drawn among others that are left cost as
 /// many bytes as if all were drawn.
 const TILE: usize = 8;
 /// A tile is left if its mean [level error](colour::level_error), beyond that of a drawn pixel, is at most this.
-pub(crate) const LEFT_ERROR: f32 = 20.0;
+pub(crate) const SKIP_ERROR: f32 = 20.0;
 /// The same where the palette has all colours of the frame: there an error is seen more easily.
-pub(crate) const LEFT_ERROR_IF_EXACT: f32 = 6.0;
+pub(crate) const EXACT_SKIP_ERROR: f32 = 6.0;
 /// A tile with a pixel of a larger level error is never left: almost three levels.
-pub(crate) const GLARING: f32 = 50.0;
+pub(crate) const MAX_SKIPPED_ERROR: f32 = 50.0;
 /// The level error up to which a pixel that changes may be left in a tile that is drawn.
 const SEEN_RIGHT: f32 = 2.0;
 /// The same of a pixel that could be left in the frame before: a level in each channel.
@@ -41,7 +41,7 @@ const GROWN_BY: usize = 6;
 
 /// What a pixel needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Need {
+pub(crate) enum PixelUpdate {
     /// To be left as it is seen.
     Keep,
     /// To be left or drawn, whichever makes the file smaller.
@@ -52,24 +52,26 @@ pub(crate) enum Need {
     Draw,
 }
 
-impl Need {
+impl PixelUpdate {
     /// Whether it may take a colour of the palette that is made for it.
     pub(crate) fn may_draw(self) -> bool {
-        matches!(self, Need::Draw | Need::Refine)
+        matches!(self, PixelUpdate::Draw | PixelUpdate::Refine)
     }
 
     /// As a suspended animation holds it.
     pub(crate) fn to_byte(self) -> u8 {
         match self {
-            Need::Keep => 0,
-            Need::Either => 1,
-            Need::Refine => 2,
-            Need::Draw => 3,
+            PixelUpdate::Keep => 0,
+            PixelUpdate::Either => 1,
+            PixelUpdate::Refine => 2,
+            PixelUpdate::Draw => 3,
         }
     }
 
     pub(crate) fn of_byte(byte: u8) -> Option<Self> {
-        [Need::Keep, Need::Either, Need::Refine, Need::Draw].get(usize::from(byte)).copied()
+        [PixelUpdate::Keep, PixelUpdate::Either, PixelUpdate::Refine, PixelUpdate::Draw]
+            .get(usize::from(byte))
+            .copied()
     }
 }
 
@@ -77,28 +79,28 @@ impl Need {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Previous<'a> {
     pub(crate) frame: &'a [[u8; 3]],
-    pub(crate) needs: &'a [Need],
+    pub(crate) updates: &'a [PixelUpdate],
     /// What a viewer sees before it.
     pub(crate) seen: &'a [[u8; 3]],
     /// Mean level error of what it draws.
     pub(crate) error: f32,
-    /// [`LEFT_ERROR`] or [`LEFT_ERROR_IF_EXACT`].
-    pub(crate) left_error: f32,
+    /// [`SKIP_ERROR`] or [`EXACT_SKIP_ERROR`].
+    pub(crate) skip_error: f32,
     /// Its colours, and the nearest palette entry of each; `None`: it is drawn without error.
     pub(crate) nearest: Option<(&'a Histogram, &'a [Nearest])>,
 }
 
 /// What pixels need, row by row.
 #[derive(Debug, Default)]
-pub(crate) struct Needs {
+pub(crate) struct UpdateMap {
     width: usize,
-    pub(crate) pixels: Vec<Need>,
-    tiles: Vec<TileNeeds>,
+    pub(crate) pixels: Vec<PixelUpdate>,
+    tiles: Vec<TileUpdate>,
 }
 
 /// What a tile needs.
 #[derive(Debug, Clone, Copy, Default)]
-struct TileNeeds {
+struct TileUpdate {
     /// Whether any of it is to be drawn because it changes.
     changes: bool,
     /// How many pixels are to be refined, and the mean of their squared errors.
@@ -106,11 +108,11 @@ struct TileNeeds {
     error: f32,
 }
 
-impl Needs {
+impl UpdateMap {
     /// Those that a suspended animation has come to: [`count`](Self::count) counts them as they are.
-    pub(crate) fn decided(width: usize, pixels: Vec<Need>) -> Self {
+    pub(crate) fn decided(width: usize, pixels: Vec<PixelUpdate>) -> Self {
         let tiles = width.div_ceil(TILE) * pixels.len().div_ceil(TILE * width);
-        let as_it_is = TileNeeds { changes: false, wrong: 0, error: f32::INFINITY };
+        let as_it_is = TileUpdate { changes: false, wrong: 0, error: f32::INFINITY };
         Self { width, pixels, tiles: vec![as_it_is; tiles] }
     }
 
@@ -118,7 +120,7 @@ impl Needs {
     pub(crate) fn draw_all(&mut self, width: usize, pixels: usize) {
         self.width = width;
         self.pixels.clear();
-        self.pixels.resize(pixels, Need::Draw);
+        self.pixels.resize(pixels, PixelUpdate::Draw);
         self.tiles.clear();
     }
 
@@ -132,15 +134,23 @@ impl Needs {
         refining: bool,
     ) -> StaticPixels {
         self.width = width;
-        self.pixels.resize(pixels.len(), Need::Draw);
-        self.tiles.resize(width.div_ceil(TILE) * pixels.len().div_ceil(TILE * width), TileNeeds::default());
+        self.pixels.resize(pixels.len(), PixelUpdate::Draw);
+        self.tiles.resize(width.div_ceil(TILE) * pixels.len().div_ceil(TILE * width), TileUpdate::default());
         let metric = refining.then(LocalMetric::new);
         let bands =
             self.pixels.par_chunks_mut(TILE * width).zip(self.tiles.par_chunks_mut(width.div_ceil(TILE)));
-        let compared = bands.enumerate().fold(StaticPixels::none, |mut still, (number, (needs, tiles))| {
+        let compared = bands.enumerate().fold(StaticPixels::none, |mut still, (number, (updates, tiles))| {
             let start = number * TILE * width;
-            let part = &pixels[start..start + needs.len()];
-            compare_band(part, width, previous.part(start, needs.len()), metric, needs, tiles, &mut still);
+            let part = &pixels[start..start + updates.len()];
+            compare_band(
+                part,
+                width,
+                previous.part(start, updates.len()),
+                metric,
+                updates,
+                tiles,
+                &mut still,
+            );
             still
         });
         compared.reduce(StaticPixels::none, StaticPixels::join)
@@ -182,11 +192,13 @@ impl Needs {
     pub(crate) fn draw_what_is_off(&mut self, pixels: &[[u8; 3]], seen: &[[u8; 3]], bound: u8) -> bool {
         let part = pixels.len().div_ceil(rayon::current_num_threads());
         let parts = self.pixels.par_chunks_mut(part).zip(pixels.par_chunks(part)).zip(seen.par_chunks(part));
-        let found = parts.map(|((needs, pixels), seen)| {
+        let found = parts.map(|((updates, pixels), seen)| {
             let mut found = false;
-            for ((need, now), seen) in needs.iter_mut().zip(pixels).zip(seen) {
-                if colour::levels_off(*now, *seen) > bound && matches!(need, Need::Keep | Need::Either) {
-                    *need = Need::Draw;
+            for ((update, now), seen) in updates.iter_mut().zip(pixels).zip(seen) {
+                if colour::levels_off(*now, *seen) > bound
+                    && matches!(update, PixelUpdate::Keep | PixelUpdate::Either)
+                {
+                    *update = PixelUpdate::Draw;
                     found = true;
                 }
             }
@@ -209,19 +221,21 @@ impl Needs {
         let (width, columns, tiles) = (self.width, self.width.div_ceil(TILE), &self.tiles);
         let mut histograms = std::iter::once(&mut *all).chain(&mut *others).collect::<Vec<_>>();
         let parts = histograms.par_iter_mut().zip(self.pixels.par_chunks_mut(part)).enumerate();
-        let changed = parts.map(|(number, (histogram, needs))| {
+        let changed = parts.map(|(number, (histogram, updates))| {
             histogram.clear();
             let mut changed = 0;
             let (mut last, mut run) = ([0; 3], 0);
-            for (at, need) in (number * part..).zip(needs) {
-                match need {
-                    Need::Keep | Need::Either => continue,
-                    Need::Refine if tiles[at / width / TILE * columns + at % width / TILE].error < least => {
-                        *need = Need::Keep;
+            for (at, update) in (number * part..).zip(updates) {
+                match update {
+                    PixelUpdate::Keep | PixelUpdate::Either => continue,
+                    PixelUpdate::Refine
+                        if tiles[at / width / TILE * columns + at % width / TILE].error < least =>
+                    {
+                        *update = PixelUpdate::Keep;
                         continue;
                     }
-                    Need::Refine => (),
-                    Need::Draw => changed += 1,
+                    PixelUpdate::Refine => (),
+                    PixelUpdate::Draw => changed += 1,
                 }
                 if pixels[at] != last {
                     histogram.add(last, run);
@@ -252,10 +266,10 @@ impl<'a> Previous<'a> {
         let range = start..start + count;
         Self {
             frame: &self.frame[range.clone()],
-            needs: &self.needs[range.clone()],
+            updates: &self.updates[range.clone()],
             seen: &self.seen[range],
             error: self.error,
-            left_error: self.left_error,
+            skip_error: self.skip_error,
             nearest: self.nearest,
         }
     }
@@ -267,37 +281,37 @@ fn compare_band(
     width: usize,
     previous: Previous<'_>,
     refine: Option<LocalMetric>,
-    needs: &mut [Need],
-    tiles: &mut [TileNeeds],
+    updates: &mut [PixelUpdate],
+    tiles: &mut [TileUpdate],
     still: &mut StaticPixels,
 ) {
     if refine.is_none() && pixels == previous.frame {
-        needs.fill(Need::Keep);
-        tiles.fill(TileNeeds::default());
-        still.count(needs.len());
+        updates.fill(PixelUpdate::Keep);
+        tiles.fill(TileUpdate::default());
+        still.count(updates.len());
         return;
     }
     for (left, needed) in (0..width).step_by(TILE).zip(tiles) {
         let count = TILE.min(width - left);
         let mut tile = Tile::new(refine);
-        let rows = (left..needs.len()).step_by(width);
+        let rows = (left..updates.len()).step_by(width);
         for (row, start) in rows.clone().enumerate() {
             let part = start..start + count;
-            tile.compare(row, &pixels[part.clone()], previous.part(start, count), &mut needs[part], still);
+            tile.compare(row, &pixels[part.clone()], previous.part(start, count), &mut updates[part], still);
         }
-        *needed = tile.needs();
+        *needed = tile.updates();
         if tile.wrong > 0 {
             for (row, start) in rows.clone().enumerate() {
-                tile.keep_the_rest(row, &mut needs[start..start + count], still);
+                tile.keep_the_rest(row, &mut updates[start..start + count], still);
             }
             still.count_wrong(u64::from(needed.wrong), needed.error);
         }
-        if tile.may_be_left(previous.left_error) {
+        if tile.may_be_left(previous.skip_error) {
             needed.changes = false;
             for start in rows {
-                for need in &mut needs[start..start + count] {
-                    if matches!(need, Need::Draw | Need::Either) {
-                        *need = Need::Keep;
+                for update in &mut updates[start..start + count] {
+                    if matches!(update, PixelUpdate::Draw | PixelUpdate::Either) {
+                        *update = PixelUpdate::Keep;
                     }
                 }
             }
@@ -339,24 +353,24 @@ impl Tile {
         row: usize,
         pixels: &[[u8; 3]],
         previous: Previous<'_>,
-        needs: &mut [Need],
+        updates: &mut [PixelUpdate],
         still: &mut StaticPixels,
     ) {
         self.pixels += pixels.len();
         if self.refine.is_none() && pixels == previous.frame {
-            needs.fill(Need::Keep);
-            still.count(needs.len());
+            updates.fill(PixelUpdate::Keep);
+            still.count(updates.len());
             return;
         }
         // By index: five zipped iterators are not always inlined, which costs a tenth of the encoder's time.
         let count = pixels.len();
         let (frame, shown, drawn) =
-            (&previous.frame[..count], &previous.seen[..count], &previous.needs[..count]);
-        for (k, need) in needs[..count].iter_mut().enumerate() {
+            (&previous.frame[..count], &previous.seen[..count], &previous.updates[..count]);
+        for (k, update) in updates[..count].iter_mut().enumerate() {
             let (now, was, seen) = (pixels[k], frame[k], shown[k]);
             // What may be left is mostly left. Were it taken as drawn, one small change after the other would be left.
-            let left = matches!(drawn[k], Need::Keep | Need::Either);
-            *need = if now == was {
+            let left = matches!(drawn[k], PixelUpdate::Keep | PixelUpdate::Either);
+            *update = if now == was {
                 let error = match self.refine {
                     Some(metric) if left && now != seen => metric.error(now, seen),
                     Some(_) if !left => previous.error_of(now),
@@ -366,10 +380,10 @@ impl Tile {
                     self.wrong += 1;
                     self.sum_wrong += error;
                     self.errors[row * TILE + k] = error;
-                    Need::Refine
+                    PixelUpdate::Refine
                 } else {
                     still.count(1);
-                    Need::Keep
+                    PixelUpdate::Keep
                 }
             } else {
                 let error = colour::level_error(now, if left { seen } else { was }) as f32;
@@ -378,12 +392,12 @@ impl Tile {
                 } else {
                     self.excess += error;
                 }
-                let right = if drawn[k] == Need::Either { SEEN_RIGHT_AGAIN } else { SEEN_RIGHT };
+                let right = if drawn[k] == PixelUpdate::Either { SEEN_RIGHT_AGAIN } else { SEEN_RIGHT };
                 self.worst = self.worst.max(error);
                 match error {
-                    0.0 => Need::Keep,
-                    error if error > right => Need::Draw,
-                    _ => Need::Either,
+                    0.0 => PixelUpdate::Keep,
+                    error if error > right => PixelUpdate::Draw,
+                    _ => PixelUpdate::Either,
                 }
             };
         }
@@ -394,30 +408,30 @@ impl Tile {
         AMONG_WORST * self.sum_wrong / self.wrong.max(1) as f32
     }
 
-    fn needs(&self) -> TileNeeds {
+    fn updates(&self) -> TileUpdate {
         let changes = self.worst > SEEN_RIGHT;
         if self.wrong == 0 {
-            return TileNeeds { changes, wrong: 0, error: 0.0 };
+            return TileUpdate { changes, wrong: 0, error: 0.0 };
         }
         let least = self.least_wrong();
         let worst = self.errors.iter().filter(|&&error| error > 0.0 && error >= least);
         let (wrong, sum) = worst.fold((0, 0.0), |(wrong, sum), error| (wrong + 1, sum + error));
-        TileNeeds { changes, wrong, error: sum / wrong as f32 }
+        TileUpdate { changes, wrong, error: sum / wrong as f32 }
     }
 
     /// Keeps the pixels of a row that are not among the worst.
-    fn keep_the_rest(&self, row: usize, needs: &mut [Need], still: &mut StaticPixels) {
+    fn keep_the_rest(&self, row: usize, updates: &mut [PixelUpdate], still: &mut StaticPixels) {
         let least = self.least_wrong();
-        for (need, &error) in needs.iter_mut().zip(&self.errors[row * TILE..]) {
-            if *need == Need::Refine && error < least {
-                *need = Need::Keep;
+        for (update, &error) in updates.iter_mut().zip(&self.errors[row * TILE..]) {
+            if *update == PixelUpdate::Refine && error < least {
+                *update = PixelUpdate::Keep;
                 still.count(1);
             }
         }
     }
 
-    fn may_be_left(&self, left_error: f32) -> bool {
-        self.excess <= left_error * self.pixels as f32 && self.worst <= GLARING
+    fn may_be_left(&self, skip_error: f32) -> bool {
+        self.excess <= skip_error * self.pixels as f32 && self.worst <= MAX_SKIPPED_ERROR
     }
 }
 
@@ -426,20 +440,20 @@ mod tests {
     use super::*;
 
     /// 20 x 20 tiles, of which the first changes and those given are to be refined.
-    fn needs(wrong: &[(usize, usize)]) -> Needs {
-        let mut tiles = vec![TileNeeds::default(); 400];
+    fn updates(wrong: &[(usize, usize)]) -> UpdateMap {
+        let mut tiles = vec![TileUpdate::default(); 400];
         tiles[0].changes = true;
         for &(x, y) in wrong {
-            tiles[y * 20 + x] = TileNeeds { changes: false, wrong: 30, error: 9.0 };
+            tiles[y * 20 + x] = TileUpdate { changes: false, wrong: 30, error: 9.0 };
         }
-        Needs { width: 160, pixels: Vec::new(), tiles }
+        UpdateMap { width: 160, pixels: Vec::new(), tiles }
     }
 
     #[test]
     fn a_little_far_from_all_changes_waits_and_much_does_not() {
         let mut waited = 1;
         let waits = std::iter::from_fn(|| {
-            let mut few = needs(&[(19, 19), (10, 3)]);
+            let mut few = updates(&[(19, 19), (10, 3)]);
             waited = few.confine(2.0, waited);
             (few.tiles[399].error < 2.0).then_some(())
         });
@@ -447,20 +461,20 @@ mod tests {
         assert_eq!(waits.count(), 25_536 / (60 * GROWN_BY));
         assert_eq!(waited, 1);
         let all = (0..400).map(|at| (at % 20, at / 20)).collect::<Vec<_>>();
-        let mut many = needs(&all);
+        let mut many = updates(&all);
         assert_eq!(many.confine(2.0, 1), 1);
         assert!(many.tiles.iter().all(|tile| tile.error >= 2.0 || tile.changes));
     }
 
     #[test]
     fn what_lies_among_changes_does_not_wait() {
-        let mut beside = needs(&[(0, 0), (19, 19)]);
+        let mut beside = updates(&[(0, 0), (19, 19)]);
         beside.tiles[0].changes = true;
         assert_eq!(beside.confine(2.0, 3), 4);
         assert!(beside.tiles[0].error >= 2.0 && beside.tiles[399].error < 2.0);
         // There is nothing to refine, or its error is too small.
-        assert_eq!(needs(&[]).confine(2.0, 3), 3);
-        assert_eq!(needs(&[(19, 19)]).confine(10.0, 3), 3);
+        assert_eq!(updates(&[]).confine(2.0, 3), 3);
+        assert_eq!(updates(&[(19, 19)]).confine(10.0, 3), 3);
     }
 
     #[test]
@@ -470,19 +484,19 @@ mod tests {
         // Half of the tile is a little wrong, the other half much.
         seen[..32].fill([103, 100, 100]);
         seen[32..].fill([112, 100, 100]);
-        let needs = [Need::Keep; 64];
+        let updates = [PixelUpdate::Keep; 64];
         let previous = Previous {
             frame: &pixels,
-            needs: &needs,
+            updates: &updates,
             seen: &seen,
             error: 0.0,
-            left_error: LEFT_ERROR,
+            skip_error: SKIP_ERROR,
             nearest: None,
         };
-        let mut found = Needs::default();
+        let mut found = UpdateMap::default();
         let _ = found.compare(&pixels, 8, previous, true);
-        assert!(found.pixels[..32].iter().all(|&need| need == Need::Keep));
-        assert!(found.pixels[32..].iter().all(|&need| need == Need::Refine));
+        assert!(found.pixels[..32].iter().all(|&update| update == PixelUpdate::Keep));
+        assert!(found.pixels[32..].iter().all(|&update| update == PixelUpdate::Refine));
         let [tile] = found.tiles[..] else { panic!("{:?}", found.tiles) };
         assert_eq!((tile.changes, tile.wrong), (false, 32));
         let error = LocalMetric::new().error(pixels[0], seen[63]);

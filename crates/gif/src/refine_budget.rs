@@ -6,7 +6,7 @@
 //! error are drawn first.
 //!
 //! A frame is prepared before the previous one has been drawn, that is, before it is known how much that one used. So a
-//! frame gets a [`Loan`], and pays back what it did not use.
+//! frame gets a [`Reservation`], and pays back what it did not use.
 
 use std::io;
 
@@ -16,14 +16,14 @@ use crate::state::{StateReader, StateWriter, damaged};
 
 /// An amount of allowance, relative to the pixels that stay: what part of them, and what CIE 1976 difference in the mean of
 /// all of them.
-struct Grant {
+struct BudgetShare {
     pixels: f64,
     difference: f64,
 }
 /// At the start. With what comes later, the mean difference stays below 0.05 over the first 11 frames.
-const AT_FIRST: Grant = Grant { pixels: 0.1, difference: 0.13 };
+const AT_FIRST: BudgetShare = BudgetShare { pixels: 0.1, difference: 0.13 };
 /// Added with each frame of which a fair part changes.
-const EACH_FRAME: Grant = Grant { pixels: 0.2, difference: 0.03 };
+const EACH_FRAME: BudgetShare = BudgetShare { pixels: 0.2, difference: 0.03 };
 /// A frame adds that in full if one of its pixels in so many changes, else proportionally less.
 const FOR_CHANGES: f64 = 8.0;
 /// A loan may be so many times what is left: only a part of the pixels it allows is drawn, and only that is paid. One large
@@ -87,14 +87,14 @@ impl Redrawn {
 
 /// What is left of it.
 #[derive(Debug)]
-pub(crate) struct Allowance {
+pub(crate) struct RefineBudget {
     share: f64,
     difference: f64,
     /// How many frames in a row refined nothing outside of what changed, plus one.
     pub(crate) waited: usize,
 }
 
-impl Allowance {
+impl RefineBudget {
     pub(crate) fn new() -> Self {
         Self { share: AT_FIRST.pixels, difference: AT_FIRST.difference, waited: 1 }
     }
@@ -117,10 +117,10 @@ impl Allowance {
     }
 
     /// Lends what the next frame may use, before the previous one has paid. `of`: pixels of the whole frame.
-    pub(crate) fn lend(&mut self, still: &StaticPixels, of: usize) -> Loan {
+    pub(crate) fn reserve(&mut self, still: &StaticPixels, of: usize) -> Reservation {
         let pixels = still.pixels as f64;
         if pixels * FEW_STAY < of as f64 {
-            return Loan { pixels, share: 0.0, difference: 0.0, least_error: f32::INFINITY };
+            return Reservation { pixels, share: 0.0, difference: 0.0, least_error: f32::INFINITY };
         }
         let most = [self.share * pixels * AHEAD, self.difference * pixels * AHEAD];
         let (mut asked, mut least_error) = ([0.0; 2], 0.0);
@@ -136,32 +136,32 @@ impl Allowance {
         let [share, difference] = asked.map(|sum| LENT * sum / pixels.max(1.0));
         self.share -= share;
         self.difference -= difference;
-        Loan { pixels, share, difference, least_error }
+        Reservation { pixels, share, difference, least_error }
     }
 
     /// Takes back a loan of which nothing is used.
-    pub(crate) fn give_back(&mut self, loan: &Loan) {
-        self.share += loan.share;
-        self.difference += loan.difference;
+    pub(crate) fn release(&mut self, reservation: &Reservation) {
+        self.share += reservation.share;
+        self.difference += reservation.difference;
     }
 
     /// Takes back what was not used of a loan, and adds what a frame of which a part `changed` adds.
-    pub(crate) fn pay(&mut self, loan: &Loan, redrawn: &[Redrawn], changed: f64) {
-        if loan.least_error == f32::INFINITY {
+    pub(crate) fn commit(&mut self, reservation: &Reservation, redrawn: &[Redrawn], changed: f64) {
+        if reservation.least_error == f32::INFINITY {
             return;
         }
         let more = (changed * FOR_CHANGES).min(1.0);
-        let pixels = loan.pixels.max(1.0);
-        self.share += EACH_FRAME.pixels * more + loan.share
+        let pixels = reservation.pixels.max(1.0);
+        self.share += EACH_FRAME.pixels * more + reservation.share
             - redrawn.iter().map(|r| r.pixels).sum::<u64>() as f64 / pixels;
-        self.difference += EACH_FRAME.difference * more + loan.difference
+        self.difference += EACH_FRAME.difference * more + reservation.difference
             - redrawn.iter().map(|r| r.difference).sum::<f64>() / pixels;
     }
 }
 
 /// What a frame may use of the allowance.
 #[derive(Debug)]
-pub(crate) struct Loan {
+pub(crate) struct Reservation {
     /// How many stay.
     pixels: f64,
     share: f64,
@@ -170,7 +170,7 @@ pub(crate) struct Loan {
     pub(crate) least_error: f32,
 }
 
-impl Loan {
+impl Reservation {
     pub(crate) fn write(&self, state: &mut StateWriter) -> io::Result<()> {
         state.f64(self.pixels)?;
         state.f64(self.share)?;
@@ -221,7 +221,7 @@ mod tests {
     fn the_largest_errors_come_first_and_no_more_than_allowed() {
         let mut still = StaticPixels::none();
         (0..1_000).for_each(|k| still.count_wrong(1, 2.0 + k as f32 * 0.01));
-        let least = Allowance::new().lend(&still, still.pixels as usize).least_error;
+        let least = RefineBudget::new().reserve(&still, still.pixels as usize).least_error;
         let drawn = (0..1_000).filter(|&k| 2.0 + k as f32 * 0.01 >= least).count();
         let most = 1_000.0 * AHEAD * AT_FIRST.pixels;
         assert!((100..=most as usize).contains(&drawn), "{drawn} of 1000 from {least}");
@@ -229,28 +229,28 @@ mod tests {
 
     #[test]
     fn in_the_long_run_no_more_is_drawn_than_granted() {
-        let mut allowance = Allowance::new();
+        let mut budget = RefineBudget::new();
         let (frames, mut sum) = (200, 0.0);
-        let mut unpaid: Option<(Loan, Redrawn)> = None;
+        let mut uncommitted: Option<(Reservation, Redrawn)> = None;
         for frame in 0..frames {
             let errors = (0..1_000_u32).map(|k| 2.0 + (k * 37 + frame * 101) as f32 % 97.0);
             let mut still = StaticPixels::none();
-            if allowance.is_left() {
+            if budget.is_left() {
                 errors.clone().for_each(|error| still.count_wrong(1, error));
             } else {
                 still.count(1_000);
             }
-            let loan = allowance.lend(&still, still.pixels as usize);
+            let reservation = budget.reserve(&still, still.pixels as usize);
             let mut redrawn = Redrawn::default();
             if still.errors.iter().any(|&count| count > 0) {
                 errors
-                    .filter(|&error| error >= loan.least_error)
+                    .filter(|&error| error >= reservation.least_error)
                     .for_each(|error| redrawn.count(error, error as u32 / 2));
             }
             sum += redrawn.difference / 1_000.0;
             // As a frame pays only when the next one has its loan.
-            if let Some((loan, redrawn)) = unpaid.replace((loan, redrawn)) {
-                allowance.pay(&loan, &[redrawn], 1.0);
+            if let Some((reservation, redrawn)) = uncommitted.replace((reservation, redrawn)) {
+                budget.commit(&reservation, &[redrawn], 1.0);
             }
         }
         let granted = AT_FIRST.difference * AHEAD + EACH_FRAME.difference * f64::from(frames);
@@ -261,36 +261,36 @@ mod tests {
     fn what_is_used_up_comes_back_slowly() {
         let mut still = StaticPixels::none();
         (0..100).for_each(|_| still.count_wrong(1, 50.0));
-        let mut allowance = Allowance::new();
+        let mut budget = RefineBudget::new();
         let mut all = Redrawn::default();
         (0..100).for_each(|_| all.count(50.0, 25));
-        let loan = allowance.lend(&still, still.pixels as usize);
-        allowance.pay(&loan, &[all], 1.0);
-        assert!(allowance.lend(&still, still.pixels as usize).least_error > 50.0);
+        let reservation = budget.reserve(&still, still.pixels as usize);
+        budget.commit(&reservation, &[all], 1.0);
+        assert!(budget.reserve(&still, still.pixels as usize).least_error > 50.0);
     }
 
     #[test]
     fn where_few_stay_nothing_is_drawn_anew() {
         let mut still = StaticPixels::none();
         (0..100).for_each(|k| still.count_wrong(1, if k < 20 { 50.0 } else { 3.0 }));
-        let mut allowance = Allowance::new();
-        let loan = allowance.lend(&still, 10_000);
-        assert!(loan.least_error > from(STEPS));
-        allowance.pay(&loan, &[], 1.0);
-        assert_eq!((allowance.share, allowance.difference), (AT_FIRST.pixels, AT_FIRST.difference));
-        assert!(allowance.lend(&still, 1_000).least_error <= 50.0);
+        let mut budget = RefineBudget::new();
+        let reservation = budget.reserve(&still, 10_000);
+        assert!(reservation.least_error > from(STEPS));
+        budget.commit(&reservation, &[], 1.0);
+        assert_eq!((budget.share, budget.difference), (AT_FIRST.pixels, AT_FIRST.difference));
+        assert!(budget.reserve(&still, 1_000).least_error <= 50.0);
     }
 
     #[test]
     fn what_was_not_used_comes_back_at_once() {
         let mut still = StaticPixels::none();
         (0..100).for_each(|k| still.count_wrong(1, if k < 20 { 50.0 } else { 3.0 }));
-        let mut allowance = Allowance::new();
-        let first = allowance.lend(&still, still.pixels as usize);
-        let meanwhile = allowance.lend(&still, still.pixels as usize);
-        allowance.pay(&first, &[], 0.0);
-        allowance.pay(&meanwhile, &[], 0.0);
-        let later = allowance.lend(&still, still.pixels as usize);
+        let mut budget = RefineBudget::new();
+        let first = budget.reserve(&still, still.pixels as usize);
+        let meanwhile = budget.reserve(&still, still.pixels as usize);
+        budget.commit(&first, &[], 0.0);
+        budget.commit(&meanwhile, &[], 0.0);
+        let later = budget.reserve(&still, still.pixels as usize);
         assert!(meanwhile.least_error > first.least_error);
         assert_eq!(later.least_error, first.least_error);
     }
