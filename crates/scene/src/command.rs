@@ -13,7 +13,7 @@ use crate::model::{
 
 /// What a command does.
 #[derive(Clone, Copy)]
-pub(crate) enum Act {
+pub(crate) enum Effect {
     /// Sets the size of the image.
     Screen,
     /// Sets the camera.
@@ -59,11 +59,11 @@ fn read<T: Scripted + Into<U>, U>(numbers: &mut Numbers<'_>) -> Result<U, Faults
 
 /// Defines [`Command`] from its names, so that the list of all is whole.
 macro_rules! commands {
-    ($($command:ident: $form:expr, $act:expr, $about:literal;)*) => {
+    ($($command:ident: $form:expr, $effect:expr, $summary:literal;)*) => {
         /// A command of the scene language.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Command {
-            $(#[doc = $about] $command,)*
+            $(#[doc = $summary] $command,)*
         }
 
         impl Command {
@@ -78,16 +78,16 @@ macro_rules! commands {
             }
 
             /// What it is for, in a few words.
-            pub const fn about(self) -> &'static str {
+            pub const fn summary(self) -> &'static str {
                 match self {
-                    $(Self::$command => $about,)*
+                    $(Self::$command => $summary,)*
                 }
             }
 
             /// What it does.
-            pub(crate) const fn act(self) -> Act {
+            pub(crate) const fn effect(self) -> Effect {
                 match self {
-                    $(Self::$command => $act,)*
+                    $(Self::$command => $effect,)*
                 }
             }
         }
@@ -99,33 +99,33 @@ const fn group(name: &'static str) -> Form {
 }
 
 commands! {
-    Screen: Screen::FORM, Act::Screen, "The size of the image.";
-    Orthocamera: ORTHOCAMERA, Act::Camera(|_| Ok(Camera::Orthographic)), "A parallel projection.";
-    Camera: Pinhole::FORM, Act::Camera(read::<Pinhole, _>), "A pinhole camera.";
-    Look: Look::FORM, Act::Camera(read::<Look, _>), "A camera that looks at a target.";
-    Lens: Lens::FORM, Act::Lens, "A lens that is sharp at one distance.";
-    Background: Background::FORM, Act::Background, "What a ray sees that hits nothing.";
-    Samples: Samples::FORM, Act::Samples, "Rays of a pixel.";
-    Shutter: Shutter::FORM, Act::Shutter, "The share of a frame's time that it is exposed.";
-    Tone: Tone::FORM, Act::Tone, "From colours to levels.";
-    Depth: Depth::FORM, Act::Depth, "How many bounces are followed.";
-    Sphere: Sphere::FORM, Act::Object(read::<Sphere, _>), "A sphere.";
-    Triangle: Triangle::FORM, Act::Object(read::<Triangle, _>), "A triangle.";
-    Cuboid: Cuboid::FORM, Act::Object(read::<Cuboid, _>), "A box along the axes.";
-    Plane: Plane::FORM, Act::Object(read::<Plane, _>), "A plane without end.";
-    Disc: Disc::FORM, Act::Object(read::<Disc, _>), "A flat, round disc.";
-    Cylinder: Cylinder::FORM, Act::Object(read::<Cylinder, _>), "A closed cylinder.";
-    Cone: Cone::FORM, Act::Object(read::<Cone, _>), "A closed cone, also cut off.";
-    Torus: Torus::FORM, Act::Object(read::<Torus, _>), "A ring.";
-    Material: MATERIAL, Act::Material, "How a surface answers light, by name.";
-    Group: group("Group"), Act::Group, "Names the objects up to its `End`.";
-    End: Form::new("End", &[]), Act::End, "Ends a group.";
-    Use: USE, Act::Use, "Draws a group.";
-    Ilight: DirectionalLight::FORM, Act::Light(read::<DirectionalLight, _>), "A light at infinity.";
-    Plight: Lamp::FORM, Act::Light(read::<Lamp, _>), "A light at a place.";
-    Frames: FrameNumbers::FORM, Act::Frames, "Which frames a `Trace` is.";
-    Clear: Form::new("Clear", &[]), Act::Clear, "Removes objects and lights.";
-    Trace: Form::new("Trace", &[]), Act::Trace, "Renders a frame.";
+    Screen: Screen::FORM, Effect::Screen, "The size of the image.";
+    Orthocamera: ORTHOCAMERA, Effect::Camera(|_| Ok(Camera::Orthographic)), "A parallel projection.";
+    Camera: Pinhole::FORM, Effect::Camera(read::<Pinhole, _>), "A pinhole camera.";
+    Look: Look::FORM, Effect::Camera(read::<Look, _>), "A camera that looks at a target.";
+    Lens: Lens::FORM, Effect::Lens, "A lens that is sharp at one distance.";
+    Background: Background::FORM, Effect::Background, "What a ray sees that hits nothing.";
+    Samples: Samples::FORM, Effect::Samples, "Rays of a pixel.";
+    Shutter: Shutter::FORM, Effect::Shutter, "The share of a frame's time that it is exposed.";
+    Tone: Tone::FORM, Effect::Tone, "From colours to levels.";
+    Depth: Depth::FORM, Effect::Depth, "How many bounces are followed.";
+    Sphere: Sphere::FORM, Effect::Object(read::<Sphere, _>), "A sphere.";
+    Triangle: Triangle::FORM, Effect::Object(read::<Triangle, _>), "A triangle.";
+    Cuboid: Cuboid::FORM, Effect::Object(read::<Cuboid, _>), "A box along the axes.";
+    Plane: Plane::FORM, Effect::Object(read::<Plane, _>), "A plane without end.";
+    Disc: Disc::FORM, Effect::Object(read::<Disc, _>), "A flat, round disc.";
+    Cylinder: Cylinder::FORM, Effect::Object(read::<Cylinder, _>), "A closed cylinder.";
+    Cone: Cone::FORM, Effect::Object(read::<Cone, _>), "A closed cone, also cut off.";
+    Torus: Torus::FORM, Effect::Object(read::<Torus, _>), "A ring.";
+    Material: MATERIAL, Effect::Material, "How a surface answers light, by name.";
+    Group: group("Group"), Effect::Group, "Names the objects up to its `End`.";
+    End: Form::new("End", &[]), Effect::End, "Ends a group.";
+    Use: USE, Effect::Use, "Draws a group.";
+    Ilight: DirectionalLight::FORM, Effect::Light(read::<DirectionalLight, _>), "A light at infinity.";
+    Plight: Lamp::FORM, Effect::Light(read::<Lamp, _>), "A light at a place.";
+    Frames: FrameNumbers::FORM, Effect::Frames, "Which frames a `Trace` is.";
+    Clear: Form::new("Clear", &[]), Effect::Clear, "Removes objects and lights.";
+    Trace: Form::new("Trace", &[]), Effect::Trace, "Renders a frame.";
 }
 
 impl fmt::Display for Command {

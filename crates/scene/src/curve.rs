@@ -62,7 +62,7 @@ impl Mode {
     }
 
     /// What it does, in a few words.
-    pub(crate) fn about(self) -> &'static str {
+    pub(crate) fn summary(self) -> &'static str {
         match self {
             Self::Linear => "In straight lines from key to key.",
             Self::Smooth => "Without corners; it eases in and out, and never overshoots a key.",

@@ -118,20 +118,20 @@ pub struct ModeEntry {
 
 /// The whole language as data.
 pub fn language() -> Language {
-    let modes = Mode::ALL.iter().map(|mode| ModeEntry { name: mode.name(), about: mode.about() });
+    let modes = Mode::ALL.iter().map(|mode| ModeEntry { name: mode.name(), about: mode.summary() });
     let cycle = ModeEntry { name: CYCLE, about: "It starts again at its last key; beside another mode." };
     Language {
         version: VERSION,
-        commands: Command::ALL.iter().map(|c| entry(c.form(), c.about())).collect(),
-        clauses: Clause::ALL.iter().map(|c| entry(c.form(), c.about())).collect(),
+        commands: Command::ALL.iter().map(|c| entry(c.form(), c.summary())).collect(),
+        clauses: Clause::ALL.iter().map(|c| entry(c.form(), c.summary())).collect(),
         curve_modes: modes.chain([cycle]).collect(),
     }
 }
 
 fn entry(form: &'static Form, about: &'static str) -> CommandEntry {
     let subject = form.subject.map(|subject| match subject {
-        Subject::Defines(names) => SubjectEntry { role: "defines", of: names.thing() },
-        Subject::Refers(names) => SubjectEntry { role: "refers", of: names.thing() },
+        Subject::Defines(names) => SubjectEntry { role: "defines", of: names.noun() },
+        Subject::Refers(names) => SubjectEntry { role: "refers", of: names.noun() },
     });
     CommandEntry {
         name: form.name,
@@ -139,10 +139,10 @@ fn entry(form: &'static Form, about: &'static str) -> CommandEntry {
         about,
         subject,
         parameters: form.fields.iter().map(parameter).collect(),
-        together: form.together.iter().map(|together| together.told(form)).collect(),
+        together: form.constraints.iter().map(|constraint| constraint.describe(form)).collect(),
         curves: form.curves && !form.fields.is_empty(),
         material_instead_from: form.surface().map(|i| form.number(i).0),
-        ends_with: form.ends_with.map(Names::thing),
+        ends_with: form.ends_with.map(Names::noun),
     }
 }
 

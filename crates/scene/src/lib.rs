@@ -33,7 +33,7 @@ mod shown;
 pub use command::Command;
 pub use curve::{Curve, Key, Mode};
 pub use diagnostic::{Code, Diagnostic, Severity};
-pub use form::{Field, Form, Kind, Names, Presence, Subject, Together, Unit, Values};
+pub use form::{Constraint, Field, Form, Kind, Names, Presence, Subject, Unit, Values};
 pub use language::{CommandEntry, Language, ModeEntry, ParameterEntry, SubjectEntry, language};
 pub use limits::Limits;
 pub use model::{

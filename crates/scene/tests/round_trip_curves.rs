@@ -13,8 +13,8 @@ use rayfold_scene::{Clause, Command, Diagnostic, Form, Limits, Script, Values, p
 /// A number, or one that changes.
 #[derive(Clone, Debug)]
 enum Number {
-    Still(f64),
-    Moving { words: &'static str, keys: Vec<(f64, f64)> },
+    Constant(f64),
+    Animated { words: &'static str, keys: Vec<(f64, f64)> },
 }
 
 /// A line, before it is known what of it its command takes.
@@ -41,10 +41,10 @@ fn number() -> impl Strategy<Value = Number> {
     let modes = ["", "linear ", "smooth ", "STEP ", "cycle ", "smooth Cycle ", "cycle step "];
     let keys = prop::collection::btree_map(-50..60i32, value(), 2..6);
     prop_oneof![
-        3 => value().prop_map(Number::Still),
+        3 => value().prop_map(Number::Constant),
         1 => (prop::sample::select(modes.to_vec()), keys).prop_map(|(words, keys)| {
             let keys = keys.into_iter().map(|(frame, value)| (f64::from(frame) / 4.0, value)).collect();
-            Number::Moving { words, keys }
+            Number::Animated { words, keys }
         }),
     ]
 }
@@ -83,14 +83,14 @@ fn numbers(form: &Form, draft: &Draft) -> String {
         let fit = |x: f64| fitting(field.values, x);
         text += " ";
         match (number, field.values) {
-            (Number::Still(x), Values::OneOf(words)) => text += words[fit(*x) as usize],
-            (Number::Moving { .. }, Values::OneOf(words)) => text += words[0],
-            (Number::Moving { words, keys }, _) if form.curves => {
+            (Number::Constant(x), Values::OneOf(words)) => text += words[fit(*x) as usize],
+            (Number::Animated { .. }, Values::OneOf(words)) => text += words[0],
+            (Number::Animated { words, keys }, _) if form.curves => {
                 let keys: Vec<_> = keys.iter().map(|(frame, x)| format!("{frame}:{:e}", fit(*x))).collect();
                 text += &format!("({words}{})", keys.join(" "));
             }
-            (Number::Moving { keys, .. }, _) => text += &fit(keys[0].1).to_string(),
-            (Number::Still(x), _) => text += &format!("{:e}", fit(*x)),
+            (Number::Animated { keys, .. }, _) => text += &fit(keys[0].1).to_string(),
+            (Number::Constant(x), _) => text += &format!("{:e}", fit(*x)),
         }
     }
     text

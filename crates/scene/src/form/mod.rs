@@ -25,7 +25,7 @@ pub struct Form {
     /// Its parameters in their order, the optional ones last.
     pub fields: &'static [Field],
     /// What several of its numbers must keep together.
-    pub together: &'static [Together],
+    pub constraints: &'static [Constraint],
     /// Whether its numbers may be curves.
     pub curves: bool,
     /// The name that stands behind its numbers, if one does.
@@ -163,7 +163,7 @@ pub enum Values {
 
 /// A condition on several parameters, which it names by their place among the fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Together {
+pub enum Constraint {
     /// Two positions or numbers are not the same.
     Differ(usize, usize),
     /// Two positions differ in every component.
@@ -206,8 +206,8 @@ impl Form {
             most += count;
             i += 1;
         }
-        let (subject, together, curves, ends_with) = (None, &[], true, None);
-        Self { name, subject, fields, together, curves, ends_with, required, most, surface }
+        let (subject, constraints, curves, ends_with) = (None, &[], true, None);
+        Self { name, subject, fields, constraints, curves, ends_with, required, most, surface }
     }
 
     /// The same, with a name before its numbers.
@@ -221,8 +221,8 @@ impl Form {
     }
 
     /// The same, with conditions on several parameters.
-    pub(crate) const fn with(self, together: &'static [Together]) -> Self {
-        Self { together, ..self }
+    pub(crate) const fn with(self, constraints: &'static [Constraint]) -> Self {
+        Self { constraints, ..self }
     }
 
     /// The same, without curves.
@@ -436,7 +436,7 @@ impl Display for Presence {
 
 impl Names {
     /// One thing that has such a name.
-    pub fn thing(self) -> &'static str {
+    pub fn noun(self) -> &'static str {
         match self {
             Self::Materials => "material",
             Self::Groups => "group",
@@ -444,9 +444,9 @@ impl Names {
     }
 }
 
-impl Together {
+impl Constraint {
     /// As a person reads it, of the names of the parameters of `form`.
-    pub fn told(self, form: &Form) -> String {
+    pub fn describe(self, form: &Form) -> String {
         let names = |field: usize| format!("`{}`", form.fields[field].names.join(" "));
         match self {
             Self::Differ(a, b) => format!("{} and {} differ", names(a), names(b)),

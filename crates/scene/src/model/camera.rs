@@ -8,7 +8,7 @@ use super::invalid::{Faults, InvalidValue, Parameter, direction, finite, positiv
 use super::look::Look;
 use super::screen::Screen;
 use super::vector::{cross, is_parallel, level, unit};
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values, write_line};
+use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values, write_line};
 
 /// The command of the orthographic camera.
 pub(crate) const ORTHOCAMERA: Form = Form::new("Orthocamera", &[]);
@@ -170,7 +170,7 @@ impl Scripted for Pinhole {
             Field::new(Parameter::WindowCorner, &["bu", "bv"], Kind::WindowPosition, Values::Any),
         ],
     )
-    .with(&[Together::NotParallel(1, 2), Together::DifferEverywhere(4, 5)]);
+    .with(&[Constraint::NotParallel(1, 2), Constraint::DifferEverywhere(4, 5)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let [eye, gaze, up] = [numbers.vector(), numbers.vector(), numbers.vector()];

@@ -5,18 +5,18 @@ use glam::DVec3;
 use super::invalid::{Faults, InvalidValue, Parameter, finite};
 use super::material::{Coefficients, Finish, Glass, Material, Pattern, Shine, Weight};
 use super::surface::{AMBIENT, DIFFUSE, MIRROR};
-use crate::form::{Field, Form, Kind, Names, Numbers, Presence, Subject, Together, Values};
+use crate::form::{Constraint, Field, Form, Kind, Names, Numbers, Presence, Subject, Values};
 
 /// The command that names a material.
 pub(crate) const MATERIAL: Form = Form::new("Material", &[]).with_subject(Subject::Defines(Names::Materials));
 
 /// Defines [`Clause`] from its names, so that the list of all is whole.
 macro_rules! clauses {
-    ($($clause:ident: $form:expr, $about:literal;)*) => {
+    ($($clause:ident: $form:expr, $summary:literal;)*) => {
         /// What a `Material` can say of a surface, each at most once.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Clause {
-            $(#[doc = $about] $clause,)*
+            $(#[doc = $summary] $clause,)*
         }
 
         impl Clause {
@@ -31,9 +31,9 @@ macro_rules! clauses {
             }
 
             /// What it says, in a few words.
-            pub const fn about(self) -> &'static str {
+            pub const fn summary(self) -> &'static str {
                 match self {
-                    $(Self::$clause => $about,)*
+                    $(Self::$clause => $summary,)*
                 }
             }
         }
@@ -65,7 +65,7 @@ clauses! {
     Checker: Form::new("checker", SIZE).ending_with(Names::Materials), "Another material in every other cell.";
     Stripes: Form::new("stripes", SIZE).ending_with(Names::Materials), "Another material in every other stripe along x.";
     Noise: Form::new("noise", SIZE).ending_with(Names::Materials), "Another material here and there.";
-    Gradient: Form::new("gradient", ENDS).with(&[Together::Differ(0, 1)]).ending_with(Names::Materials), "Another material from height a to height b.";
+    Gradient: Form::new("gradient", ENDS).with(&[Constraint::Differ(0, 1)]).ending_with(Names::Materials), "Another material from height a to height b.";
 }
 
 impl Clause {

@@ -97,12 +97,12 @@ impl From<InvalidValue> for Faults {
 
 /// What is allowed, but hardly meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Doubt {
+pub(crate) enum Lint {
     /// A triangle without area is never hit.
     DegenerateTriangle,
 }
 
-impl Doubt {
+impl Lint {
     /// What it is about.
     pub(crate) fn parameter(self) -> Parameter {
         match self {

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::invalid::{Faults, InvalidValue, Parameter, finite};
 use super::vector::{cross, is_parallel, level, unit};
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
+use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 
 /// A pinhole camera at an eye that looks at a target, with square pixels: the ray of column i and row j goes
 /// tan(fov/2)·((2i + 1 - nx)·u + (2j + 1 - ny)·v)/ny - w, in the frame of [`Look::basis`].
@@ -118,7 +118,7 @@ impl Scripted for Look {
                 .optional("0 1 0, or 0 0 -1 for a gaze along y"),
         ],
     )
-    .with(&[Together::Differ(0, 1), Together::LooksAside(0, 1, 3)]);
+    .with(&[Constraint::Differ(0, 1), Constraint::LooksAside(0, 1, 3)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let (eye, target, field_of_view) = (numbers.vector(), numbers.vector(), numbers.number());

@@ -34,7 +34,7 @@ pub use vector::unit;
 
 pub(crate) use camera::{ORTHOCAMERA, unsquashed};
 pub(crate) use clause::{Clauses, MATERIAL};
-pub(crate) use invalid::{Doubt, Faults};
+pub(crate) use invalid::{Faults, Lint};
 pub(crate) use sampling::FrameNumbers;
 pub(crate) use shapes::USE;
 pub(crate) use vector::PARALLEL;

@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::invalid::{Faults, InvalidValue, Parameter, not_negative};
 use super::screen::whole;
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Unit, Values};
+use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Unit, Values};
 
 /// How many rays a pixel gets at most, and to which error.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -264,7 +264,7 @@ impl Scripted for FrameNumbers {
                 .optional("1 to a"),
         ],
     )
-    .with(&[Together::InOrder(0, 1)])
+    .with(&[Constraint::InOrder(0, 1)])
     .fixed();
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {

@@ -45,8 +45,8 @@ pub fn parse_curve(word: &str) -> Option<Curve> {
 /// The first fault, and where.
 pub(super) fn parse(text: &str, span: Range<usize>) -> Result<Number, (Range<usize>, CurveFault)> {
     read(text, span).map(|curve| match *curve.keys() {
-        [key] => Number::Still(key.value),
-        _ => Number::Moving(curve),
+        [key] => Number::Constant(key.value),
+        _ => Number::Animated(curve),
     })
 }
 
@@ -122,8 +122,8 @@ mod tests {
 
     fn parsed(text: &str) -> Result<String, (Range<usize>, CurveFault)> {
         parse(text, 0..text.len()).map(|number| match number {
-            Number::Still(value) => value.to_string(),
-            Number::Moving(curve) => curve.to_string(),
+            Number::Constant(value) => value.to_string(),
+            Number::Animated(curve) => curve.to_string(),
         })
     }
 

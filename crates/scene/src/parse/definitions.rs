@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use super::line::Statement;
-use super::seen::{Moving, Origin, Seen, Suffix, join};
 use super::text::{is_name, parameters};
+use super::visibility::{Animated, Origin, Suffix, VisibleSpan, join};
 use super::{Parser, curve, number, wording};
-use crate::command::{Act, Command};
+use crate::command::{Command, Effect};
 use crate::form::{Names as Kinds, Numbers};
 use crate::model::{Clause, Coefficients, Material};
 use crate::report::Line;
@@ -23,7 +23,7 @@ pub(super) struct MaterialInfo {
     other: Option<usize>,
     /// Of its clauses with curves, among all lines with curves.
     moving: Vec<usize>,
-    seen: Option<Seen>,
+    visible_span: Option<VisibleSpan>,
 }
 
 /// What the parser knows of a group.
@@ -34,7 +34,7 @@ pub(super) struct GroupInfo {
     pub(super) uses: usize,
     pub(super) reach: Reach,
     contents: Contents,
-    seen: Option<Seen>,
+    visible_span: Option<VisibleSpan>,
 }
 
 /// Bounds on what the groups that a group uses are moved and scaled by.
@@ -150,37 +150,37 @@ impl<'a> Parser<'a> {
         let Some(subject) = subject else { return };
         let name = &text[subject.clone()];
         // Nobody is told that it is not used, either.
-        match command.act() {
-            Act::Material => {
+        match command.effect() {
+            Effect::Material => {
                 if self.materials.refer(name).is_none()
                     && self.materials.define(name, line, subject, None).is_ok()
                 {
                     self.materials.refer(name);
                 }
             }
-            Act::Group => {
+            Effect::Group => {
                 if self.groups.refer(name).is_none() && self.groups.define(name, line, subject, None).is_ok()
                 {
                     self.groups.refer(name);
                 }
             }
-            Act::Use => {
+            Effect::Use => {
                 self.groups.refer(name);
             }
-            Act::Screen
-            | Act::Camera(_)
-            | Act::Background
-            | Act::Lens
-            | Act::Samples
-            | Act::Shutter
-            | Act::Tone
-            | Act::Depth
-            | Act::Frames
-            | Act::End
-            | Act::Object(_)
-            | Act::Light(_)
-            | Act::Clear
-            | Act::Trace => {}
+            Effect::Screen
+            | Effect::Camera(_)
+            | Effect::Background
+            | Effect::Lens
+            | Effect::Samples
+            | Effect::Shutter
+            | Effect::Tone
+            | Effect::Depth
+            | Effect::Frames
+            | Effect::End
+            | Effect::Object(_)
+            | Effect::Light(_)
+            | Effect::Clear
+            | Effect::Trace => {}
         }
     }
 
@@ -192,14 +192,14 @@ impl<'a> Parser<'a> {
             |line: &ClauseLine| matches!(line.clause, Clause::Ambient | Clause::Diffuse | Clause::Mirror);
         let is_good = self.report.error_count() == errors_before;
         let other = clauses.iter().find_map(|line| line.other);
-        let is_still = clauses.iter().all(|line| line.row.is_still())
+        let is_constant = clauses.iter().all(|line| line.row.is_constant())
             && other.is_none_or(|other| {
-                self.materials.get(other).thing.as_ref().is_some_and(|info| info.still.is_some())
+                self.materials.get(other).value.as_ref().is_some_and(|info| info.still.is_some())
             });
         let mut named = NamedMaterial { name: name.into(), clauses, still: None };
-        if is_still && is_good {
+        if is_constant && is_good {
             let coefficients = |other: usize| {
-                let info = self.materials.get(other).thing.as_ref();
+                let info = self.materials.get(other).value.as_ref();
                 Ok(info.and_then(|info| info.still.clone()).unwrap_or_default())
             };
             named.still = named.at(0.0, coefficients).ok();
@@ -209,7 +209,7 @@ impl<'a> Parser<'a> {
             is_plain: named.clauses.iter().all(is_plain),
             other,
             moving,
-            seen: None,
+            visible_span: None,
         };
         match self.materials.define(name, s.line, subject.clone(), is_good.then_some(info)) {
             Ok(number) if is_good => {
@@ -259,7 +259,7 @@ impl<'a> Parser<'a> {
                 None => Some(None),
             };
             if let (Some(row), Some(other)) = (row, other) {
-                if row.is_still() {
+                if row.is_constant() {
                     self.check_clause(s, clause, &row, &spans);
                 } else {
                     moving.push(self.keep_moving(s.line, spans, Origin::Clause(clause), &row));
@@ -288,7 +288,7 @@ impl<'a> Parser<'a> {
                 Some((span, word)) if word.starts_with('(') => curve::parse(s.text, span.clone())
                     .map_err(|(span, fault)| (span, wording::curve(fault, name))),
                 Some((span, word)) => number::parse(word)
-                    .map(Number::Still)
+                    .map(Number::Constant)
                     .map_err(|fault| (span.clone(), wording::bad_number(fault, name, word, false))),
                 None => Err((0..0, wording::no_clause())),
             };
@@ -329,7 +329,7 @@ impl<'a> Parser<'a> {
         };
         *next += 1;
         let number = self.refer(Kinds::Materials, s.line, span.clone())?;
-        if self.materials.get(number).thing.as_ref().is_some_and(|info| !info.is_plain) {
+        if self.materials.get(number).value.as_ref().is_some_and(|info| !info.is_plain) {
             let name = &s.text[span.clone()];
             self.report.error(s.line, span, || wording::unfit_material(name));
         }
@@ -408,7 +408,7 @@ impl<'a> Parser<'a> {
     pub(super) fn close_group(&mut self) {
         let Some(group) = self.group.take() else { return };
         let OpenGroup { name, line, subject, recorder, drawn, uses, reach, contents, .. } = group;
-        let info = GroupInfo { drawn, uses, reach, contents, seen: None };
+        let info = GroupInfo { drawn, uses, reach, contents, visible_span: None };
         if self.groups.define(name, line, subject, Some(info)).is_ok() {
             self.record(|script| script.add_group(recorder.finish(name, drawn)));
         }
@@ -423,7 +423,7 @@ impl<'a> Parser<'a> {
         row: &Row,
     ) -> usize {
         self.is_fresh = true;
-        self.moving.push(Moving { line, spans, row: row.clone(), origin, seen: None });
+        self.moving.push(Animated { line, spans, row: row.clone(), origin, visible_span: None });
         self.moving.len() - 1
     }
 
@@ -464,7 +464,7 @@ impl<'a> Parser<'a> {
     /// A setting stands no more, since the Trace of which it stood.
     pub(super) fn settle(&mut self, old: Option<(Option<usize>, usize)>) {
         if let Some((Some(number), since)) = old {
-            join(&mut self.moving[number].seen, Suffix::of(&self.exposures).from(since));
+            join(&mut self.moving[number].visible_span, Suffix::of(&self.exposures).from(since));
         }
     }
 
@@ -474,18 +474,18 @@ impl<'a> Parser<'a> {
         self.settle(background);
         let mut suffix = Suffix::of(&self.exposures);
         for (number, since) in self.pending.moving.drain(..).rev() {
-            join(&mut self.moving[number].seen, suffix.from(since));
+            join(&mut self.moving[number].visible_span, suffix.from(since));
         }
         let mut suffix = Suffix::of(&self.exposures);
         for (number, since) in self.pending.materials.drain(..).rev() {
-            if let Some(info) = self.materials.thing_mut(number) {
-                join(&mut info.seen, suffix.from(since));
+            if let Some(info) = self.materials.value_mut(number) {
+                join(&mut info.visible_span, suffix.from(since));
             }
         }
         let mut suffix = Suffix::of(&self.exposures);
         for (number, since) in self.pending.groups.drain(..).rev() {
-            if let Some(info) = self.groups.thing_mut(number) {
-                join(&mut info.seen, suffix.from(since));
+            if let Some(info) = self.groups.value_mut(number) {
+                join(&mut info.visible_span, suffix.from(since));
             }
         }
     }
@@ -498,31 +498,33 @@ impl<'a> Parser<'a> {
         }
         // What a group or a material refers to stands before it.
         for number in (0..self.groups.all().len()).rev() {
-            let Some(GroupInfo { seen, contents, .. }) = self.groups.thing_mut(number) else { continue };
-            let (seen, contents) = (seen.take(), std::mem::take(contents));
+            let Some(GroupInfo { visible_span, contents, .. }) = self.groups.value_mut(number) else {
+                continue;
+            };
+            let (visible_span, contents) = (visible_span.take(), std::mem::take(contents));
             for number in contents.moving {
-                join(&mut self.moving[number].seen, seen.as_ref());
+                join(&mut self.moving[number].visible_span, visible_span.as_ref());
             }
             for number in contents.materials {
-                if let Some(info) = self.materials.thing_mut(number) {
-                    join(&mut info.seen, seen.as_ref());
+                if let Some(info) = self.materials.value_mut(number) {
+                    join(&mut info.visible_span, visible_span.as_ref());
                 }
             }
             for number in contents.groups {
-                if let Some(info) = self.groups.thing_mut(number) {
-                    join(&mut info.seen, seen.as_ref());
+                if let Some(info) = self.groups.value_mut(number) {
+                    join(&mut info.visible_span, visible_span.as_ref());
                 }
             }
         }
         for number in (0..self.materials.all().len()).rev() {
-            let Some(info) = self.materials.thing_mut(number) else { continue };
-            let (seen, moving) = (info.seen.take(), std::mem::take(&mut info.moving));
+            let Some(info) = self.materials.value_mut(number) else { continue };
+            let (visible_span, moving) = (info.visible_span.take(), std::mem::take(&mut info.moving));
             let other = info.other;
             for number in moving {
-                join(&mut self.moving[number].seen, seen.as_ref());
+                join(&mut self.moving[number].visible_span, visible_span.as_ref());
             }
-            if let Some(info) = other.and_then(|other| self.materials.thing_mut(other)) {
-                join(&mut info.seen, seen.as_ref());
+            if let Some(info) = other.and_then(|other| self.materials.value_mut(other)) {
+                join(&mut info.visible_span, visible_span.as_ref());
             }
         }
     }

@@ -5,7 +5,7 @@ use std::str::Utf8Error;
 
 use super::text::{Words, is_name};
 use super::{Parser, curve, number, wording};
-use crate::command::{Act, Command, MAX_NUMBERS};
+use crate::command::{Command, Effect, MAX_NUMBERS};
 use crate::form::{Subject, Values};
 use crate::report::{Fault, Line};
 use crate::row::{Number, Row};
@@ -44,7 +44,7 @@ impl<'a> Statement<'a, '_> {
     /// Its numbers, where none is a curve.
     pub(super) fn still_row(&self) -> Row {
         let count = self.words.count() - usize::from(self.surface.is_some());
-        Row::new(self.values[..count].iter().copied().map(Number::Still).collect())
+        Row::new(self.values[..count].iter().copied().map(Number::Constant).collect())
     }
 
     /// The name that stands before the numbers.
@@ -124,7 +124,7 @@ impl<'a> Parser<'a> {
                 }
             },
         };
-        if matches!(command.act(), Act::Material) {
+        if matches!(command.effect(), Effect::Material) {
             return Some(Statement { line, text, command, words, subject, values, row: None, surface: None });
         }
         let Some(Parameters { row, surface }) = self.parameters(line, text, command, words, values) else {
@@ -246,7 +246,7 @@ impl<'a> Parser<'a> {
                         good = false;
                         self.report.error(line, span.clone(), || wording::unwanted_curve(command, name));
                     }
-                    Ok(Number::Still(value)) => values[i] = value,
+                    Ok(Number::Constant(value)) => values[i] = value,
                     Ok(curve) => curves.push((i, curve)),
                     Err((place, fault)) => {
                         good = false;
@@ -288,7 +288,7 @@ impl<'a> Parser<'a> {
         }
         if !curves.is_empty() {
             let count = count.min(most) - usize::from(parameters.surface.is_some());
-            let mut numbers: Vec<_> = values[..count].iter().copied().map(Number::Still).collect();
+            let mut numbers: Vec<_> = values[..count].iter().copied().map(Number::Constant).collect();
             curves.into_iter().for_each(|(i, curve)| numbers[i] = curve);
             parameters.row = Some(Row::new(numbers));
         }

@@ -2,7 +2,7 @@
 //!
 //! Parsing never stops at a fault: what can be said about a text is said in one go. A line is understood alone, but for
 //! the names that it refers to; `Trace` looks at what came before, and the end at when lines with curves are seen
-//! (`seen`). Nothing is allocated for a line that is in order and has neither curves nor names, and nothing is kept of a
+//! (`visible_span`). Nothing is allocated for a line that is in order and has neither curves nor names, and nothing is kept of a
 //! script that has an error. A fault is told once: what follows from one that was told is not.
 //!
 //! Follows `docs/language.md`, where the forms of numbers, blanks and line ends are decided.
@@ -13,13 +13,13 @@ mod line;
 mod names;
 mod number;
 mod picture;
-mod seen;
 mod text;
+mod visibility;
 mod wording;
 
 use std::ops::Range;
 
-use crate::command::{Act, Command, Reader};
+use crate::command::{Command, Effect, Reader};
 use crate::diagnostic::Diagnostic;
 use crate::form::{Names as Kinds, Numbers, Scripted};
 use crate::limits::Limits;
@@ -33,8 +33,8 @@ use definitions::{GroupInfo, MaterialInfo, OpenGroup, Pending};
 use line::Statement;
 use names::Names;
 use picture::Picture;
-use seen::{Exposure, Moving, Origin};
 use text::{Words, lines};
+use visibility::{Animated, Exposure, Origin};
 
 /// What a text turned out to be.
 #[derive(Clone, Debug)]
@@ -93,7 +93,7 @@ struct Parser<'a> {
     groups: Names<'a, GroupInfo>,
     group: Option<OpenGroup<'a>>,
     /// All lines with curves, and what was not seen yet of the scene as it stands.
-    moving: Vec<Moving<'a>>,
+    moving: Vec<Animated<'a>>,
     pending: Pending,
     /// Names that nothing before them had, of what, and where.
     unresolved: Vec<(Kinds, Line<'a>, Range<usize>)>,
@@ -173,7 +173,7 @@ impl<'a> Parser<'a> {
         }
         self.tell_unused_names();
         self.settle_all();
-        seen::check(&self.moving, &self.exposures, &mut self.report);
+        visibility::check(&self.moving, &self.exposures, &mut self.report);
         let script = if self.report.has_errors() { None } else { self.recorder.finish() };
         Parsed { script, diagnostics: self.report.finish() }
     }
@@ -187,59 +187,59 @@ impl<'a> Parser<'a> {
 
     /// A command was there, though faulty: that it is missing would be told in vain.
     fn expect_no_more_of(&mut self, command: Command) {
-        match command.act() {
-            Act::Trace => {
+        match command.effect() {
+            Effect::Trace => {
                 self.trace_misspelt = true;
                 self.unseen = Unseen::NOTHING;
             }
-            Act::Screen => {
+            Effect::Screen => {
                 if matches!(self.screen, ScreenState::Unset) {
                     self.screen = ScreenState::Faulty;
                 }
             }
-            Act::Group => self.line_lost = true,
-            Act::End => self.close_group(),
-            Act::Camera(_)
-            | Act::Background
-            | Act::Lens
-            | Act::Samples
-            | Act::Shutter
-            | Act::Tone
-            | Act::Depth
-            | Act::Frames
-            | Act::Material
-            | Act::Use
-            | Act::Object(_)
-            | Act::Light(_)
-            | Act::Clear => {}
+            Effect::Group => self.line_lost = true,
+            Effect::End => self.close_group(),
+            Effect::Camera(_)
+            | Effect::Background
+            | Effect::Lens
+            | Effect::Samples
+            | Effect::Shutter
+            | Effect::Tone
+            | Effect::Depth
+            | Effect::Frames
+            | Effect::Material
+            | Effect::Use
+            | Effect::Object(_)
+            | Effect::Light(_)
+            | Effect::Clear => {}
         }
     }
 
     fn run(&mut self, s: &Statement<'a, '_>) {
-        let act = s.command.act();
-        if self.group.is_some() && !matches!(act, Act::Object(_) | Act::Use | Act::End) {
+        let effect = s.command.effect();
+        if self.group.is_some() && !matches!(effect, Effect::Object(_) | Effect::Use | Effect::End) {
             self.leave_group_at(s);
         }
-        match act {
-            Act::Screen => self.screen(s),
-            Act::Camera(read) => self.camera(s, read),
-            Act::Background => self.background(s),
-            Act::Lens => self.lens(s),
-            Act::Samples => {
+        match effect {
+            Effect::Screen => self.screen(s),
+            Effect::Camera(read) => self.camera(s, read),
+            Effect::Background => self.background(s),
+            Effect::Lens => self.lens(s),
+            Effect::Samples => {
                 self.set(s, |recorder, samples| recorder.samples = samples);
             }
-            Act::Shutter => self.set(s, |recorder, shutter| recorder.shutter = shutter),
-            Act::Tone => self.set(s, |recorder, tone| recorder.tone = tone),
-            Act::Depth => self.set(s, |recorder, depth| recorder.depth = depth),
-            Act::Frames => self.set(s, |recorder, numbers| recorder.numbers = numbers),
-            Act::Material => self.material(s),
-            Act::Group => self.open_group(s),
-            Act::End => self.end_group(s),
-            Act::Use => self.draw_group(s),
-            Act::Object(read) => self.object(s, read),
-            Act::Light(read) => self.light(s, read),
-            Act::Clear => self.clear(),
-            Act::Trace => self.trace(s),
+            Effect::Shutter => self.set(s, |recorder, shutter| recorder.shutter = shutter),
+            Effect::Tone => self.set(s, |recorder, tone| recorder.tone = tone),
+            Effect::Depth => self.set(s, |recorder, depth| recorder.depth = depth),
+            Effect::Frames => self.set(s, |recorder, numbers| recorder.numbers = numbers),
+            Effect::Material => self.material(s),
+            Effect::Group => self.open_group(s),
+            Effect::End => self.end_group(s),
+            Effect::Use => self.draw_group(s),
+            Effect::Object(read) => self.object(s, read),
+            Effect::Light(read) => self.light(s, read),
+            Effect::Clear => self.clear(),
+            Effect::Trace => self.trace(s),
         }
     }
 
@@ -262,12 +262,12 @@ impl<'a> Parser<'a> {
         reader: Reader<T>,
     ) -> Option<(Value<T>, Option<usize>)> {
         match &s.row {
-            None => self.read(s, None, reader).map(|value| (Value::Still(value), None)),
+            None => self.read(s, None, reader).map(|value| (Value::Constant(value), None)),
             Some(row) => {
                 let template = Template { command: s.command, row: row.clone() };
                 let number =
                     self.keep_moving(s.line, s.words.parameters().to_vec(), Origin::Command(s.command), row);
-                Some((Value::Moving(template), Some(number)))
+                Some((Value::Animated(template), Some(number)))
             }
         }
     }
@@ -333,20 +333,20 @@ impl<'a> Parser<'a> {
         let (number, material) = match surface {
             None => (None, None),
             Some(Some(number)) => {
-                let info = self.materials.get(number).thing.as_ref();
+                let info = self.materials.get(number).value.as_ref();
                 // Of one with curves its line is kept; of a faulty one nothing.
                 (Some(number), info.map(|info| info.still.clone()))
             }
             Some(None) => (None, Some(Some(Material::default()))),
         };
         let moves = matches!(material, Some(None));
-        let is_still = s.row.is_none() && !moves;
-        let drawn = if is_still {
+        let is_constant = s.row.is_none() && !moves;
+        let drawn = if is_constant {
             let material = material.flatten().or(number.map(|_| Material::default()));
             let Some(object) = self.read(s, material.as_ref(), read) else { return };
-            if let Some(doubt) = object.doubt() {
-                let place = s.command.form().place(|_, parameter| parameter == doubt.parameter());
-                self.report.warning(s.line, s.words.span(place), || wording::doubtful(doubt));
+            if let Some(lint) = object.lint() {
+                let place = s.command.form().place(|_, parameter| parameter == lint.parameter());
+                self.report.warning(s.line, s.words.span(place), || wording::lint_fault(lint));
             }
             Err(object)
         } else {
@@ -455,7 +455,7 @@ impl<'a> Parser<'a> {
         };
         let Some(number) = number else { return };
         let row = s.row.clone().unwrap_or_else(|| s.still_row());
-        let Some(info) = self.groups.get(number).thing.as_ref() else { return };
+        let Some(info) = self.groups.get(number).value.as_ref() else { return };
         let (reach, scale) = info.reach.placed(&row);
         let is_hidden = still == Some(None) || info.drawn == 0;
         let (drawn, uses) = if is_hidden { (0, 0) } else { (info.drawn, info.uses.saturating_add(1)) };

@@ -7,7 +7,7 @@ use crate::report::Line;
 
 /// How many names are compared with one that is unknown, in a whole script: far more than a person gives, few enough
 /// that a large script in which every name is unknown takes no longer than another.
-const MOST_COMPARED: usize = 1 << 20;
+const MAX_COMPARED: usize = 1 << 20;
 
 /// The things of one kind that have names.
 pub(super) struct Names<'a, T> {
@@ -24,7 +24,7 @@ pub(super) struct Named<'a, T> {
     pub(super) span: Range<usize>,
     pub(super) is_used: bool,
     /// `None` where its definition is faulty.
-    pub(super) thing: Option<T>,
+    pub(super) value: Option<T>,
 }
 
 impl<'a, T> Names<'a, T> {
@@ -41,14 +41,14 @@ impl<'a, T> Names<'a, T> {
         name: &'a str,
         line: Line<'a>,
         span: Range<usize>,
-        thing: Option<T>,
+        value: Option<T>,
     ) -> Result<usize, usize> {
         if let Some(&first) = self.numbers.get(name) {
             return Err(self.all[first].line.number);
         }
         let number = self.all.len();
         self.numbers.insert(name, number);
-        self.all.push(Named { name, line, span, is_used: false, thing });
+        self.all.push(Named { name, line, span, is_used: false, value });
         Ok(number)
     }
 
@@ -68,8 +68,8 @@ impl<'a, T> Names<'a, T> {
         &self.all[number]
     }
 
-    pub(super) fn thing_mut(&mut self, number: usize) -> Option<&mut T> {
-        self.all[number].thing.as_mut()
+    pub(super) fn value_mut(&mut self, number: usize) -> Option<&mut T> {
+        self.all[number].value.as_mut()
     }
 
     pub(super) fn all(&self) -> &[Named<'a, T>] {
@@ -83,7 +83,7 @@ impl<'a, T> Names<'a, T> {
             return None;
         }
         let lower = name.to_lowercase();
-        let left = MOST_COMPARED.saturating_sub(self.compared);
+        let left = MAX_COMPARED.saturating_sub(self.compared);
         self.compared += self.all.len();
         let candidates = self.all.iter().take(left).filter(|named| named.name.len() <= 80);
         let near = candidates

@@ -35,27 +35,27 @@ impl<'a> Picture<'a> {
     pub(super) fn camera_set(&mut self, s: &Statement<'a, '_>, camera: &Value<Camera>) {
         self.is_compared = false;
         self.has_camera = true;
-        self.is_orthographic = *camera == Value::Still(Camera::Orthographic);
+        self.is_orthographic = *camera == Value::Constant(Camera::Orthographic);
         let corners = match camera {
-            Value::Still(Camera::Pinhole(pinhole)) => {
+            Value::Constant(Camera::Pinhole(pinhole)) => {
                 let (a, b) = (pinhole.lower_left(), pinhole.upper_right());
                 Some([a.x, a.y, b.x, b.y])
             }
-            Value::Moving(template) if template.command == Command::Camera => {
+            Value::Animated(template) if template.command == Command::Camera => {
                 let still = |number: &Number| match number {
-                    Number::Still(value) => Some(*value),
-                    Number::Moving(_) => None,
+                    Number::Constant(value) => Some(*value),
+                    Number::Animated(_) => None,
                 };
                 let corners: Option<Vec<_>> = template.row.numbers()[10..].iter().map(still).collect();
                 corners.and_then(|corners| corners.try_into().ok())
             }
-            Value::Still(Camera::Orthographic | Camera::Look(_)) | Value::Moving(_) => None,
+            Value::Constant(Camera::Orthographic | Camera::Look(_)) | Value::Animated(_) => None,
         };
         self.window = corners.map(|corners| (s.line, s.words.span(10..14), corners));
     }
 
     pub(super) fn lens_set(&mut self, s: &Statement<'a, '_>, lens: &Value<Lens>) {
-        let is_point = matches!(lens, Value::Still(lens) if lens.radius() == 0.0);
+        let is_point = matches!(lens, Value::Constant(lens) if lens.radius() == 0.0);
         self.lens = (!is_point).then(|| s.place());
     }
 
@@ -71,7 +71,7 @@ impl<'a> Picture<'a> {
         }
         let Some((line, span, corners)) = &self.window else { return };
         if let Some(better) = unsquashed(*corners, screen) {
-            report.warning(*line, span.clone(), || wording::squashed(screen, better));
+            report.warning(*line, span.clone(), || wording::non_square_pixels(screen, better));
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::command::Command;
 use crate::curve::{CYCLE, Mode, Moment};
 use crate::diagnostic::Code;
 use crate::form::{Field, Form, Kind, Names, Unit, Values};
-use crate::model::{Clause, Doubt, InvalidValue, Screen};
+use crate::model::{Clause, InvalidValue, Lint, Screen};
 use crate::report::Fault;
 use crate::shown::{grouped, nearest, quoted};
 
@@ -305,7 +305,7 @@ fn listed<'a>(words: impl Iterator<Item = &'a str>) -> String {
 const NAME_HELP: &str = "a name is a letter or `_`, then letters, digits, `_` and `-`";
 
 pub(super) fn no_name(command: Command, names: Names) -> Fault {
-    Fault::new(Code::MalformedName, format!("`{command}` lacks the name of a {}", names.thing()))
+    Fault::new(Code::MalformedName, format!("`{command}` lacks the name of a {}", names.noun()))
         .expected("expected a name here")
         .help(format!("write `{}`", usage(command)))
 }
@@ -319,19 +319,19 @@ fn usage(command: Command) -> String {
 
 pub(super) fn bad_name(word: &str, names: Names) -> Fault {
     Fault::new(Code::MalformedName, format!("{} is no name", quoted(word)))
-        .expected(format!("expected the name of a {}", names.thing()))
+        .expected(format!("expected the name of a {}", names.noun()))
         .help(NAME_HELP)
 }
 
 /// `later` is the line in which it is given; `nearest` was perhaps meant.
 pub(super) fn unknown_name(names: Names, name: &str, later: Option<usize>, nearest: Option<&str>) -> Fault {
-    let thing = names.thing();
+    let noun = names.noun();
     let message = match later {
-        Some(line) => format!("the {thing} {} is not known before line {line}", quoted(name)),
-        None => format!("there is no {thing} {}", quoted(name)),
+        Some(line) => format!("the {noun} {} is not known before line {line}", quoted(name)),
+        None => format!("there is no {noun} {}", quoted(name)),
     };
     let fault = Fault::new(Code::UnknownName, message)
-        .expected(format!("expected a {thing} that is defined before this"));
+        .expected(format!("expected a {noun} that is defined before this"));
     match (later, nearest) {
         (Some(line), _) => fault.help(format!("move line {line} up, before this")),
         (None, Some(near)) => fault.help(format!("did you mean `{near}`?")),
@@ -346,15 +346,15 @@ pub(super) fn uses_itself(name: &str) -> Fault {
 
 /// `first` is the line in which it was given before.
 pub(super) fn defined_twice(names: Names, name: &str, first: usize) -> Fault {
-    let thing = names.thing();
-    Fault::new(Code::DuplicateName, format!("there is a {thing} {} already, in line {first}", quoted(name)))
+    let noun = names.noun();
+    Fault::new(Code::DuplicateName, format!("there is a {noun} {} already, in line {first}", quoted(name)))
         .expected("expected another name")
 }
 
 pub(super) fn unused_name(names: Names) -> Fault {
-    let thing = names.thing();
-    Fault::new(Code::Unused, format!("this {thing} is not used"))
-        .expected(format!("expected something that uses this {thing}"))
+    let noun = names.noun();
+    Fault::new(Code::Unused, format!("this {noun} is not used"))
+        .expected(format!("expected something that uses this {noun}"))
 }
 
 pub(super) fn no_clause() -> Fault {
@@ -430,7 +430,7 @@ pub(super) fn lens_without_effect() -> Fault {
 }
 
 /// `better` is a window that would not.
-pub(super) fn squashed(screen: Screen, better: [f64; 4]) -> Fault {
+pub(super) fn non_square_pixels(screen: Screen, better: [f64; 4]) -> Fault {
     let better: Vec<_> = better.iter().map(|x| short(*x)).collect();
     Fault::new(Code::SquashedImage, "the picture is squashed: a ball is no circle in it")
         .expected(format!("expected a window of the shape {} : {}", screen.width(), screen.height()))
@@ -487,9 +487,9 @@ pub(super) fn no_trace() -> Fault {
         .help(TRACE_HELP)
 }
 
-pub(super) fn doubtful(doubt: Doubt) -> Fault {
-    match doubt {
-        Doubt::DegenerateTriangle => {
+pub(super) fn lint_fault(lint: Lint) -> Fault {
+    match lint {
+        Lint::DegenerateTriangle => {
             Fault::new(Code::DegenerateTriangle, "a triangle of no area is never hit")
                 .expected("expected three points that are not on a line")
         }

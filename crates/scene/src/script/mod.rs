@@ -75,8 +75,8 @@ pub(crate) struct View {
 /// What is the same in all frames, or read anew for each.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value<T> {
-    Still(T),
-    Moving(Template),
+    Constant(T),
+    Animated(Template),
 }
 
 /// A line that is read at each moment that is asked for.
@@ -217,7 +217,7 @@ impl Script {
             ShotSummary {
                 frame_count: shot.frame_count(),
                 screen: view.screen,
-                is_orthographic: view.camera == Value::Still(Camera::Orthographic),
+                is_orthographic: view.camera == Value::Constant(Camera::Orthographic),
                 objects: shot.drawn,
             }
         })
@@ -368,6 +368,6 @@ impl Objects {
 
 impl<T: Default> Default for Value<T> {
     fn default() -> Self {
-        Self::Still(T::default())
+        Self::Constant(T::default())
     }
 }

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use super::{Drawn, Extent, Group, NamedMaterial, Script, Shot, Template, Value};
-use crate::command::{Act, Reader};
+use crate::command::{Effect, Reader};
 use crate::form::{Numbers, Scripted};
 use crate::model::{Clauses, Coefficients, Faults, Instance, Light, Material, Object, Placement, Scene};
 use crate::row::Row;
@@ -35,8 +35,8 @@ struct Level {
 impl Script {
     pub(super) fn scene(&self, shot: &Shot, frame: f64) -> Result<Scene, Faults> {
         let view = &self.views[shot.view];
-        let camera = view.camera.at(frame, |act| match act {
-            Act::Camera(read) => Some(read),
+        let camera = view.camera.at(frame, |effect| match effect {
+            Effect::Camera(read) => Some(read),
             _ => None,
         })?;
         let mut scene = Scene::new(view.screen, camera);
@@ -228,22 +228,26 @@ impl Template {
     }
 
     pub(crate) fn object(&self, frame: f64, surface: Option<&Material>) -> Result<Object, Faults> {
-        let Act::Object(read) = self.command.act() else { unreachable!("`{}` is no object", self.command) };
+        let Effect::Object(read) = self.command.effect() else {
+            unreachable!("`{}` is no object", self.command)
+        };
         self.at(frame, surface, read)
     }
 
     pub(crate) fn light(&self, frame: f64) -> Result<Light, Faults> {
-        let Act::Light(read) = self.command.act() else { unreachable!("`{}` is no light", self.command) };
+        let Effect::Light(read) = self.command.effect() else {
+            unreachable!("`{}` is no light", self.command)
+        };
         self.at(frame, None, read)
     }
 }
 
 impl<T: Clone> Value<T> {
     /// `reader` finds in what the line's command does how it is read.
-    fn at(&self, frame: f64, reader: impl Fn(Act) -> Option<Reader<T>>) -> Result<T, Faults> {
+    fn at(&self, frame: f64, reader: impl Fn(Effect) -> Option<Reader<T>>) -> Result<T, Faults> {
         match self {
-            Self::Still(value) => Ok(value.clone()),
-            Self::Moving(template) => match reader(template.command.act()) {
+            Self::Constant(value) => Ok(value.clone()),
+            Self::Animated(template) => match reader(template.command.effect()) {
                 Some(read) => template.at(frame, None, read),
                 None => unreachable!("`{}` is no such thing", template.command),
             },

@@ -27,13 +27,13 @@ impl From<&Scene> for Script {
             namer.add(object);
         }
         let mut recorder = namer.recorder;
-        recorder.set_camera(Value::Still(scene.camera));
-        recorder.set_background(Value::Still(scene.background));
-        recorder.set_lens(Value::Still(scene.lens));
+        recorder.set_camera(Value::Constant(scene.camera));
+        recorder.set_background(Value::Constant(scene.background));
+        recorder.set_lens(Value::Constant(scene.lens));
         (recorder.samples, recorder.shutter) = (scene.samples, scene.shutter);
         (recorder.tone, recorder.depth) = (scene.tone, scene.depth);
         recorder.numbers = FrameNumbers::default();
-        scene.lights.iter().for_each(|light| recorder.add_light(Value::Still(*light)));
+        scene.lights.iter().for_each(|light| recorder.add_light(Value::Constant(*light)));
         recorder.trace(scene.screen, scene.objects.len());
         recorder.finish().unwrap_or_else(|| unreachable!("a frame was recorded"))
     }
@@ -124,7 +124,7 @@ fn line(clause: Clause, numbers: &[&[f64]], other: Option<usize>) -> ClauseLine 
 }
 
 fn row(numbers: &[&[f64]]) -> Row {
-    Row::new(numbers.concat().into_iter().map(Number::Still).collect())
+    Row::new(numbers.concat().into_iter().map(Number::Constant).collect())
 }
 
 fn row_of(placement: &Placement) -> Row {

@@ -92,8 +92,8 @@ impl Recorder {
 
     pub(crate) fn add_light(&mut self, light: Value<Light>) {
         match light {
-            Value::Still(light) => self.lights.still.push(light),
-            Value::Moving(template) => self.lights.others.push((self.lights.still.len(), template)),
+            Value::Constant(light) => self.lights.still.push(light),
+            Value::Animated(template) => self.lights.others.push((self.lights.still.len(), template)),
         }
     }
 

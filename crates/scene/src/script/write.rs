@@ -31,7 +31,7 @@ impl Display for Script {
         for shot in &self.shots {
             let view = &self.views[shot.view];
             let (mut objects, mut lights) = (shot.objects.clone(), shot.lights.clone());
-            let mut background = &Value::Still(Background::default());
+            let mut background = &Value::Constant(Background::default());
             if let Some(seen) = seen {
                 if seen.objects.starts_with(&objects) && seen.lights.starts_with(&lights) {
                     background = &last.background;
@@ -50,8 +50,8 @@ impl Display for Script {
             }
             if *background != view.background {
                 match &view.background {
-                    Value::Still(background) => write_line(f, background, None)?,
-                    Value::Moving(template) => template.write(f, None)?,
+                    Value::Constant(background) => write_line(f, background, None)?,
+                    Value::Animated(template) => template.write(f, None)?,
                 }
             }
             self.write_lights(f, &lights)?;
@@ -144,14 +144,14 @@ impl View {
     fn write_changes(&self, f: &mut Formatter<'_>, last: &Self) -> fmt::Result {
         if self.camera != last.camera {
             match &self.camera {
-                Value::Still(camera) => Camera::write(camera, f)?,
-                Value::Moving(template) => template.write(f, None)?,
+                Value::Constant(camera) => Camera::write(camera, f)?,
+                Value::Animated(template) => template.write(f, None)?,
             }
         }
         if self.lens != last.lens {
             match &self.lens {
-                Value::Still(lens) => write_line::<Lens>(f, lens, None)?,
-                Value::Moving(template) => template.write(f, None)?,
+                Value::Constant(lens) => write_line::<Lens>(f, lens, None)?,
+                Value::Animated(template) => template.write(f, None)?,
             }
         }
         if self.samples != last.samples {

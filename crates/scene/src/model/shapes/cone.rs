@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
+use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative};
 use crate::model::material::Material;
 use crate::model::surface;
@@ -69,7 +69,7 @@ impl Scripted for Cone {
             surface::MIRROR,
         ],
     )
-    .with(&[Together::NotBothZero(0, 1), Together::Differ(2, 3)]);
+    .with(&[Constraint::NotBothZero(0, 1), Constraint::Differ(2, 3)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let radii = [numbers.number(), numbers.number()];

@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
+use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, positive};
 use crate::model::material::Material;
 use crate::model::surface;
@@ -64,7 +64,7 @@ impl Scripted for Cylinder {
             surface::MIRROR,
         ],
     )
-    .with(&[Together::Differ(1, 2)]);
+    .with(&[Constraint::Differ(1, 2)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let (radius, ends) = (numbers.number(), [numbers.vector(), numbers.vector()]);

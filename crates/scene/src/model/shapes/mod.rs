@@ -28,7 +28,7 @@ pub use sphere::Sphere;
 pub use torus::Torus;
 pub use triangle::Triangle;
 
-use super::invalid::{Doubt, InvalidValue};
+use super::invalid::{InvalidValue, Lint};
 use super::material::Material;
 use crate::form::write_line;
 
@@ -90,9 +90,9 @@ impl Object {
     }
 
     /// What is hardly meant about it.
-    pub(crate) fn doubt(&self) -> Option<Doubt> {
+    pub(crate) fn lint(&self) -> Option<Lint> {
         match self {
-            Self::Triangle(o) => o.is_degenerate().then_some(Doubt::DegenerateTriangle),
+            Self::Triangle(o) => o.is_degenerate().then_some(Lint::DegenerateTriangle),
             Self::Sphere(_)
             | Self::Cuboid(_)
             | Self::Plane(_)

@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
+use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite, positive};
 use crate::model::material::Material;
 use crate::model::surface;
@@ -86,7 +86,7 @@ impl Scripted for Torus {
             surface::MIRROR,
         ],
     )
-    .with(&[Together::Greater(0, 1)]);
+    .with(&[Constraint::Greater(0, 1)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let (radius, thickness) = (numbers.number(), numbers.number());

@@ -4,12 +4,12 @@
 //! the curve's ends and keys decide. Conditions on several must hold at each frame's opening, middle and closing. Few
 //! frames are looked at for that: where the ranges of the numbers say that a condition holds over a stretch of frames
 //! they are done, else its halves are looked at, and at last a frame. The work is counted over the whole script
-//! ([`MOST_WORK`]), so that no number of frames takes longer than about a second.
+//! ([`MAX_WORK`]), so that no number of frames takes longer than about a second.
 
 use std::ops::Range;
 
 use super::wording;
-use crate::command::{Act, Command};
+use crate::command::{Command, Effect};
 use crate::form::{Form, Numbers};
 use crate::model::{
     Background, Clause, Clauses, Coefficients, Faults, FrameNumbers, Lens, Material, Placement,
@@ -18,7 +18,7 @@ use crate::report::{Line, Report};
 use crate::row::{Number, Row};
 
 /// Keys of curves that are looked at, stretch of frames by stretch of frames, in a whole script.
-const MOST_WORK: usize = 1 << 24;
+const MAX_WORK: usize = 1 << 24;
 
 /// Reading a line counts as much as so many keys.
 const READING: usize = 32;
@@ -33,7 +33,7 @@ pub(super) struct Exposure {
 
 /// When something is seen.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Seen {
+pub(super) struct VisibleSpan {
     /// From the first opening to the last closing.
     pub(super) from: f64,
     pub(super) to: f64,
@@ -42,13 +42,13 @@ pub(super) struct Seen {
 }
 
 /// A line, or a part of it, with curves.
-pub(super) struct Moving<'a> {
+pub(super) struct Animated<'a> {
     pub(super) line: Line<'a>,
     /// Of each of its numbers.
     pub(super) spans: Vec<Range<usize>>,
     pub(super) row: Row,
     pub(super) origin: Origin,
-    pub(super) seen: Option<Seen>,
+    pub(super) visible_span: Option<VisibleSpan>,
 }
 
 /// What the numbers belong to.
@@ -72,38 +72,40 @@ impl Exposure {
 pub(super) struct Suffix<'e> {
     exposures: &'e [Exposure],
     start: usize,
-    seen: Option<Seen>,
+    visible_span: Option<VisibleSpan>,
 }
 
 impl<'e> Suffix<'e> {
     /// None of these.
     pub(super) fn of(exposures: &'e [Exposure]) -> Self {
-        Self { exposures, start: exposures.len(), seen: None }
+        Self { exposures, start: exposures.len(), visible_span: None }
     }
 
     /// What those from number `start` on see; it never grows from call to call.
-    pub(super) fn from(&mut self, start: usize) -> Option<&Seen> {
+    pub(super) fn from(&mut self, start: usize) -> Option<&VisibleSpan> {
         for i in (start..self.start).rev() {
             let exposure = &self.exposures[i];
-            let one = Seen { from: exposure.opening(), to: exposure.closing(), traces: i..i + 1 };
-            join(&mut self.seen, Some(&one));
+            let one = VisibleSpan { from: exposure.opening(), to: exposure.closing(), traces: i..i + 1 };
+            join(&mut self.visible_span, Some(&one));
         }
         self.start = self.start.min(start);
-        self.seen.as_ref()
+        self.visible_span.as_ref()
     }
 }
 
 /// What is seen then too.
-pub(super) fn join(seen: &mut Option<Seen>, also: Option<&Seen>) {
-    match (seen.as_mut(), also) {
+pub(super) fn join(visible_span: &mut Option<VisibleSpan>, also: Option<&VisibleSpan>) {
+    match (visible_span.as_mut(), also) {
         (_, None) => {}
-        (None, Some(also)) => *seen = Some(also.clone()),
-        (Some(seen), Some(also)) => {
-            seen.from = seen.from.min(also.from);
-            seen.to = seen.to.max(also.to);
-            let (start, end) =
-                (seen.traces.start.min(also.traces.start), seen.traces.end.max(also.traces.end));
-            seen.traces = start..end;
+        (None, Some(also)) => *visible_span = Some(also.clone()),
+        (Some(visible_span), Some(also)) => {
+            visible_span.from = visible_span.from.min(also.from);
+            visible_span.to = visible_span.to.max(also.to);
+            let (start, end) = (
+                visible_span.traces.start.min(also.traces.start),
+                visible_span.traces.end.max(also.traces.end),
+            );
+            visible_span.traces = start..end;
         }
     }
 }
@@ -121,53 +123,53 @@ impl Origin {
         use crate::form::Scripted;
         match self {
             Self::Clause(clause) => Clauses::default().add(clause, numbers, Coefficients::default()).err(),
-            Self::Command(command) => match command.act() {
-                Act::Camera(read) => read(numbers).err(),
-                Act::Object(read) => read(numbers).err(),
-                Act::Light(read) => read(numbers).err(),
-                Act::Background => Background::read(numbers).err(),
-                Act::Lens => Lens::read(numbers).err(),
-                Act::Use => Placement::read(numbers).err(),
-                Act::Screen
-                | Act::Samples
-                | Act::Shutter
-                | Act::Tone
-                | Act::Depth
-                | Act::Frames
-                | Act::Material
-                | Act::Group
-                | Act::End
-                | Act::Clear
-                | Act::Trace => unreachable!("`{command}` has no curves"),
+            Self::Command(command) => match command.effect() {
+                Effect::Camera(read) => read(numbers).err(),
+                Effect::Object(read) => read(numbers).err(),
+                Effect::Light(read) => read(numbers).err(),
+                Effect::Background => Background::read(numbers).err(),
+                Effect::Lens => Lens::read(numbers).err(),
+                Effect::Use => Placement::read(numbers).err(),
+                Effect::Screen
+                | Effect::Samples
+                | Effect::Shutter
+                | Effect::Tone
+                | Effect::Depth
+                | Effect::Frames
+                | Effect::Material
+                | Effect::Group
+                | Effect::End
+                | Effect::Clear
+                | Effect::Trace => unreachable!("`{command}` has no curves"),
             },
         }
     }
 }
 
 /// Looks at all lines with curves at the times at which they are seen.
-pub(super) fn check(moving: &[Moving<'_>], exposures: &[Exposure], report: &mut Report<'_>) {
+pub(super) fn check(moving: &[Animated<'_>], exposures: &[Exposure], report: &mut Report<'_>) {
     let mut work = 0;
     for line in moving {
-        if let Some(seen) = &line.seen
-            && line.check_alone(seen, report)
-            && !line.row.surely_keeps(line.origin.form(), seen.from, seen.to, &mut 0)
+        if let Some(visible_span) = &line.visible_span
+            && line.check_alone(visible_span, report)
+            && !line.row.provably_satisfies(line.origin.form(), visible_span.from, visible_span.to, &mut 0)
         {
-            line.check_together(&exposures[seen.traces.clone()], &mut work, report);
+            line.check_together(&exposures[visible_span.traces.clone()], &mut work, report);
         }
     }
 }
 
-impl Moving<'_> {
+impl Animated<'_> {
     /// The conditions on one number; whether all hold.
-    fn check_alone(&self, seen: &Seen, report: &mut Report<'_>) -> bool {
+    fn check_alone(&self, visible_span: &VisibleSpan, report: &mut Report<'_>) -> bool {
         let form = self.origin.form();
         let mut good = true;
         for (i, number) in self.row.numbers().iter().enumerate() {
-            let Number::Moving(curve) = number else { continue };
+            let Number::Animated(curve) = number else { continue };
             let (_, field) = form.number(i);
             let is_wrong = |value: f64| !field.values.take(value, value);
             let mut wrong = None;
-            curve.moments(seen.from, seen.to, |moment| {
+            curve.moments(visible_span.from, visible_span.to, |moment| {
                 if wrong.is_none() && is_wrong(moment.value) {
                     wrong = Some(moment);
                 }
@@ -175,16 +177,16 @@ impl Moving<'_> {
             let Some(mut wrong) = wrong else { continue };
             // A whole frame says more to a person than the moment before a cycle starts again.
             let frames = [wrong.frame.round(), wrong.frame.floor(), wrong.frame.ceil()];
-            let whole = frames
-                .into_iter()
-                .find(|frame| (seen.from..=seen.to).contains(frame) && is_wrong(curve.at(*frame)));
+            let whole = frames.into_iter().find(|frame| {
+                (visible_span.from..=visible_span.to).contains(frame) && is_wrong(curve.at(*frame))
+            });
             if let Some(frame) = whole {
                 wrong.frame = frame;
                 wrong.value = curve.at(frame);
             }
             good = false;
             report.error(self.line, self.spans[i].clone(), || {
-                wording::wrong_at(field, wrong, seen.from, seen.to)
+                wording::wrong_at(field, wrong, visible_span.from, visible_span.to)
             });
         }
         good
@@ -198,13 +200,13 @@ impl Moving<'_> {
             let mut ranges = vec![(exposure.numbers.first, exposure.numbers.last)];
             while let Some((first, last)) = ranges.pop() {
                 *work += READING;
-                if *work > MOST_WORK {
+                if *work > MAX_WORK {
                     let span = self.spans[0].start..self.spans[self.spans.len() - 1].end;
                     report.error(self.line, span, wording::too_much_work);
                     return;
                 }
                 let (from, to) = (f64::from(first) - half, f64::from(last) + half);
-                if self.row.surely_keeps(form, from, to, work) {
+                if self.row.provably_satisfies(form, from, to, work) {
                     continue;
                 }
                 if first < last {
