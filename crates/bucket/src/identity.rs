@@ -14,7 +14,7 @@ mod session;
 mod signed;
 mod sts;
 
-pub(crate) use access::{Access, DeniedKeys, discreetly};
+pub(crate) use access::{Access, DeniedKeys, hide_missing_key};
 pub(crate) use caller::Identities;
 pub(crate) use session::Sessions;
 pub(crate) use sts::{AssumeRole, in_sts_shape, is_for_sts};

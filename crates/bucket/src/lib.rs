@@ -25,12 +25,12 @@
 mod answer;
 mod check;
 mod checksum;
+mod connection_service;
 mod cors;
 mod delivery;
 mod error;
 mod events;
 mod expiry;
-mod front;
 mod gate;
 mod host;
 mod identity;

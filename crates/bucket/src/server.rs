@@ -12,9 +12,9 @@ use tokio::sync::oneshot;
 use tokio::task::{JoinHandle, JoinSet};
 use tokio::time::timeout;
 
+use crate::connection_service::{ConnectionService, Rules};
 use crate::delivery::Delivery;
 use crate::expiry::{INTERVAL, expire_uploads};
-use crate::front::{Front, Rules};
 use crate::host::Hosts;
 use crate::identity::{Access, AssumeRole, Identities, Sessions};
 use crate::limits::Limits;
@@ -136,10 +136,11 @@ async fn accept(listener: TcpListener, (service, rules): (S3Service, Rules), mut
             continue;
         };
         let _ = stream.set_nodelay(true);
-        let front = Front { service: service.clone(), rules: rules.clone(), peer: peer.ip() };
+        let connection_service =
+            ConnectionService { service: service.clone(), rules: rules.clone(), peer: peer.ip() };
         let connection = hyper::server::conn::http1::Builder::new()
             .timer(TokioTimer::new())
-            .serve_connection(TokioIo::new(stream), front);
+            .serve_connection(TokioIo::new(stream), connection_service);
         let connection = graceful.watch(connection);
         // A client that goes away in the middle is that client's end.
         connections.spawn(async move { drop(connection.await) });

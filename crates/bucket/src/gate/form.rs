@@ -8,7 +8,7 @@ use crate::answer::not_implemented;
 use crate::checksum::Algorithm;
 
 /// What may come before the file.
-const MOST_BYTES: usize = 1024 * 1024;
+const MAX_BYTES: usize = 1024 * 1024;
 
 /// Fields that are kept, compared, or of the form itself.
 const KNOWN: [&str; 26] = [
@@ -56,7 +56,7 @@ impl Fields {
         self.bytes.extend_from_slice(bytes);
         let text = String::from_utf8_lossy(&self.bytes);
         let Some(fields) = fields(&text) else {
-            return if self.bytes.len() > MOST_BYTES { Err(too_long()) } else { Ok(()) };
+            return if self.bytes.len() > MAX_BYTES { Err(too_long()) } else { Ok(()) };
         };
         for (name, value) in fields {
             check(operation, &name.to_ascii_lowercase(), value)?;

@@ -33,7 +33,7 @@ pub(crate) struct DeniedKeys(pub(crate) HashSet<String>);
 struct MayNotList;
 
 /// Whoever may not list a bucket is not told that an object is absent, but what S3 says of one that is there: no.
-pub(crate) fn discreetly(extensions: &Extensions) -> impl Fn(S3Error) -> S3Error + use<> {
+pub(crate) fn hide_missing_key(extensions: &Extensions) -> impl Fn(S3Error) -> S3Error + use<> {
     let may_list = extensions.get::<MayNotList>().is_none();
     move |error| {
         if may_list || *error.code() != S3ErrorCode::NoSuchKey {
@@ -126,7 +126,7 @@ fn may_read(extensions: &mut Extensions, source: &CopySource) -> S3Result<()> {
     }
 }
 
-/// For [`discreetly`].
+/// For [`hide_missing_key`].
 fn note_listing(session: &Session, bucket: &str, extensions: &mut Extensions) {
     let resource = arn(bucket, None);
     match session.policy.verdict(&plainly("s3:ListBucket", &resource)) {

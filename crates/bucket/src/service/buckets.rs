@@ -14,7 +14,7 @@ use crate::storage::{Kind, Table, View};
 const PAGE: usize = 10_000;
 
 impl Service {
-    pub(super) fn buckets_listed(&self, input: &ListBucketsInput) -> Answer<ListBucketsOutput> {
+    pub(super) fn handle_list_buckets(&self, input: &ListBucketsInput) -> Answer<ListBucketsOutput> {
         let most = match input.max_buckets {
             None => PAGE,
             Some(most @ 1..=10_000) => usize::try_from(most).unwrap_or(PAGE),
@@ -51,7 +51,7 @@ impl Service {
         })
     }
 
-    pub(super) async fn bucket_created(&self, input: CreateBucketInput) -> Answer<CreateBucketOutput> {
+    pub(super) async fn handle_create_bucket(&self, input: CreateBucketInput) -> Answer<CreateBucketOutput> {
         if input.object_lock_enabled_for_bucket == Some(true) {
             return Err(not_implemented("object lock"));
         }
@@ -97,13 +97,16 @@ impl Service {
         self.bucket(&self.snapshot()?, name).map(drop)
     }
 
-    pub(super) fn bucket_found(&self, input: &HeadBucketInput) -> Answer<HeadBucketOutput> {
+    pub(super) fn handle_head_bucket(&self, input: &HeadBucketInput) -> Answer<HeadBucketOutput> {
         self.bucket_exists(&input.bucket)?;
         Ok(HeadBucketOutput { bucket_region: Some(self.region.to_string()), ..HeadBucketOutput::default() })
     }
 
     /// An empty location is us-east-1, as ever.
-    pub(super) fn bucket_location(&self, input: &GetBucketLocationInput) -> Answer<GetBucketLocationOutput> {
+    pub(super) fn handle_get_bucket_location(
+        &self,
+        input: &GetBucketLocationInput,
+    ) -> Answer<GetBucketLocationOutput> {
         self.bucket_exists(&input.bucket)?;
         let elsewhere = &*self.region != "us-east-1";
         let location_constraint = elsewhere.then(|| self.region.to_string().into());
@@ -111,7 +114,7 @@ impl Service {
     }
 
     /// Deletes an empty bucket, with its unfinished uploads.
-    pub(super) async fn bucket_deleted(&self, input: DeleteBucketInput) -> Answer<DeleteBucketOutput> {
+    pub(super) async fn handle_delete_bucket(&self, input: DeleteBucketInput) -> Answer<DeleteBucketOutput> {
         let name = input.bucket;
         let delete = self.change(Kind::Shrinks, move |batch| {
             bucket(batch, &name)?;

@@ -4,7 +4,7 @@ use s3s::dto::*;
 use s3s::{S3Request, s3_error};
 
 use super::conditions::{ReadConditions, WriteConditions};
-use super::ingest::{Claims, etag, ingest, is_too_large};
+use super::ingest::{ExpectedBody, etag, ingest, is_too_large};
 use super::objects::{Destination, admit, check_key, check_metadata, expires, keep, place};
 use super::writes::{of, stored_encoding};
 use super::{Caller, Service};
@@ -14,7 +14,10 @@ use crate::records::{self, Headers, Moment};
 use crate::storage::Kind;
 
 impl Service {
-    pub(super) async fn object_copied(&self, req: S3Request<CopyObjectInput>) -> Answer<CopyObjectOutput> {
+    pub(super) async fn handle_copy_object(
+        &self,
+        req: S3Request<CopyObjectInput>,
+    ) -> Answer<CopyObjectOutput> {
         let caller = Caller::of(&req);
         // Conditions on the destination have no place in the input yet.
         let header = |name: &str| {
@@ -71,7 +74,7 @@ impl Service {
         };
         self.bucket_exists(&input.bucket)?;
         let bytes = held.bytes(&self.storage, 0..from.size)?;
-        let ingested = ingest(&self.storage, Claims::none(algorithm), bytes).await?;
+        let ingested = ingest(&self.storage, ExpectedBody::none(algorithm), bytes).await?;
         if ingested.size != from.size {
             return Err(s3_error!(InternalError, "the source's body is shorter than it should be"));
         }

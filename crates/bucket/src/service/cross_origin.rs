@@ -10,7 +10,7 @@ use crate::records::{CorsRule, set};
 use crate::storage::{Kind, Table};
 
 /// Of one bucket: S3's.
-const MOST_RULES: usize = 100;
+const MAX_RULES: usize = 100;
 
 /// Of a rule's id: S3's.
 const LONGEST_ID: usize = 255;
@@ -24,7 +24,7 @@ impl Service {
         found.map(|bucket| bucket.cors).unwrap_or_default()
     }
 
-    pub(super) fn cors_told(&self, name: &str) -> Answer<GetBucketCorsOutput> {
+    pub(super) fn handle_get_bucket_cors(&self, name: &str) -> Answer<GetBucketCorsOutput> {
         let rules = self.bucket(&self.snapshot()?, name)?.cors;
         if rules.is_empty() {
             return Err(S3Error::with_message(
@@ -44,15 +44,15 @@ impl Service {
         Ok(GetBucketCorsOutput { cors_rules: Some(told.collect()) })
     }
 
-    pub(super) async fn cors_set(&self, name: String, rules: Vec<CORSRule>) -> Answer<()> {
-        if rules.is_empty() || rules.len() > MOST_RULES {
-            return Err(s3_error!(MalformedXML, "A CORS configuration has between 1 and {MOST_RULES} rules"));
+    pub(super) async fn handle_put_bucket_cors(&self, name: String, rules: Vec<CORSRule>) -> Answer<()> {
+        if rules.is_empty() || rules.len() > MAX_RULES {
+            return Err(s3_error!(MalformedXML, "A CORS configuration has between 1 and {MAX_RULES} rules"));
         }
         let rules = rules.into_iter().map(read).collect::<Answer<Vec<_>>>()?;
         self.cors_changed(name, Kind::Grows, rules).await
     }
 
-    pub(super) async fn cors_removed(&self, name: String) -> Answer<()> {
+    pub(super) async fn handle_delete_bucket_cors(&self, name: String) -> Answer<()> {
         self.cors_changed(name, Kind::Shrinks, Vec::new()).await
     }
 

@@ -24,7 +24,7 @@ const BLOCK_BYTES: usize = 1024 * 1024;
 const LARGEST_BODY: u64 = 5 * 1024 * 1024 * 1024;
 
 /// What the client says of a body.
-pub(crate) struct Claims {
+pub(crate) struct ExpectedBody {
     length: Option<u64>,
     md5: Option<Vec<u8>>,
     algorithm: Algorithm,
@@ -48,7 +48,7 @@ pub(crate) enum Content {
     File(NewBody),
 }
 
-impl Claims {
+impl ExpectedBody {
     /// Those of a request with a body. `otherwise` is the checksum's algorithm where the client names none.
     pub(crate) fn of_request(
         headers: &HeaderMap,
@@ -114,14 +114,14 @@ pub(crate) fn valid(algorithm: Algorithm, value: Option<&str>) -> Answer<String>
 }
 
 /// Takes a body in.
-pub(crate) async fn ingest<S>(storage: &Storage, claims: Claims, mut body: S) -> Answer<Ingested>
+pub(crate) async fn ingest<S>(storage: &Storage, expected: ExpectedBody, mut body: S) -> Answer<Ingested>
 where
     S: Stream<Item = Result<Bytes, StdError>> + Unpin,
 {
-    let mut sink = Sink::new(storage.clone(), claims.algorithm);
+    let mut sink = Sink::new(storage.clone(), expected.algorithm);
     while let Some(bytes) = body.next().await {
         sink.take(&bytes.map_err(|error| body_failed(&error))?).await?;
-        if sink.size > claims.length.unwrap_or(LARGEST_BODY) {
+        if sink.size > expected.length.unwrap_or(LARGEST_BODY) {
             return Err(s3_error!(
                 EntityTooLarge,
                 "The body is longer than Content-Length says, or than 5 GiB."
@@ -129,23 +129,23 @@ where
         }
     }
     let ingested = sink.end().await?;
-    if claims.length.is_some_and(|length| length != ingested.size) {
+    if expected.length.is_some_and(|length| length != ingested.size) {
         return Err(s3_error!(IncompleteBody, "The body is shorter than Content-Length says."));
     }
-    if claims.md5.is_some_and(|md5| md5 != ingested.md5) {
+    if expected.md5.is_some_and(|md5| md5 != ingested.md5) {
         return Err(wrong_md5());
     }
-    let header = claims.algorithm.header();
-    let claimed = match claims.trailer {
-        None => claims.checksum,
+    let header = expected.algorithm.header();
+    let claimed = match expected.trailer {
+        None => expected.checksum,
         Some(trailer) => {
             let value =
                 trailer.read(|headers| headers.get(header).and_then(|v| v.to_str().ok()).map(str::to_owned));
-            Some(valid(claims.algorithm, value.flatten().as_deref())?)
+            Some(valid(expected.algorithm, value.flatten().as_deref())?)
         }
     };
     if claimed.is_some_and(|claimed| claimed != ingested.checksum.value) {
-        return Err(wrong_checksum(claims.algorithm));
+        return Err(wrong_checksum(expected.algorithm));
     }
     Ok(ingested)
 }
@@ -239,22 +239,22 @@ mod tests {
 
     use super::*;
 
-    fn claims(headers: &[(&'static str, &str)]) -> Result<Claims, String> {
+    fn expected(headers: &[(&'static str, &str)]) -> Result<ExpectedBody, String> {
         let headers = headers.iter().map(|(name, value)| {
             (
                 hyper::header::HeaderName::from_static(name),
                 hyper::header::HeaderValue::from_str(value).unwrap(),
             )
         });
-        let claims = Claims::of_request(&headers.collect(), None, Algorithm::Crc32);
-        claims.map_err(|error| error.code().as_str().to_owned())
+        let expected = ExpectedBody::of_request(&headers.collect(), None, Algorithm::Crc32);
+        expected.map_err(|error| error.code().as_str().to_owned())
     }
 
     #[test]
     fn what_is_said_of_a_body_is_read_or_refused() {
         let largest = LARGEST_BODY.to_string();
         assert_eq!(
-            claims(&[("content-length", &largest)]).map(|claims| claims.length),
+            expected(&[("content-length", &largest)]).map(|expected| expected.length),
             Ok(Some(LARGEST_BODY))
         );
         let larger = (LARGEST_BODY + 1).to_string();
@@ -271,17 +271,17 @@ mod tests {
             (vec![length, crc, ("x-amz-trailer", "x-amz-checksum-crc32")], "InvalidRequest"),
             (vec![length, ("x-amz-sdk-checksum-algorithm", "CRC32")], "InvalidRequest"),
         ] {
-            assert_eq!(claims(&headers).map(|_| ()), Err(code.to_owned()), "{headers:?}");
+            assert_eq!(expected(&headers).map(|_| ()), Err(code.to_owned()), "{headers:?}");
         }
         let chunked = [
             ("x-amz-content-sha256", "STREAMING-UNSIGNED-PAYLOAD-TRAILER"),
             ("x-amz-decoded-content-length", "7"),
         ];
-        assert_eq!(claims(&chunked).map(|claims| claims.length), Ok(Some(7)));
-        assert_eq!(claims(&chunked[1..]).map(|_| ()), Err("MissingContentLength".to_owned()));
-        let good = claims(&[length, crc, ("content-md5", "CZ7fAjxLoqlN0Cf2Vm8Zew==")]).unwrap();
+        assert_eq!(expected(&chunked).map(|expected| expected.length), Ok(Some(7)));
+        assert_eq!(expected(&chunked[1..]).map(|_| ()), Err("MissingContentLength".to_owned()));
+        let good = expected(&[length, crc, ("content-md5", "CZ7fAjxLoqlN0Cf2Vm8Zew==")]).unwrap();
         assert_eq!((good.md5.map(|md5| md5.len()), good.algorithm), (Some(16), Algorithm::Crc32));
-        let behind = claims(&[length, ("x-amz-trailer", "x-amz-checksum-sha256")]).unwrap();
+        let behind = expected(&[length, ("x-amz-trailer", "x-amz-checksum-sha256")]).unwrap();
         assert_eq!((behind.algorithm, behind.checksum), (Algorithm::Sha256, None));
     }
 
@@ -297,7 +297,7 @@ mod tests {
         }
         let sunk = sink.end().await.unwrap();
         let whole = stream::iter([Ok(Bytes::from(vec![7; 7_000_010]))]);
-        let at_once = ingest(&storage, Claims::none(Algorithm::Crc32), whole).await.unwrap();
+        let at_once = ingest(&storage, ExpectedBody::none(Algorithm::Crc32), whole).await.unwrap();
         assert_eq!((sunk.size, sunk.md5, &sunk.checksum), (7_000_010, at_once.md5, &at_once.checksum));
         drop((sunk, at_once));
         writing.end();
@@ -308,9 +308,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (storage, writing) = Storage::open(folder.path()).unwrap();
         for (length, code) in [("4", "EntityTooLarge"), ("5", ""), ("6", "IncompleteBody")] {
-            let claims = claims(&[("content-length", length)]).unwrap();
+            let expected = expected(&[("content-length", length)]).unwrap();
             let body = stream::iter([Ok(Bytes::from_static(b"he")), Ok(Bytes::from_static(b"llo"))]);
-            let ingested = ingest(&storage, claims, body).await;
+            let ingested = ingest(&storage, expected, body).await;
             assert_eq!(
                 ingested.err().map(|error| error.code().as_str().to_owned()).unwrap_or_default(),
                 code

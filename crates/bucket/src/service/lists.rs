@@ -101,7 +101,10 @@ fn text(bytes: &[u8]) -> String {
 }
 
 impl Service {
-    pub(super) async fn objects_listed_v2(&self, input: ListObjectsV2Input) -> Answer<ListObjectsV2Output> {
+    pub(super) async fn handle_list_objects_v2(
+        &self,
+        input: ListObjectsV2Input,
+    ) -> Answer<ListObjectsV2Output> {
         let most = most(input.max_keys, "max-keys")?;
         let prefix = input.prefix.clone().unwrap_or_default();
         let delimiter = input.delimiter.clone().unwrap_or_default();
@@ -133,7 +136,7 @@ impl Service {
         })
     }
 
-    pub(super) async fn objects_listed(&self, input: ListObjectsInput) -> Answer<ListObjectsOutput> {
+    pub(super) async fn handle_list_objects(&self, input: ListObjectsInput) -> Answer<ListObjectsOutput> {
         let most = most(input.max_keys, "max-keys")?;
         let prefix = input.prefix.clone().unwrap_or_default();
         let delimiter = input.delimiter.clone().unwrap_or_default();

@@ -10,7 +10,7 @@ use crate::records::{self, set};
 use crate::storage::{Kind, Table};
 
 /// Rules of one bucket: S3's.
-const MOST_RULES: usize = 100;
+const MAX_RULES: usize = 100;
 
 /// Events that happen here. Others of S3's are accepted in a pattern only.
 const EVENTS: [&str; 5] = [
@@ -22,7 +22,7 @@ const EVENTS: [&str; 5] = [
 ];
 
 impl Service {
-    pub(super) async fn notifications_set(
+    pub(super) async fn handle_put_bucket_notification(
         &self,
         input: PutBucketNotificationConfigurationInput,
     ) -> Answer<PutBucketNotificationConfigurationOutput> {
@@ -36,8 +36,8 @@ impl Service {
             return Err(not_implemented("a notification of a function or a topic"));
         }
         let queues = configuration.queue_configurations.unwrap_or_default();
-        if queues.len() > MOST_RULES {
-            return Err(invalid_argument(format!("at most {MOST_RULES} notifications")));
+        if queues.len() > MAX_RULES {
+            return Err(invalid_argument(format!("at most {MAX_RULES} notifications")));
         }
         let rules = queues.into_iter().enumerate().map(|(number, queue)| rule(number, queue));
         let rules = rules.collect::<Answer<Vec<_>>>()?;
@@ -50,7 +50,7 @@ impl Service {
         Ok(PutBucketNotificationConfigurationOutput {})
     }
 
-    pub(super) fn notifications_told(
+    pub(super) fn handle_get_bucket_notification(
         &self,
         input: &GetBucketNotificationConfigurationInput,
     ) -> Answer<GetBucketNotificationConfigurationOutput> {

@@ -5,7 +5,7 @@ use s3s::dto::Timestamp;
 
 use super::conditions::WriteConditions;
 use super::ingest::Content;
-use super::{Caller, Stop};
+use super::{Caller, ChangeError};
 use crate::answer::{Answer, invalid_request, no_such_bucket};
 use crate::records::{self, Body, Bucket, Event, Headers, Moment, Object, find, key, release, set};
 use crate::storage::{Batch, Bodies, Table, View};
@@ -14,10 +14,10 @@ use crate::storage::{Batch, Bodies, Table, View};
 pub(crate) const LONGEST_KEY: usize = 1024;
 
 /// Of the user's metadata, names and values together.
-const MOST_METADATA: usize = 2 * 1024;
+const MAX_METADATA: usize = 2 * 1024;
 
 /// Events that wait for their listener. A change that would make one more is refused, so that none is lost.
-const MOST_WAITING: u64 = 1_000_000;
+const MAX_WAITING: u64 = 1_000_000;
 
 /// Where an object goes, and on what terms.
 pub(crate) struct Destination {
@@ -28,12 +28,12 @@ pub(crate) struct Destination {
 }
 
 /// The bucket, as changes see it.
-pub(crate) fn bucket(batch: &Batch<'_>, name: &str) -> Result<Bucket, Stop> {
+pub(crate) fn bucket(batch: &Batch<'_>, name: &str) -> Result<Bucket, ChangeError> {
     find(batch, Table::Buckets, name.as_bytes())?.ok_or_else(|| no_such_bucket().into())
 }
 
 /// Checks all that may refuse an object at its destination; gives what is there and the bucket.
-pub(crate) fn admit(batch: &Batch<'_>, to: &Destination) -> Result<(Bucket, Option<Object>), Stop> {
+pub(crate) fn admit(batch: &Batch<'_>, to: &Destination) -> Result<(Bucket, Option<Object>), ChangeError> {
     let bucket = bucket(batch, &to.bucket)?;
     let existing = find(batch, Table::Objects, &key::object(&to.bucket, to.key.as_bytes()))?;
     to.conditions.check(existing.as_ref())?;
@@ -106,7 +106,7 @@ pub(crate) fn tell(
 
 /// Whether so many events wait that no more may.
 fn is_full(waiting: u64) -> bool {
-    waiting >= MOST_WAITING
+    waiting >= MAX_WAITING
 }
 
 impl records::Notification {
@@ -136,10 +136,10 @@ pub(crate) fn check_key(key: &str) -> Answer<()> {
 /// The headers of an object to be, within S3's limit.
 pub(crate) fn check_metadata(headers: &Headers) -> Answer<()> {
     let size: usize = headers.metadata.iter().map(|(name, value)| name.len() + value.len()).sum();
-    if size > MOST_METADATA {
+    if size > MAX_METADATA {
         return Err(s3s::s3_error!(
             MetadataTooLarge,
-            "Your metadata headers exceed the maximum allowed metadata size ({MOST_METADATA} bytes)"
+            "Your metadata headers exceed the maximum allowed metadata size ({MAX_METADATA} bytes)"
         ));
     }
     Ok(())

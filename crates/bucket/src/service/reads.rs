@@ -96,7 +96,7 @@ macro_rules! answer {
 }
 
 impl Service {
-    pub(super) async fn object_read(
+    pub(super) async fn handle_get_object(
         &self,
         req: S3Request<GetObjectInput>,
     ) -> S3Result<S3Response<GetObjectOutput>> {
@@ -117,7 +117,7 @@ impl Service {
         Ok(S3Response::new(answer!(GetObjectOutput, told, body: Some(body))))
     }
 
-    pub(super) fn object_looked_at(
+    pub(super) fn handle_head_object(
         &self,
         req: &S3Request<HeadObjectInput>,
     ) -> S3Result<S3Response<HeadObjectOutput>> {
@@ -159,7 +159,7 @@ impl Service {
         Ok(response)
     }
 
-    pub(super) fn object_attributes(
+    pub(super) fn handle_get_object_attributes(
         &self,
         input: &GetObjectAttributesInput,
     ) -> Answer<GetObjectAttributesOutput> {

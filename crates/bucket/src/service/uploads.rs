@@ -8,10 +8,10 @@ use s3s::{S3Request, s3_error};
 
 use super::conditions::{ReadConditions, WriteConditions};
 use super::copies::source;
-use super::ingest::{Claims, Ingested, etag, ingest, is_too_large};
+use super::ingest::{ExpectedBody, Ingested, etag, ingest, is_too_large};
 use super::objects::{Destination, admit, bucket, check_key, check_metadata, expires, keep, place};
 use super::writes::{of, stored_encoding};
-use super::{Caller, Service, Stop};
+use super::{Caller, ChangeError, Service};
 use crate::answer::{Answer, coded, invalid_argument, invalid_request, no_such_upload, time, unreadable};
 use crate::checksum::{self, Algorithm};
 use crate::records::{
@@ -20,7 +20,7 @@ use crate::records::{
 use crate::storage::{Batch, Kind, Table, View};
 
 /// Part numbers begin at 1: S3's.
-const MOST_PARTS: i32 = 10_000;
+const MAX_PARTS: i32 = 10_000;
 
 /// Every part but the last: S3's.
 const SMALLEST_PART: u64 = 5 * 1024 * 1024;
@@ -29,7 +29,7 @@ const SMALLEST_PART: u64 = 5 * 1024 * 1024;
 const ID_BYTES: usize = 16;
 
 impl Service {
-    pub(super) async fn upload_created(
+    pub(super) async fn handle_create_multipart_upload(
         &self,
         req: S3Request<CreateMultipartUploadInput>,
     ) -> Answer<CreateMultipartUploadOutput> {
@@ -98,7 +98,10 @@ impl Service {
             .ok_or_else(no_such_upload)
     }
 
-    pub(super) async fn part_uploaded(&self, req: S3Request<UploadPartInput>) -> Answer<UploadPartOutput> {
+    pub(super) async fn handle_upload_part(
+        &self,
+        req: S3Request<UploadPartInput>,
+    ) -> Answer<UploadPartOutput> {
         let input = req.input;
         let number = part_number(input.part_number)?;
         let upload = self.upload(&input.bucket, &input.key, &input.upload_id)?;
@@ -116,9 +119,10 @@ impl Service {
             )));
         }
         // A client that named no algorithm may check its parts by another one: they are then digested anew at the end.
-        let claims = Claims::of_request(&req.headers, req.trailing_headers.clone(), upload.algorithm)?;
+        let expected =
+            ExpectedBody::of_request(&req.headers, req.trailing_headers.clone(), upload.algorithm)?;
         let body = input.body.ok_or_else(|| s3_error!(IncompleteBody, "a body is missing"))?;
-        let ingested = ingest(&self.storage, claims, body).await?;
+        let ingested = ingest(&self.storage, expected, body).await?;
         let part = self.part_kept(input.bucket, input.key, input.upload_id, number, ingested).await?;
         let sum = Some(&part.checksum);
         Ok(UploadPartOutput {
@@ -132,7 +136,7 @@ impl Service {
         })
     }
 
-    pub(super) async fn part_copied(
+    pub(super) async fn handle_upload_part_copy(
         &self,
         req: S3Request<UploadPartCopyInput>,
     ) -> Answer<UploadPartCopyOutput> {
@@ -158,7 +162,7 @@ impl Service {
             return Err(s3_error!(EntityTooLarge, "Your proposed upload exceeds the maximum allowed size"));
         }
         let bytes = held.bytes(&self.storage, range)?;
-        let ingested = ingest(&self.storage, Claims::none(upload.algorithm), bytes).await?;
+        let ingested = ingest(&self.storage, ExpectedBody::none(upload.algorithm), bytes).await?;
         if ingested.size != length {
             return Err(s3_error!(InternalError, "the source's body is shorter than it should be"));
         }
@@ -203,7 +207,7 @@ impl Service {
         keep.await
     }
 
-    pub(super) async fn upload_completed(
+    pub(super) async fn handle_complete_multipart_upload(
         &self,
         req: S3Request<CompleteMultipartUploadInput>,
     ) -> Answer<CompleteMultipartUploadOutput> {
@@ -214,7 +218,7 @@ impl Service {
         conditions.check_form()?;
         let listed = input.multipart_upload.and_then(|upload| upload.parts).unwrap_or_default();
         let wanted = wanted(listed)?;
-        let claims = [
+        let expected = [
             (Algorithm::Crc32, input.checksum_crc32),
             (Algorithm::Crc32c, input.checksum_crc32c),
             (Algorithm::Crc64nvme, input.checksum_crc64nvme),
@@ -223,7 +227,7 @@ impl Service {
         ];
         let claim = Claim {
             kind: input.checksum_type.map(|kind| kind.as_str().to_owned()),
-            value: claims.into_iter().find_map(|(algorithm, value)| value.map(|value| (algorithm, value))),
+            value: expected.into_iter().find_map(|(algorithm, value)| value.map(|value| (algorithm, value))),
             size: input.mpu_object_size.map(|size| u64::try_from(size).unwrap_or_default()),
         };
         let (bucket, object_key) = (input.bucket.clone(), input.key.clone());
@@ -281,7 +285,7 @@ impl Service {
         })
     }
 
-    pub(super) async fn upload_aborted(
+    pub(super) async fn handle_abort_multipart_upload(
         &self,
         input: AbortMultipartUploadInput,
     ) -> Answer<AbortMultipartUploadOutput> {
@@ -322,8 +326,8 @@ struct Chosen {
 
 /// The client's list: at least one part, in ascending order.
 fn wanted(listed: Vec<CompletedPart>) -> Answer<Vec<Wanted>> {
-    if listed.is_empty() || listed.len() > usize::try_from(MOST_PARTS).unwrap_or_default() {
-        return Err(s3_error!(MalformedXML, "You must specify between 1 and {MOST_PARTS} parts"));
+    if listed.is_empty() || listed.len() > usize::try_from(MAX_PARTS).unwrap_or_default() {
+        return Err(s3_error!(MalformedXML, "You must specify between 1 and {MAX_PARTS} parts"));
     }
     let mut wanted: Vec<Wanted> = Vec::with_capacity(listed.len());
     for part in listed {
@@ -357,7 +361,7 @@ fn choose(
     upload: &records::Upload,
     wanted: &[Wanted],
     claim: &Claim,
-) -> Result<Chosen, Stop> {
+) -> Result<Chosen, ChangeError> {
     let mut parts = Vec::with_capacity(wanted.len());
     let mut md5s = Vec::with_capacity(wanted.len());
     let last = wanted.last().map_or(0, |part| part.number);
@@ -443,8 +447,8 @@ fn combined(md5s: &[String]) -> String {
 }
 
 fn part_number(number: i32) -> Answer<u16> {
-    u16::try_from(number).ok().filter(|_| (1..=MOST_PARTS).contains(&number)).ok_or_else(|| {
-        invalid_argument(format!("Part number must be an integer between 1 and {MOST_PARTS}, inclusive"))
+    u16::try_from(number).ok().filter(|_| (1..=MAX_PARTS).contains(&number)).ok_or_else(|| {
+        invalid_argument(format!("Part number must be an integer between 1 and {MAX_PARTS}, inclusive"))
     })
 }
 

@@ -12,7 +12,7 @@ use crate::records::{self, decode, key};
 use crate::storage::{Table, View};
 
 impl Service {
-    pub(super) fn parts_listed(&self, input: &ListPartsInput) -> Answer<ListPartsOutput> {
+    pub(super) fn handle_list_parts(&self, input: &ListPartsInput) -> Answer<ListPartsOutput> {
         let most = most(input.max_parts, "max-parts")?;
         let after = input.part_number_marker.unwrap_or_default();
         let upload = self.upload(&input.bucket, &input.key, &input.upload_id)?;
@@ -67,7 +67,7 @@ impl Service {
     }
 
     /// Uploads in the order of their keys, and of their ids within one. Common prefixes are as in a listing of objects.
-    pub(super) fn uploads_listed(
+    pub(super) fn handle_list_multipart_uploads(
         &self,
         input: &ListMultipartUploadsInput,
     ) -> Answer<ListMultipartUploadsOutput> {

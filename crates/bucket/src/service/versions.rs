@@ -14,7 +14,7 @@ use crate::records;
 const ONLY: &str = "null";
 
 impl Service {
-    pub(super) async fn versions_listed(
+    pub(super) async fn handle_list_object_versions(
         &self,
         input: ListObjectVersionsInput,
     ) -> Answer<ListObjectVersionsOutput> {

@@ -30,7 +30,7 @@ const REQUEST_ID: HeaderName = HeaderName::from_static("x-amz-request-id");
 
 /// How long, and how much of, a refused body is read.
 const DRAIN: Duration = Duration::from_secs(1);
-const MOST_DRAINED: usize = 1024 * 1024;
+const MAX_DRAINED: usize = 1024 * 1024;
 
 static NEXT: AtomicU64 = AtomicU64::new(1);
 
@@ -48,14 +48,14 @@ pub(crate) type Rules = Arc<dyn Fn(&str) -> Vec<CorsRule> + Send + Sync>;
 
 /// The service of one connection.
 #[derive(Clone)]
-pub(crate) struct Front {
+pub(crate) struct ConnectionService {
     pub(crate) service: S3Service,
     /// Asked for a bucket's rules for pages of other sites.
     pub(crate) rules: Rules,
     pub(crate) peer: IpAddr,
 }
 
-impl Service<Request<Incoming>> for Front {
+impl Service<Request<Incoming>> for ConnectionService {
     type Response = Response<Body>;
     type Error = HttpError;
     type Future = std::pin::Pin<Box<dyn Future<Output = Result<Self::Response, Self::Error>> + Send>>;
@@ -88,7 +88,7 @@ impl Service<Request<Incoming>> for Front {
     }
 }
 
-impl Front {
+impl ConnectionService {
     /// The answer of S3's protocol, or of what stands before it.
     async fn answer(&self, mut request: Request<Body>) -> Result<Response<Body>, HttpError> {
         if is_for_sts(request.method(), request.uri(), request.headers()) {
@@ -143,7 +143,7 @@ fn refusal(error: S3Error) -> Result<Response<Body>, HttpError> {
 async fn drain(request: Request<Body>) {
     if !request.headers().contains_key(EXPECT) {
         let _ =
-            timeout(DRAIN, http_body_util::Limited::new(request.into_body(), MOST_DRAINED).collect()).await;
+            timeout(DRAIN, http_body_util::Limited::new(request.into_body(), MAX_DRAINED).collect()).await;
     }
 }
 

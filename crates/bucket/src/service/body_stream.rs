@@ -85,7 +85,7 @@ fn files(object: &Object, layout: Option<&Layout>) -> Vec<BodyId> {
 
 impl Held {
     /// The bytes of a range, which must lie within the object.
-    pub(super) fn bytes(self, storage: &Storage, range: Range<u64>) -> Answer<Outgest> {
+    pub(super) fn bytes(self, storage: &Storage, range: Range<u64>) -> Answer<BodyStream> {
         let Self { name, object, layout, snapshot, pins } = self;
         let damaged = |what: String| BodyDamaged { object: name.clone(), what }.refuse();
         let whole =
@@ -131,12 +131,12 @@ impl Held {
         if let Some(Piece::File(file)) = pieces.front_mut() {
             file.open().map_err(damaged)?;
         }
-        Ok(Outgest { name, pieces, reading: None, left: range.end - range.start, _pins: pins })
+        Ok(BodyStream { name, pieces, reading: None, left: range.end - range.start, _pins: pins })
     }
 }
 
 /// See the module.
-pub(super) struct Outgest {
+pub(super) struct BodyStream {
     /// Bucket and key.
     name: String,
     pieces: VecDeque<Piece>,
@@ -216,7 +216,7 @@ impl Piece {
     }
 }
 
-impl Outgest {
+impl BodyStream {
     /// Starts to read the next block.
     fn advance(&mut self) {
         self.reading = self.pieces.pop_front().map(|piece| tokio::task::spawn_blocking(|| piece.read()));
@@ -232,7 +232,7 @@ impl Outgest {
     }
 }
 
-impl Stream for Outgest {
+impl Stream for BodyStream {
     type Item = Result<Bytes, StdError>;
 
     fn poll_next(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Self::Item>> {
@@ -271,7 +271,7 @@ impl Stream for Outgest {
     }
 }
 
-impl ByteStream for Outgest {
+impl ByteStream for BodyStream {
     fn remaining_length(&self) -> RemainingLength {
         usize::try_from(self.left).map_or_else(|_| RemainingLength::unknown(), RemainingLength::new_exact)
     }
@@ -293,7 +293,7 @@ mod tests {
     async fn a_body_that_lost_bytes_ends_with_an_error() {
         for (left, whole) in [(5, false), (2, true)] {
             let pieces = VecDeque::from([Piece::Bytes(Bytes::from_static(b"ab"))]);
-            let body = Outgest { name: "films/a".into(), pieces, reading: None, left, _pins: None };
+            let body = BodyStream { name: "films/a".into(), pieces, reading: None, left, _pins: None };
             let ends: Vec<bool> = body.map(|piece| piece.is_ok()).collect().await;
             assert_eq!(ends, if whole { vec![true] } else { vec![true, false] });
         }
