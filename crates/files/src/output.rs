@@ -9,10 +9,10 @@ use crate::input::kind;
 use crate::leftover::{remove_leftovers, temporary_name};
 
 /// How many links may lead to one another, as the kernel counts.
-const MOST_LINKS: usize = 40;
+const MAX_LINKS: usize = 40;
 
 /// How many random names are tried; a second one is already unlikely.
-const MOST_NAMES: usize = 16;
+const MAX_NAMES: usize = 16;
 
 /// Why a file could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -211,7 +211,7 @@ impl Temporary {
             tries += 1;
             match options.open(&path) {
                 Ok(file) => break (path, file),
-                Err(error) if error.kind() == io::ErrorKind::AlreadyExists && tries < MOST_NAMES => {}
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists && tries < MAX_NAMES => {}
                 Err(error) => return Err(error),
             }
         };
@@ -268,7 +268,7 @@ fn follow_links(path: &Path) -> io::Result<PathBuf> {
         return Ok(place);
     }
     let mut place = path.to_path_buf();
-    for _ in 0..MOST_LINKS {
+    for _ in 0..MAX_LINKS {
         match place.read_link() {
             Ok(target) => place = folder_of(&place).join(target),
             Err(_) => return Ok(place),
