@@ -4,7 +4,7 @@
 //! do, and it remembers nothing: whatever is interrupted is picked up from what the bucket shows. It knows no terminal,
 //! no flags and no S3: the bucket is a [`Store`](rayfold_pipeline::store::Store), time
 //! a [`Clock`](rayfold_pipeline::Clock), and progress comes as values ([`Sending`],
-//! [`Waiting`], [`Removing`]) to a closure that the caller brings. What an animation costs on AWS [`cost`] says.
+//! [`Waiting`], [`RemoveProgress`]) to a closure that the caller brings. What an animation costs on AWS [`cost`] says.
 //!
 //! ```
 //! use rayfold_client::{Client, File, Submission, Submitted};
@@ -37,7 +37,7 @@ pub use client::Client;
 pub use error::{Error, Result};
 pub use fetch::{FetchedFrame, FrameKey, Frames, Output, frames};
 pub use file::{Content, File};
-pub use remove::{Contents, Removing};
+pub use remove::{Contents, RemoveProgress};
 pub use status::{Misplaced, Obstacle, Overview, frame_name, obstacles};
 pub use submit::{Preview, Sending, Submission, Submitted, settings_with_frames};
 pub use watch::{Ended, Waiting, Watch};

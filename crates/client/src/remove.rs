@@ -17,7 +17,7 @@ const NOTICE: Duration = Duration::from_secs(15);
 
 /// How far a removal is.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Removing {
+pub enum RemoveProgress {
     /// So many objects are gone.
     Deleted(u64),
     /// The functions must notice that there are no scripts any more.
@@ -52,16 +52,16 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
     ///
     /// # Errors
     /// [`Error::NoAnimation`], and those of the store.
-    pub async fn remove(&self, animation: &Animation, mut told: impl FnMut(Removing)) -> Result<u64> {
+    pub async fn remove(&self, animation: &Animation, mut told: impl FnMut(RemoveProgress)) -> Result<u64> {
         let Contents { scripts, .. } = self.contents(animation).await?;
-        self.delete(&scripts, |done| told(Removing::Deleted(done))).await?;
+        self.delete(&scripts, |done| told(RemoveProgress::Deleted(done))).await?;
         let mut removed = scripts.len() as u64;
         let mut watch = Watch::new(*self, animation.clone());
-        watch.look().await?;
+        watch.poll().await?;
         while !scripts.is_empty() && is_pending(&watch) && watch.elapsed() < NOTICE {
-            told(Removing::WaitingForFunctions);
+            told(RemoveProgress::WaitingForFunctions);
             watch.pause().await;
-            watch.look_patiently().await?;
+            watch.poll_with_retry().await?;
         }
         // Whatever was under way may have left something since.
         loop {
@@ -69,7 +69,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
             if rest.is_empty() {
                 return Ok(removed);
             }
-            self.delete(&rest, |done| told(Removing::Deleted(removed + done))).await?;
+            self.delete(&rest, |done| told(RemoveProgress::Deleted(removed + done))).await?;
             removed += rest.len() as u64;
         }
     }
@@ -145,10 +145,12 @@ mod tests {
             futures_util::future::join(removing, world.deletions(&["scripts/film/1.txt"])).await;
         assert_eq!(world.keys("").await, others);
         let (first, last) = (told.first().cloned(), told.last().cloned());
-        assert_eq!(first, Some(Removing::Deleted(1)));
+        assert_eq!(first, Some(RemoveProgress::Deleted(1)));
         let removed = removed.unwrap();
-        assert_eq!(last, Some(Removing::Deleted(removed)));
-        assert!(removed as usize >= before - others.len() && told.contains(&Removing::WaitingForFunctions));
+        assert_eq!(last, Some(RemoveProgress::Deleted(removed)));
+        assert!(
+            removed as usize >= before - others.len() && told.contains(&RemoveProgress::WaitingForFunctions)
+        );
         assert!(matches!(client.remove(&film, |_| {}).await, Err(Error::NoAnimation(name)) if name == film));
     }
 

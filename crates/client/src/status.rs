@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::watch::Watch;
 
 /// How many slashes before `scripts/` are looked behind.
-const MOST_SLASHES: usize = 4;
+const MAX_SLASHES: usize = 4;
 
 /// What a bucket holds.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -106,7 +106,7 @@ impl<'a, S: Store, C: Clock> Client<'a, S, C> {
             found.extend(listed.objects.into_iter().filter(|object| object.key.contains('\\')));
             for folder in listed.prefixes.into_iter().filter(|folder| folder != SCRIPTS) {
                 let name = folder.trim_matches('/');
-                if name.is_empty() && folder.len() < MOST_SLASHES {
+                if name.is_empty() && folder.len() < MAX_SLASHES {
                     levels.push(folder);
                 } else if name.eq_ignore_ascii_case(SCRIPTS.trim_matches('/')) {
                     let below = self.list_if_allowed(ListRequest::all(folder)).await?;
@@ -141,7 +141,7 @@ impl<'a, S: Store, C: Clock> Client<'a, S, C> {
         let looks = animations.iter().map(|animation| {
             let mut watch = Watch::new(*self, animation.clone());
             async move {
-                watch.look().await?;
+                watch.poll().await?;
                 watch.compare().await?;
                 Ok::<_, Error>(watch)
             }

@@ -106,7 +106,7 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
     ///
     /// # Errors
     /// Those of the store.
-    pub async fn look(&mut self) -> Result<bool> {
+    pub async fn poll(&mut self) -> Result<bool> {
         let (store, key) = (self.client.store, self.animation.manifest());
         // At first a whole GET, whose refusal says more than that of a HEAD.
         let is_known = match &self.version {
@@ -155,8 +155,8 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
     ///
     /// # Errors
     /// When the store refuses.
-    pub async fn look_patiently(&mut self) -> Result<bool> {
-        match self.look().await {
+    pub async fn poll_with_retry(&mut self) -> Result<bool> {
+        match self.poll().await {
             Err(Error::Store(error)) if error.is_retryable() && self.elapsed() < PATIENCE => Ok(false),
             answer => answer,
         }
@@ -169,7 +169,7 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
     pub async fn look_for(&mut self) -> Result<bool> {
         let begun = self.client.clock.now();
         loop {
-            let changed = self.look_patiently().await?;
+            let changed = self.poll_with_retry().await?;
             if self.version.is_some() {
                 return Ok(changed);
             }
@@ -234,7 +234,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         let mut watch = Watch::new(*self, animation.clone());
         let mut last_change = self.clock.now();
         loop {
-            if watch.look_patiently().await? {
+            if watch.poll_with_retry().await? {
                 last_change = self.clock.now();
             }
             if let Some(manifest) = watch.manifest()
@@ -354,10 +354,10 @@ mod tests {
         world.put("scripts/film/1.txt", "frame").await;
         world.put("manifests/film.json", "garbage").await;
         let mut watch = Watch::new(world.client(), world.film());
-        assert!(watch.look().await.unwrap());
+        assert!(watch.poll().await.unwrap());
         assert!(watch.is_unreadable() && !watch.is_settled() && !watch.is_current());
         world.functions().await;
-        assert!(watch.look().await.unwrap());
+        assert!(watch.poll().await.unwrap());
         assert!(!watch.is_unreadable() && watch.is_current());
     }
 
@@ -401,7 +401,7 @@ mod tests {
         world.put("scripts/film/1.txt", "frame").await;
         world.functions().await;
         let mut watch = Watch::new(world.client(), world.film());
-        assert!(watch.look().await.unwrap() && !watch.look().await.unwrap());
+        assert!(watch.poll().await.unwrap() && !watch.poll().await.unwrap());
         let manifest = watch.manifest().unwrap();
         let version = manifest.frames[0].version.clone();
         let key = || "scripts/film/1.txt".to_owned();
