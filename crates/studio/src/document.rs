@@ -111,7 +111,7 @@ impl Document {
     }
 
     /// The pace of the animation was changed, as a step of its own; `before` held until now.
-    pub fn paced(&mut self, before: f64) {
+    pub fn frame_rate_changed(&mut self, before: f64) {
         self.held -= self.undone.drain(..).map(|step| step.size()).sum::<usize>();
         self.done.push_back(Step { gesture: None, inverses: Vec::new(), fps: Some(before) });
     }
@@ -146,8 +146,8 @@ impl Document {
         self.held -= step.size();
         let splices: Vec<_> = step.inverses.into_iter().rev().collect();
         let inverses = splices.iter().map(|splice| self.splice(splice)).collect();
-        let paced = step.fps.map(|before| std::mem::replace(fps, before));
-        let inverse = Step { gesture: None, inverses, fps: paced };
+        let frame_rate_changed = step.fps.map(|before| std::mem::replace(fps, before));
+        let inverse = Step { gesture: None, inverses, fps: frame_rate_changed };
         self.held += inverse.size();
         (splices, inverse)
     }

@@ -6,7 +6,7 @@ use rayfold_scene::{Command, Kind, Parameter, Presence, parse_curve};
 
 use crate::document::Splice;
 use crate::line::{Line, written};
-use crate::stage::Stage;
+use crate::source_map::SourceMap;
 use crate::tables::{Role, fields, role};
 use crate::values::{Keying, Values, changed, tidy};
 use crate::view::Bounds;
@@ -80,26 +80,30 @@ pub(crate) fn new_line(command: Command, ground: DVec3, size: f64, count: usize)
 }
 
 /// Adds a line of a frame, with all that is missing to see it; what is done, and where the line is then.
-pub(crate) fn add(lines: &[Line], stage: &Stage, line: Line) -> (Vec<Splice>, usize) {
+pub(crate) fn add(lines: &[Line], source_map: &SourceMap, line: Line) -> (Vec<Splice>, usize) {
     let mut before = Vec::new();
-    if stage.screen.is_none() {
+    if source_map.screen.is_none() {
         before.push(Line::new(SCREEN));
     }
-    if stage.camera.is_none() && stage.objects.is_empty() && stage.trace.is_none() {
+    if source_map.camera.is_none() && source_map.objects.is_empty() && source_map.trace.is_none() {
         before.push(Line::new(CAMERA));
-        if stage.background.is_none() {
+        if source_map.background.is_none() {
             before.push(Line::new(BACKGROUND));
         }
     }
     let is_light = line.command().is_some_and(|command| role(command) == Role::Light);
-    if stage.lights.is_empty() && stage.objects.is_empty() && stage.trace.is_none() && !is_light {
+    if source_map.lights.is_empty()
+        && source_map.objects.is_empty()
+        && source_map.trace.is_none()
+        && !is_light
+    {
         before.push(Line::new(SUN));
     }
-    let at = stage.end(lines);
+    let at = source_map.end(lines);
     let place = at + before.len();
     let mut inserted = before;
     inserted.push(line);
-    if stage.trace.is_none() {
+    if source_map.trace.is_none() {
         inserted.push(Line::new(Command::Trace.name()));
     }
     // A new line behind a last one without an end begins where that one gets its end.
@@ -180,11 +184,11 @@ pub(crate) fn hide(lines: &[Line], which: &[usize]) -> Vec<Splice> {
 /// A line changes places with the neighbour of its kind.
 pub(crate) fn reorder(
     lines: &[Line],
-    stage: &Stage,
+    source_map: &SourceMap,
     line: usize,
     down: bool,
 ) -> Option<(Vec<Splice>, usize)> {
-    let row = [&stage.objects, &stage.lights].into_iter().find(|row| row.contains(&line))?;
+    let row = [&source_map.objects, &source_map.lights].into_iter().find(|row| row.contains(&line))?;
     let at = row.iter().position(|&other| other == line)?;
     let other = *if down { row.get(at + 1)? } else { row.get(at.checked_sub(1)?)? };
     let (first, second) = (line.min(other), line.max(other));
@@ -195,9 +199,9 @@ pub(crate) fn reorder(
 }
 
 /// The `Trace` of a frame is so many frames.
-pub(crate) fn set_frames(lines: &[Line], stage: &Stage, count: u32) -> Vec<Splice> {
+pub(crate) fn set_frames(lines: &[Line], source_map: &SourceMap, count: u32) -> Vec<Splice> {
     let number = |count: u32| f64::from(count);
-    let old = stage.frames.and_then(|at| Some((at, lines.get(at)?)));
+    let old = source_map.frames.and_then(|at| Some((at, lines.get(at)?)));
     if let Some((at, line)) = old {
         let words = line.words().map_or(0, |words| words.parameters.len());
         let changed = match Values::of(line, 1.0).and_then(|values| values.number(0)) {
@@ -207,7 +211,7 @@ pub(crate) fn set_frames(lines: &[Line], stage: &Stage, count: u32) -> Vec<Splic
         return changed.map(|line| set(at, line)).into_iter().collect();
     }
     let frames = |count: u32| Line::new(&format!("{} {count}", Command::Frames.name()));
-    let Some(trace) = stage.trace else {
+    let Some(trace) = source_map.trace else {
         let inserted = vec![frames(count)];
         return vec![Splice { at: lines.len(), removed: 0, inserted }];
     };
@@ -254,7 +258,7 @@ mod tests {
             for text in ["", "# mine", "Screen 4 3\r\nTrace\r\n", "Screen 4 3\nTrace"] {
                 let lines = Line::split(text.as_bytes());
                 let line = new_line(command, DVec3::new(1.0, 0.0, -2.0), 0.7, 3);
-                let (splices, at) = add(&lines, &Stage::of(&lines, 0, 1.0), line);
+                let (splices, at) = add(&lines, &SourceMap::of(&lines, 0, 1.0), line);
                 let text = after(text, splices);
                 check(&text);
                 assert_eq!(Line::split(text.as_bytes())[at].command(), Some(command), "{text}");
@@ -288,7 +292,7 @@ mod tests {
     fn a_trace_becomes_so_many_frames() {
         let set = |text: &str, frame, count| {
             let lines = Line::split(text.as_bytes());
-            after(text, set_frames(&lines, &Stage::of(&lines, frame, 1.0), count))
+            after(text, set_frames(&lines, &SourceMap::of(&lines, frame, 1.0), count))
         };
         assert_eq!(set("Screen 4 3\nTrace\n", 0, 50), "Screen 4 3\nFrames 50\nTrace\n");
         assert_eq!(set("Screen 4 3\nFrames 9 # all\nTrace\n", 4, 50), "Screen 4 3\nFrames 50 # all\nTrace\n");
@@ -311,9 +315,9 @@ mod tests {
             [Some(Command::Sphere), Some(Command::Cuboid)]
         );
         let lines = Line::split(TEXT.as_bytes());
-        let (splices, at) = reorder(&lines, &Stage::of(&lines, 0, 1.0), 1, true).unwrap();
+        let (splices, at) = reorder(&lines, &SourceMap::of(&lines, 0, 1.0), 1, true).unwrap();
         let text = after(TEXT, splices);
         assert_eq!((at, Line::split(text.as_bytes())[3].command()), (3, Some(Command::Sphere)));
-        assert!(reorder(&lines, &Stage::of(&lines, 0, 1.0), 1, false).is_none());
+        assert!(reorder(&lines, &SourceMap::of(&lines, 0, 1.0), 1, false).is_none());
     }
 }

@@ -8,7 +8,7 @@ use rayfold_scene::{Scene, Script};
 
 use crate::extent;
 use crate::line::Line;
-use crate::stage::Stage;
+use crate::source_map::SourceMap;
 use crate::view::Bounds;
 
 /// A frame of a script.
@@ -17,7 +17,7 @@ pub(crate) struct Frame {
     /// In the script's size; none where there is nothing to draw.
     pub(crate) scene: Option<Scene>,
     /// The lines that it is made of.
-    pub(crate) stage: Stage,
+    pub(crate) source_map: SourceMap,
     /// Its number, at which curves are read.
     pub(crate) time: f64,
     boxes: OnceLock<Vec<Bounds>>,
@@ -30,7 +30,7 @@ impl Frame {
         let time = script.and_then(|script| script.frame_number(frame)).unwrap_or(1.0);
         Self {
             scene: script.and_then(|script| script.frame(frame)),
-            stage: Stage::of(lines, frame, time),
+            source_map: SourceMap::of(lines, frame, time),
             time,
             boxes: OnceLock::new(),
             bounds: OnceLock::new(),

@@ -11,7 +11,7 @@ use crate::document::Splice;
 use crate::edits::moved;
 use crate::extent::bounds;
 use crate::line::{Line, written};
-use crate::stage::Stage;
+use crate::source_map::SourceMap;
 use crate::values::{Keying, Values};
 
 /// Why some lines cannot be a group.
@@ -27,7 +27,7 @@ pub(crate) enum Refusal {
 
 impl Refusal {
     /// For people.
-    pub(crate) fn told(self) -> &'static str {
+    pub(crate) fn message(self) -> &'static str {
         match self {
             Self::NothingDrawn => "Only objects and groups of the picture can be grouped: select some first.",
             Self::SeveralFrames => {
@@ -47,11 +47,11 @@ impl Refusal {
 /// When they cannot be one.
 pub(crate) fn group(
     lines: &[Line],
-    stage: &Stage,
+    source_map: &SourceMap,
     scene: &Scene,
     which: &[usize],
 ) -> Result<(Vec<Splice>, usize), Refusal> {
-    let chosen: Vec<usize> = stage.objects.iter().copied().filter(|line| which.contains(line)).collect();
+    let chosen: Vec<usize> = source_map.objects.iter().copied().filter(|line| which.contains(line)).collect();
     let (Some(&first), Some(&last)) = (chosen.iter().min(), chosen.iter().max()) else {
         return Err(Refusal::NothingDrawn);
     };
@@ -59,7 +59,7 @@ pub(crate) fn group(
     if lines[first..=last].iter().any(ends) {
         return Err(Refusal::SeveralFrames);
     }
-    let pivot = pivot(stage, scene, &chosen);
+    let pivot = pivot(source_map, scene, &chosen);
     let name = free_name(lines);
     let mut inserted: Vec<Line> =
         (first..=last).filter(|at| !chosen.contains(at)).map(|at| lines[at].clone()).collect();
@@ -110,9 +110,9 @@ pub(crate) fn ungroup(lines: &[Line], at: usize) -> Result<(Vec<Splice>, Range<u
 }
 
 /// Where the group's origin comes to be.
-fn pivot(stage: &Stage, scene: &Scene, chosen: &[usize]) -> DVec3 {
+fn pivot(source_map: &SourceMap, scene: &Scene, chosen: &[usize]) -> DVec3 {
     let own = || {
-        let of_line = |at: usize| stage.line_of(at).is_some_and(|line| chosen.contains(&line));
+        let of_line = |at: usize| source_map.line_of(at).is_some_and(|line| chosen.contains(&line));
         scene.objects.iter().enumerate().filter(move |(at, _)| of_line(*at)).map(|(_, object)| object)
     };
     let slides = |object: &Object| match object {
@@ -153,7 +153,7 @@ mod tests {
 
     fn grouped(text: &str, which: &[usize]) -> Result<(String, usize), Refusal> {
         let lines = Line::split(text.as_bytes());
-        let (splices, at) = group(&lines, &Stage::of(&lines, 0, 1.0), &scene(text), which)?;
+        let (splices, at) = group(&lines, &SourceMap::of(&lines, 0, 1.0), &scene(text), which)?;
         let mut document = Document::new(text.as_bytes());
         for splice in splices {
             document.apply(splice, None);
@@ -190,7 +190,7 @@ mod tests {
         assert_eq!(grouped(&text, &[0, 2]), Err(Refusal::NothingDrawn));
         let lines = Line::split(text.as_bytes());
         let last = rayfold_scene::parse("a", text.as_bytes(), &Default::default()).script.unwrap();
-        let found = group(&lines, &Stage::of(&lines, 1, 1.0), &last.frame(1).unwrap(), &[3, 5]);
+        let found = group(&lines, &SourceMap::of(&lines, 1, 1.0), &last.frame(1).unwrap(), &[3, 5]);
         assert_eq!(found, Err(Refusal::SeveralFrames));
     }
 

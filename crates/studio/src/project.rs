@@ -145,7 +145,7 @@ impl Project {
         let before = self.settings.now().fps();
         self.settings.set_fps(fps)?;
         if fps != before {
-            self.files[file].document.paced(before);
+            self.files[file].document.frame_rate_changed(before);
         }
         Ok(())
     }

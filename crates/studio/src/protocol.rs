@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::handles::{Grip, Handle, Manner};
+use crate::handles::{DragOptions, Handle, HandleKind};
 use crate::project::Saved;
 use crate::tables::{CommandTable, FieldTable, Role};
 use crate::tracks::{KeyPlace, Tracks};
@@ -12,7 +12,7 @@ use crate::tracks::{KeyPlace, Tracks};
 /// What the page asks for.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "kebab-case", rename_all_fields = "kebab-case", tag = "ask")]
-pub(crate) enum Ask {
+pub(crate) enum ClientMessage {
     /// The viewport has this size, in pixels of the screen.
     Size { width: u32, height: u32 },
     /// A picture has been shown.
@@ -24,20 +24,20 @@ pub(crate) enum Ask {
     /// What is under the pointer?
     Hover { x: f64, y: f64 },
     /// The pointer goes down: on a handle, on an object, or on nothing, which turns the camera.
-    Press { x: f64, y: f64, extend: bool, grip: Option<Grip>, line: Option<usize> },
+    Press { x: f64, y: f64, extend: bool, grip: Option<HandleKind>, line: Option<usize> },
     /// It moves.
     Drag {
         x: f64,
         y: f64,
         #[serde(flatten)]
-        manner: Manner,
+        options: DragOptions,
     },
     /// It goes up.
     Release,
     /// Turn, move or approach; in heights of the picture.
     Navigate { how: Navigation, x: f64, y: f64 },
     /// Look through a camera.
-    Look { at: Standpoint },
+    Look { at: ViewPreset },
     /// What is looked through becomes the script's camera.
     KeepCamera,
     /// Numbers of a line, from number `first` on; those of one `gesture` are one step.
@@ -71,7 +71,7 @@ pub(crate) enum Ask {
     /// Objects get a material to begin with.
     Preset { lines: Vec<usize>, preset: String },
     /// What concerns keys and frames.
-    Time { wish: TimeWish },
+    Time { wish: TimelineEdit },
     /// Objects move by so many steps along the axes.
     Nudge { lines: Vec<usize>, by: [f64; 3] },
     /// A new object or light; at a point of the picture, or in the middle.
@@ -107,7 +107,7 @@ pub(crate) enum Source {
 /// What is wished of keys and frames.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "kebab-case", rename_all_fields = "kebab-case", tag = "do")]
-pub(crate) enum TimeWish {
+pub(crate) enum TimelineEdit {
     /// Turns something on or off.
     Switch { what: Switch, on: bool },
     /// Keys at the frame that is shown for the main numbers of lines; where all have one there, they go.
@@ -159,7 +159,7 @@ pub(crate) enum Navigation {
 /// Where to look from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum Standpoint {
+pub(crate) enum ViewPreset {
     /// The script's camera.
     Script,
     /// A free one, from where one looks now.
@@ -177,7 +177,7 @@ pub(crate) enum Standpoint {
 /// What the page is told; what is left out has not changed.
 #[derive(Clone, Debug, Default, Serialize)]
 #[serde(rename_all = "camelCase")]
-pub(crate) struct Tell {
+pub(crate) struct ServerMessage {
     /// Once, at the start.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) tables: Option<Vec<CommandTable>>,

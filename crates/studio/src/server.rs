@@ -29,7 +29,7 @@ use crate::output::{Outputs, frame_png, frames_zip, scripts_zip};
 use crate::page::Page;
 use crate::pictures::Painter;
 use crate::project::Project;
-use crate::protocol::{Ask, Tell};
+use crate::protocol::{ClientMessage, ServerMessage};
 use crate::runs::Cloud;
 use crate::session::{Answer, Output, Session};
 
@@ -301,7 +301,7 @@ async fn socket(State(shared): State<Arc<Shared>>, upgrade: WebSocketUpgrade) ->
 /// A page at work, until it closes or another takes over.
 async fn work(shared: Arc<Shared>, mut socket: WebSocket, mut left: oneshot::Receiver<()>) {
     let (pictures, mut drawn) = mpsc::channel::<Vec<u8>>(WAITING);
-    let (tellings, mut told) = mpsc::channel::<Tell>(WAITING);
+    let (tellings, mut told) = mpsc::channel::<ServerMessage>(WAITING);
     let Ok(painter) = Painter::start(move |picture| pictures.blocking_send(picture).is_ok()) else { return };
     let (mut session, answer) = Session::open(&shared.project());
     let mut tick = tokio::time::interval(TICK);
@@ -322,7 +322,7 @@ async fn work(shared: Arc<Shared>, mut socket: WebSocket, mut left: oneshot::Rec
                     Some(Output::Render) => {
                         let tellings = tellings.clone();
                         shared.outputs.start(&shared.project(), move |output| {
-                            let tell = Tell { output: Some(output), ..Tell::default() };
+                            let tell = ServerMessage { output: Some(output), ..ServerMessage::default() };
                             // A page that has left hears nothing any more.
                             let _ = tellings.blocking_send(tell);
                         });
@@ -369,7 +369,7 @@ async fn work(shared: Arc<Shared>, mut socket: WebSocket, mut left: oneshot::Rec
 }
 
 fn ask(shared: &Shared, session: &mut Session, message: &str) -> Answer {
-    match serde_json::from_str::<Ask>(message) {
+    match serde_json::from_str::<ClientMessage>(message) {
         Ok(ask) => tokio::task::block_in_place(|| session.ask(&mut shared.project(), ask)),
         Err(error) => Answer {
             tell: notice(&format!("the page said what is not understood: {error}")),
@@ -378,11 +378,11 @@ fn ask(shared: &Shared, session: &mut Session, message: &str) -> Answer {
     }
 }
 
-fn notice(text: &str) -> Tell {
-    Tell { notice: Some(text.into()), ..Tell::default() }
+fn notice(text: &str) -> ServerMessage {
+    ServerMessage { notice: Some(text.into()), ..ServerMessage::default() }
 }
 
-fn text(tell: &Tell) -> Message {
+fn text(tell: &ServerMessage) -> Message {
     // Numbers, texts and lists of them always have a form in JSON.
     Message::Text(serde_json::to_string(tell).unwrap_or_default().into())
 }

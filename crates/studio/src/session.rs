@@ -7,9 +7,9 @@ mod editing;
 mod held_keys;
 mod hold;
 mod loading;
-mod sight;
-mod telling;
+mod replies;
 mod time;
+mod viewport;
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -25,8 +25,8 @@ use crate::line::Line;
 use crate::materials;
 use crate::pictures::Wanted;
 use crate::project::{Place, Project};
-use crate::protocol::{Ask, FileState, Tell};
-use crate::resting;
+use crate::protocol::{ClientMessage, FileState, ServerMessage};
+use crate::snap_to_ground;
 use crate::tables::commands;
 use crate::tracks::{Copied, Tracks};
 use crate::values::changed;
@@ -84,7 +84,7 @@ pub(crate) enum Output {
 #[derive(Debug, Default)]
 pub(crate) struct Answer {
     /// What the page is told.
-    pub(crate) tell: Tell,
+    pub(crate) tell: ServerMessage,
     /// The picture that it gets.
     pub(crate) picture: Option<Wanted>,
     /// The page has shown a picture.
@@ -127,23 +127,23 @@ impl Session {
             shown_file: 0,
             output: None,
         };
-        let tell = Tell {
+        let tell = ServerMessage {
             tables: Some(commands()),
             examples: Some(examples::names()),
             can_create: Some(project.can_create()),
             presets: materials::presets(),
             lines: Some(session.lines(project)),
             notice: None,
-            ..Tell::default()
+            ..ServerMessage::default()
         };
         let answer = session.answer(project, tell, Change::Nothing);
         (session, answer)
     }
 
     /// Does what the page asks for.
-    pub(crate) fn ask(&mut self, project: &mut Project, ask: Ask) -> Answer {
+    pub(crate) fn ask(&mut self, project: &mut Project, ask: ClientMessage) -> Answer {
         self.asked = self.asked.wrapping_add(1);
-        let mut tell = Tell::default();
+        let mut tell = ServerMessage::default();
         let change = self.run(project, ask, &mut tell);
         match change {
             None => Answer { shown: true, ..Answer::default() },
@@ -163,14 +163,14 @@ impl Session {
         if looked.is_none() && !saved && matches!(pace, Ok(false)) {
             return None;
         }
-        let mut tell = Tell::default();
+        let mut tell = ServerMessage::default();
         if let Err(error) = pace {
             tell.notice = Some(words(&error));
         }
         let change = match looked {
             Some(splices) if !splices.is_empty() => {
                 tell.notice = Some(format!("{} was changed on the disk", project.files[place.file].name));
-                self.told(splices, &mut tell);
+                self.send_splices(splices, &mut tell);
                 Change::Still
             }
             _ => Change::Nothing,
@@ -179,17 +179,23 @@ impl Session {
     }
 
     /// `None` where there is nothing to tell.
-    fn run(&mut self, project: &mut Project, ask: Ask, tell: &mut Tell) -> Option<Change> {
-        if !matches!(ask, Ask::Shown | Ask::Size { .. } | Ask::Hover { .. } | Ask::Text { .. }) {
+    fn run(&mut self, project: &mut Project, ask: ClientMessage, tell: &mut ServerMessage) -> Option<Change> {
+        if !matches!(
+            ask,
+            ClientMessage::Shown
+                | ClientMessage::Size { .. }
+                | ClientMessage::Hover { .. }
+                | ClientMessage::Text { .. }
+        ) {
             self.typing = None;
         }
         Some(match ask {
-            Ask::Shown => return None,
-            Ask::Size { width, height } => {
+            ClientMessage::Shown => return None,
+            ClientMessage::Size { width, height } => {
                 self.size = (width.max(1), height.max(1));
                 Change::Still
             }
-            Ask::Frame { frame, moving } => {
+            ClientMessage::Frame { frame, moving } => {
                 self.show(project, frame, tell);
                 if moving {
                     (tell.outline, tell.ghosts) = (Some(String::new()), Some(Vec::new()));
@@ -198,38 +204,38 @@ impl Session {
                 self.outline(project, tell);
                 Change::Still
             }
-            Ask::Select { lines } => {
+            ClientMessage::Select { lines } => {
                 self.select(project, lines);
                 self.outline(project, tell);
                 Change::Nothing
             }
-            Ask::Hover { x, y } => {
+            ClientMessage::Hover { x, y } => {
                 self.hover(project, x, y, tell);
                 Change::Nothing
             }
-            Ask::Press { x, y, extend, grip, line } => {
+            ClientMessage::Press { x, y, extend, grip, line } => {
                 self.press(project, DVec2::new(x, y), extend, grip.zip(line));
                 self.outline(project, tell);
                 Change::Nothing
             }
-            Ask::Drag { x, y, manner } => self.drag(project, DVec2::new(x, y), manner, tell),
-            Ask::Release => {
+            ClientMessage::Drag { x, y, options } => self.drag(project, DVec2::new(x, y), options, tell),
+            ClientMessage::Release => {
                 self.held = None;
                 self.outline(project, tell);
                 Change::Still
             }
-            Ask::Navigate { how, x, y } => {
+            ClientMessage::Navigate { how, x, y } => {
                 self.navigate(project, how, DVec2::new(x, y));
                 tell.outline = Some(String::new());
                 Change::Moving
             }
-            Ask::Look { at } => {
+            ClientMessage::Look { at } => {
                 self.look(project, at);
                 self.outline(project, tell);
                 Change::Still
             }
-            Ask::KeepCamera => self.keep_camera(project, tell),
-            Ask::Set { line, first, values, gesture } => {
+            ClientMessage::KeepCamera => self.keep_camera(project, tell),
+            ClientMessage::Set { line, first, values, gesture } => {
                 let keying = self.keying(project);
                 let to = self.line(project, line).and_then(|line| changed(line, first, &values, keying));
                 let is_fit = values.iter().all(|value| value.is_finite()) && first + values.len() <= 64;
@@ -242,7 +248,7 @@ impl Session {
                     _ => Change::Nothing,
                 }
             }
-            Ask::Text { line, text } => {
+            ClientMessage::Text { line, text } => {
                 let old = self.line(project, line).cloned().unwrap_or_default();
                 if text.len() <= TEXT && old.text() != text {
                     let mut inserted: Vec<_> = text.split('\n').map(Line::new).collect();
@@ -260,19 +266,19 @@ impl Session {
                 }
                 Change::Still
             }
-            Ask::Insert { at, text } => {
+            ClientMessage::Insert { at, text } => {
                 if text.len() <= TEXT {
                     let inserted = text.split('\n').map(Line::new).collect();
                     self.edit(project, vec![Splice { at, removed: 0, inserted }], None, tell);
                 }
                 Change::Still
             }
-            Ask::Remove { lines } => {
+            ClientMessage::Remove { lines } => {
                 self.edit(project, edits::remove(&lines), None, tell);
                 self.select(project, Vec::new());
                 Change::Still
             }
-            Ask::Duplicate { lines } => {
+            ClientMessage::Duplicate { lines } => {
                 let size = self.step(project) * 40.0;
                 let (splices, copies) = edits::duplicate(self.file_lines(project), &lines, size);
                 self.edit(project, splices, None, tell);
@@ -280,72 +286,72 @@ impl Session {
                 self.outline(project, tell);
                 Change::Still
             }
-            Ask::Reorder { line, down } => {
+            ClientMessage::Reorder { line, down } => {
                 let shown = self.shown(project);
                 if let Some((splices, at)) =
-                    edits::reorder(self.file_lines(project), &shown.stage, line, down)
+                    edits::reorder(self.file_lines(project), &shown.source_map, line, down)
                 {
                     self.edit(project, splices, None, tell);
                     self.select(project, vec![at]);
                 }
                 Change::Still
             }
-            Ask::Rename { line, name } => {
+            ClientMessage::Rename { line, name } => {
                 if let Some(to) = self.line(project, line).and_then(|line| line.named(&name)) {
                     self.edit(project, vec![edits::set(line, to)], None, tell);
                 }
                 Change::Nothing
             }
-            Ask::Hide { lines } => {
+            ClientMessage::Hide { lines } => {
                 let splices = edits::hide(self.file_lines(project), &lines);
                 self.edit(project, splices, None, tell);
                 self.outline(project, tell);
                 Change::Still
             }
-            Ask::Drop { lines } => {
+            ClientMessage::Drop { lines } => {
                 let shown = self.shown(project);
                 if let Some(scene) = self.sound_scene(project) {
                     let (of, keying) = (self.file_lines(project), self.keying(project));
-                    let splices = resting::drop_down(of, &shown.stage, &scene, &lines, keying);
+                    let splices = snap_to_ground::drop_down(of, &shown.source_map, &scene, &lines, keying);
                     self.edit(project, splices, None, tell);
                     self.outline(project, tell);
                 }
                 Change::Still
             }
-            Ask::Ground { lines } => {
+            ClientMessage::Ground { lines } => {
                 let shown = self.shown(project);
                 if let Some(scene) = self.sound_scene(project) {
                     let (of, keying) = (self.file_lines(project), self.keying(project));
-                    let splices = resting::to_ground(of, &shown.stage, &scene, &lines, keying);
+                    let splices = snap_to_ground::to_ground(of, &shown.source_map, &scene, &lines, keying);
                     self.edit(project, splices, None, tell);
                     self.outline(project, tell);
                 }
                 Change::Still
             }
-            Ask::Lock { lines } => {
+            ClientMessage::Lock { lines } => {
                 self.lock(project, &lines);
                 Change::Nothing
             }
-            Ask::Group { lines } => {
+            ClientMessage::Group { lines } => {
                 self.group(project, &lines, tell);
                 Change::Still
             }
-            Ask::Ungroup { line } => {
+            ClientMessage::Ungroup { line } => {
                 self.ungroup(project, line, tell);
                 Change::Still
             }
-            Ask::Surface { lines, material } => {
+            ClientMessage::Surface { lines, material } => {
                 let splices = materials::give(self.file_lines(project), &lines, &material);
                 self.edit(project, splices, None, tell);
                 Change::Still
             }
-            Ask::Preset { lines, preset } => {
+            ClientMessage::Preset { lines, preset } => {
                 let splices = materials::give_preset(self.file_lines(project), &lines, &preset);
                 self.edit(project, splices, None, tell);
                 Change::Still
             }
-            Ask::Time { wish } => self.time_wish(project, wish, tell),
-            Ask::Nudge { lines, by } => {
+            ClientMessage::Time { wish } => self.edit_timeline(project, wish, tell),
+            ClientMessage::Nudge { lines, by } => {
                 let by = DVec3::from(by) * self.step(project) * 10.0;
                 let keying = self.keying(project);
                 let splices = lines
@@ -358,32 +364,32 @@ impl Session {
                 self.outline(project, tell);
                 Change::Still
             }
-            Ask::Add { command, at } => {
+            ClientMessage::Add { command, at } => {
                 self.add(project, &command, at.map(DVec2::from), tell);
                 Change::Still
             }
-            Ask::Undo | Ask::Redo => {
+            ClientMessage::Undo | ClientMessage::Redo => {
                 let file = self.place(project).file;
-                match project.step(file, matches!(ask, Ask::Undo)) {
-                    Ok(splices) => self.told(splices, tell),
+                match project.step(file, matches!(ask, ClientMessage::Undo)) {
+                    Ok(splices) => self.send_splices(splices, tell),
                     Err(error) => tell.notice = Some(words(&error)),
                 }
                 self.select(project, self.selection.clone());
                 self.outline(project, tell);
                 Change::Still
             }
-            Ask::Resolve { keep_mine } => {
+            ClientMessage::Resolve { keep_mine } => {
                 let file = self.place(project).file;
                 let splices = project.files[file].resolve(keep_mine);
-                self.told(splices, tell);
+                self.send_splices(splices, tell);
                 Change::Still
             }
-            Ask::Load { from, new } => self.load(project, from, new.as_deref(), tell),
-            Ask::Render => {
+            ClientMessage::Load { from, new } => self.load(project, from, new.as_deref(), tell),
+            ClientMessage::Render => {
                 self.output = Some(Output::Render);
                 Change::Nothing
             }
-            Ask::Cancel => {
+            ClientMessage::Cancel => {
                 self.output = Some(Output::Cancel);
                 Change::Nothing
             }
@@ -417,7 +423,7 @@ impl Session {
         self.selection.reverse();
     }
 
-    fn show(&mut self, project: &Project, frame: usize, tell: &mut Tell) {
+    fn show(&mut self, project: &Project, frame: usize, tell: &mut ServerMessage) {
         self.frame = frame.min(project.frame_count() - 1);
         let file = self.place(project).file;
         if file != self.shown_file {

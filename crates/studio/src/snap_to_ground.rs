@@ -11,7 +11,7 @@ use crate::document::Splice;
 use crate::edits::{moved, set};
 use crate::extent::{bounds, reach};
 use crate::line::Line;
-use crate::stage::Stage;
+use crate::source_map::SourceMap;
 use crate::values::{Keying, tidy};
 
 /// Rays a side, odd so that the middle is looked at, too.
@@ -27,12 +27,12 @@ const LIFT: f64 = 1e-6;
 /// Objects fall together until one of them rests on what is below, or on the height 0 where nothing is.
 pub(crate) fn drop_down(
     lines: &[Line],
-    stage: &Stage,
+    source_map: &SourceMap,
     scene: &Scene,
     which: &[usize],
     keying: Keying,
 ) -> Vec<Splice> {
-    let is_chosen = |object: usize| stage.line_of(object).is_some_and(|line| which.contains(&line));
+    let is_chosen = |object: usize| source_map.line_of(object).is_some_and(|line| which.contains(&line));
     let (own, others): (Vec<_>, Vec<_>) =
         scene.objects.iter().cloned().enumerate().partition(|(object, _)| is_chosen(*object));
     let plain = |objects: Vec<(usize, Object)>| objects.into_iter().map(|(_, object)| object).collect();
@@ -43,14 +43,14 @@ pub(crate) fn drop_down(
 /// Objects stand on the height 0 with their lowest point, each for itself.
 pub(crate) fn to_ground(
     lines: &[Line],
-    stage: &Stage,
+    source_map: &SourceMap,
     scene: &Scene,
     which: &[usize],
     keying: Keying,
 ) -> Vec<Splice> {
     let mut splices = Vec::new();
     for &line in which {
-        let own = scene.objects.iter().enumerate().filter(|(at, _)| stage.line_of(*at) == Some(line));
+        let own = scene.objects.iter().enumerate().filter(|(at, _)| source_map.line_of(*at) == Some(line));
         let lowest = own.filter_map(|(_, object)| Some(-reach(object, DVec3::NEG_Y)?)).reduce(f64::min);
         splices.extend(lowest.map(|lowest| down(lines, &[line], lowest, keying)).unwrap_or_default());
     }
@@ -116,14 +116,14 @@ mod tests {
 
     const STILL: Keying = Keying { time: 1.0, first: 1.0, auto: false, whole: false };
 
-    type Act = fn(&[Line], &Stage, &Scene, &[usize], Keying) -> Vec<Splice>;
+    type Act = fn(&[Line], &SourceMap, &Scene, &[usize], Keying) -> Vec<Splice>;
 
     fn after(text: &str, which: &[usize], act: Act) -> String {
         let lines = Line::split(text.as_bytes());
         let parsed = rayfold_scene::parse("a", text.as_bytes(), &Default::default());
         let scene = parsed.script.unwrap_or_else(|| panic!("{:?}", parsed.diagnostics)).frame(0).unwrap();
         let mut document = Document::new(text.as_bytes());
-        for splice in act(&lines, &Stage::of(&lines, 0, 1.0), &scene, which, STILL) {
+        for splice in act(&lines, &SourceMap::of(&lines, 0, 1.0), &scene, which, STILL) {
             document.apply(splice, None);
         }
         String::from_utf8(document.bytes()).unwrap()

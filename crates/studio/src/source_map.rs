@@ -17,7 +17,7 @@ const SCALE: usize = 6;
 
 /// The lines of a frame, from 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Stage {
+pub(crate) struct SourceMap {
     /// Those of its objects and of the groups that it uses, in the tracer's order.
     pub(crate) objects: Vec<usize>,
     /// How many objects of the tracer there are up to each of these lines, and with it.
@@ -48,32 +48,32 @@ struct Groups {
     open: Option<(usize, String, usize)>,
 }
 
-impl Stage {
+impl SourceMap {
     /// The lines of frame `frame` of a script, counted from 0, as it is at a time. Beyond the last `Trace`: what stands at the
     /// end.
     pub(crate) fn of(lines: &[Line], frame: usize, time: f64) -> Self {
-        let mut stage = Self::default();
+        let mut source_map = Self::default();
         let mut groups = Groups::default();
         let (mut before, mut count) = (0usize, 1usize);
         for (number, line) in lines.iter().enumerate() {
             let Some(command) = line.command() else { continue };
             match (command, role(command)) {
                 (Command::Clear, _) => {
-                    stage.objects.clear();
-                    stage.drawn.clear();
-                    stage.lights.clear();
-                    stage.background = None;
-                    stage.cleared = Some(number);
+                    source_map.objects.clear();
+                    source_map.drawn.clear();
+                    source_map.lights.clear();
+                    source_map.background = None;
+                    source_map.cleared = Some(number);
                 }
                 (Command::Trace, _) => {
                     if frame < before.saturating_add(count) {
-                        stage.trace = Some(number);
+                        source_map.trace = Some(number);
                         break;
                     }
                     before += count;
                 }
                 (Command::Frames, _) => {
-                    stage.frames = Some(number);
+                    source_map.frames = Some(number);
                     count = frames(line).unwrap_or(1);
                 }
                 (Command::Group, _) => {
@@ -82,23 +82,23 @@ impl Stage {
                 (Command::End, _) => {
                     if let Some((start, name, drawn)) = groups.open.take() {
                         groups.drawn.insert(name, drawn);
-                        stage.groups.push(start..=number);
+                        source_map.groups.push(start..=number);
                     }
                 }
                 (Command::Use, _) => {
                     let hides = Values::of(line, time).and_then(|values| values.number(SCALE)) == Some(0.0);
                     let drawn = line.subject().and_then(|name| groups.drawn.get(name)).copied().unwrap_or(0);
-                    stage.draw(&mut groups, number, if hides { 0 } else { drawn });
+                    source_map.draw(&mut groups, number, if hides { 0 } else { drawn });
                 }
-                (Command::Screen, _) => stage.screen = Some(number),
-                (Command::Background, _) => stage.background = Some(number),
-                (_, Role::Object) => stage.draw(&mut groups, number, 1),
-                (_, Role::Light) => stage.lights.push(number),
-                (_, Role::Camera) => stage.camera = Some(number),
+                (Command::Screen, _) => source_map.screen = Some(number),
+                (Command::Background, _) => source_map.background = Some(number),
+                (_, Role::Object) => source_map.draw(&mut groups, number, 1),
+                (_, Role::Light) => source_map.lights.push(number),
+                (_, Role::Camera) => source_map.camera = Some(number),
                 (_, Role::Use | Role::Material | Role::Group | Role::Setting) => {}
             }
         }
-        stage
+        source_map
     }
 
     /// An object, or what a group draws, in the group that is open or in the picture.
@@ -166,18 +166,18 @@ mod tests {
         let script = rayfold_scene::parse("a", text.as_bytes(), &Default::default()).script.unwrap();
         let expected: [&[usize]; 4] = [&[1], &[1, 5], &[9], &[9]];
         for (frame, objects) in expected.into_iter().enumerate() {
-            let stage = Stage::of(&lines, frame, 1.0);
-            assert_eq!(stage.objects, objects);
+            let source_map = SourceMap::of(&lines, frame, 1.0);
+            assert_eq!(source_map.objects, objects);
             assert_eq!(script.frame(frame).unwrap().objects.len(), objects.len());
         }
-        let last = Stage::of(&lines, 3, 1.0);
+        let last = SourceMap::of(&lines, 3, 1.0);
         assert_eq!(
             (last.camera, last.screen, last.lights.len(), last.trace),
             (Some(8), Some(0), 0, Some(11))
         );
         assert_eq!(last.end(&lines), 10);
         let lines = Line::split(b"Screen 2 2\nTrace\nClear\nTrace");
-        assert_eq!(Stage::of(&lines, 1, 1.0).end(&lines), 3, "what stands before a `Clear` is gone");
+        assert_eq!(SourceMap::of(&lines, 1, 1.0).end(&lines), 3, "what stands before a `Clear` is gone");
     }
 
     #[test]
@@ -190,16 +190,17 @@ mod tests {
         assert_eq!(script.frame_count(), 7);
         for frame in 0..7 {
             let time = script.frame_number(frame).unwrap();
-            let stage = Stage::of(&lines, frame, time);
-            assert_eq!(stage.object_count(), script.frame(frame).unwrap().objects.len(), "{frame}");
-            assert_eq!(stage.trace, Some(if frame < 3 { 14 } else { 17 }));
-            assert_eq!(stage.frames, Some(if frame < 3 { 13 } else { 15 }));
+            let source_map = SourceMap::of(&lines, frame, time);
+            assert_eq!(source_map.object_count(), script.frame(frame).unwrap().objects.len(), "{frame}");
+            assert_eq!(source_map.trace, Some(if frame < 3 { 14 } else { 17 }));
+            assert_eq!(source_map.frames, Some(if frame < 3 { 13 } else { 15 }));
         }
-        let stage = Stage::of(&lines, 0, 1.0);
-        let seen: Vec<_> = (0..stage.object_count()).map(|object| stage.line_of(object).unwrap()).collect();
+        let source_map = SourceMap::of(&lines, 0, 1.0);
+        let seen: Vec<_> =
+            (0..source_map.object_count()).map(|object| source_map.line_of(object).unwrap()).collect();
         assert_eq!(seen, [10, 11, 11, 11, 12, 12]);
-        assert_eq!(stage.line_of(6), None);
-        let inside: Vec<_> = (0..lines.len()).filter(|&line| stage.is_in_group(line)).collect();
+        assert_eq!(source_map.line_of(6), None);
+        let inside: Vec<_> = (0..lines.len()).filter(|&line| source_map.is_in_group(line)).collect();
         assert_eq!(inside, (1..10).collect::<Vec<_>>());
     }
 }

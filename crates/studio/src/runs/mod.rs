@@ -10,7 +10,7 @@ mod routes;
 mod sending;
 #[cfg(test)]
 mod tests;
-mod told;
+mod updates;
 
 use std::fmt;
 use std::sync::{Arc, Mutex};

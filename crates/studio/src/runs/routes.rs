@@ -27,7 +27,7 @@ use tokio::sync::{Semaphore, mpsc};
 
 use super::offer::{Ready, Refusal};
 use super::sending::{SendingTell, Uploads};
-use super::told::{FrameTell, RunState, RunTell, Summary, faults, summary};
+use super::updates::{FrameUpdate, RunState, RunUpdate, Summary, faults, summary};
 use crate::error::words;
 use crate::pipe::{Zip, frame_file, pipe};
 use crate::project::Project;
@@ -302,7 +302,7 @@ async fn watch<S: Store>(runs: &Runs<S>, animation: Animation, sender: &mpsc::Se
     loop {
         let ended_before = std::mem::replace(&mut ended, runs.uploads.ended());
         let looked = async {
-            let changed = watch.look().await?;
+            let changed = watch.poll().await?;
             if changed || watch.is_behind() || last.is_none() || ended != ended_before {
                 watch.compare().await?;
             }
@@ -310,8 +310,8 @@ async fn watch<S: Store>(runs: &Runs<S>, animation: Animation, sender: &mpsc::Se
         };
         let problem = looked.await.err().map(|error| words(&error));
         let frames = watch.manifest().map_or(&[][..], |manifest| &manifest.frames);
-        let frames = frames.iter().map(FrameTell::of).collect();
-        if let Some(tell) = RunTell::since(&mut last, runs.state(&watch, problem), frames) {
+        let frames = frames.iter().map(FrameUpdate::of).collect();
+        if let Some(tell) = RunUpdate::since(&mut last, runs.state(&watch, problem), frames) {
             // Numbers, texts and lists of them always have a form in JSON.
             let event = Event::default().data(serde_json::to_string(&tell).unwrap_or_default());
             if sender.send(event).await.is_err() {

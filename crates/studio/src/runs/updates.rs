@@ -32,13 +32,13 @@ pub(super) struct Summary {
     /// Nothing more will happen by itself.
     pub(super) settled: bool,
     /// The GIF that there is.
-    pub(super) gif: Option<GifTell>,
+    pub(super) gif: Option<GifInfo>,
 }
 
 /// A GIF in the bucket.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct GifTell {
+pub(super) struct GifInfo {
     /// Its size.
     pub(super) bytes: u64,
     /// What it is, so that another is another address.
@@ -50,15 +50,15 @@ pub(super) struct GifTell {
 /// A run as a whole; of the frames only what has changed since the last time.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct RunTell {
+pub(super) struct RunUpdate {
     #[serde(flatten)]
     pub(super) state: RunState,
     /// All frames.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) frames: Option<Vec<FrameTell>>,
+    pub(super) frames: Option<Vec<FrameUpdate>>,
     /// Frames that are other than they were, with their places from 0.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(super) changed: Vec<(usize, FrameTell)>,
+    pub(super) changed: Vec<(usize, FrameUpdate)>,
 }
 
 /// How a run stands, without its frames.
@@ -68,7 +68,7 @@ pub(super) struct RunState {
     #[serde(flatten)]
     pub(super) summary: Summary,
     /// What keeps it from being done.
-    pub(super) faults: Vec<FaultTell>,
+    pub(super) faults: Vec<FaultInfo>,
     /// Faults that are not told.
     pub(super) more_faults: usize,
     /// How far its upload is, if this program sends it.
@@ -80,7 +80,7 @@ pub(super) struct RunState {
 /// A frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct FrameTell {
+pub(super) struct FrameUpdate {
     /// Its script.
     pub(super) script: ScriptName,
     /// The script's version.
@@ -89,7 +89,7 @@ pub(super) struct FrameTell {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) part: Part,
     /// Where it stands.
-    pub(super) state: Stand,
+    pub(super) state: FrameStatus,
     /// The renderer's version, of one that is drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) pixels: Option<u32>,
@@ -98,7 +98,7 @@ pub(super) struct FrameTell {
 /// Where a frame stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Stand {
+pub(super) enum FrameStatus {
     /// It is awaited.
     Pending,
     /// It is drawn.
@@ -110,7 +110,7 @@ pub(super) enum Stand {
 /// Something that keeps a run from being done.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct FaultTell {
+pub(super) struct FaultInfo {
     /// What is faulty, for people.
     pub(super) what: String,
     /// Its script, if it is a frame.
@@ -130,7 +130,7 @@ pub(super) struct FaultTell {
 
 /// A run as it was seen last.
 pub(super) fn summary<S: Store, C: Clock>(watch: &Watch<'_, S, C>) -> Summary {
-    let gif = watch.gif().map(|gif| GifTell {
+    let gif = watch.gif().map(|gif| GifInfo {
         bytes: gif.size,
         version: gif.etag.to_string(),
         current: watch.is_current(),
@@ -156,12 +156,12 @@ pub(super) fn summary<S: Store, C: Clock>(watch: &Watch<'_, S, C>) -> Summary {
 }
 
 /// Everything that keeps it from being done, as far as it is told, and how much is not.
-pub(super) fn faults(manifest: &Manifest) -> (Vec<FaultTell>, usize) {
-    let mut all: Vec<FaultTell> = manifest
+pub(super) fn faults(manifest: &Manifest) -> (Vec<FaultInfo>, usize) {
+    let mut all: Vec<FaultInfo> = manifest
         .head
         .rejected
         .iter()
-        .map(|rejected| FaultTell::of_nothing_drawn(rejected.key.clone(), rejected.problem.clone()))
+        .map(|rejected| FaultInfo::of_nothing_drawn(rejected.key.clone(), rejected.problem.clone()))
         .collect();
     let failed = manifest.frames.iter().filter_map(|frame| match &frame.state {
         FrameState::Failed(fault) => Some((frame, fault.reason.as_ref())),
@@ -184,11 +184,11 @@ pub(super) fn faults(manifest: &Manifest) -> (Vec<FaultTell>, usize) {
     (all, more)
 }
 
-fn of_reason(what: String, frame: Option<&Frame>, reason: Option<&Reason>) -> Vec<FaultTell> {
-    let about = |what: String, message: String| FaultTell {
+fn of_reason(what: String, frame: Option<&Frame>, reason: Option<&Reason>) -> Vec<FaultInfo> {
+    let about = |what: String, message: String| FaultInfo {
         script: frame.map(|frame| frame.script.clone()),
         part: frame.and_then(|frame| frame.part),
-        ..FaultTell::of_nothing_drawn(what, message)
+        ..FaultInfo::of_nothing_drawn(what, message)
     };
     let Some(reason) = reason else { return vec![about(what, "no reason is known yet".into())] };
     if reason.diagnostics.is_empty() {
@@ -196,7 +196,7 @@ fn of_reason(what: String, frame: Option<&Frame>, reason: Option<&Reason>) -> Ve
     }
     let told = |diagnostic: &Diagnostic| {
         let Diagnostic { line, column, message, expected, help, .. } = diagnostic;
-        FaultTell {
+        FaultInfo {
             place: Some((*line, *column)),
             help: help.clone().or_else(|| expected.clone()).unwrap_or_default(),
             ..about(what.clone(), message.clone())
@@ -209,30 +209,30 @@ fn of_reason(what: String, frame: Option<&Frame>, reason: Option<&Reason>) -> Ve
     faults
 }
 
-impl FaultTell {
+impl FaultInfo {
     fn of_nothing_drawn(what: String, message: String) -> Self {
         Self { what, script: None, part: None, place: None, message, help: String::new() }
     }
 }
 
-impl FrameTell {
+impl FrameUpdate {
     pub(super) fn of(frame: &Frame) -> Self {
         let (state, pixels) = match frame.state {
-            FrameState::Pending => (Stand::Pending, None),
-            FrameState::Done { pixels } => (Stand::Done, Some(pixels)),
-            FrameState::Failed(_) => (Stand::Failed, None),
+            FrameState::Pending => (FrameStatus::Pending, None),
+            FrameState::Done { pixels } => (FrameStatus::Done, Some(pixels)),
+            FrameState::Failed(_) => (FrameStatus::Failed, None),
         };
         let version = frame.version.to_string();
         Self { script: frame.script.clone(), version, part: frame.part, state, pixels }
     }
 }
 
-impl RunTell {
+impl RunUpdate {
     /// What is new since the last time; `None` where nothing is.
     pub(super) fn since(
-        last: &mut Option<(RunState, Vec<FrameTell>)>,
+        last: &mut Option<(RunState, Vec<FrameUpdate>)>,
         state: RunState,
-        frames: Vec<FrameTell>,
+        frames: Vec<FrameUpdate>,
     ) -> Option<Self> {
         let tell = match last {
             Some((old, known)) if known.len() == frames.len() => {
@@ -269,12 +269,12 @@ mod tests {
         RunState { summary, faults: vec![], more_faults: 0, sending: None, problem: None }
     }
 
-    fn frames(drawn: &[bool]) -> Vec<FrameTell> {
-        let frame = |(at, drawn): (usize, &bool)| FrameTell {
+    fn frames(drawn: &[bool]) -> Vec<FrameUpdate> {
+        let frame = |(at, drawn): (usize, &bool)| FrameUpdate {
             script: ScriptName::new(&format!("{at}")).unwrap(),
             version: "v".into(),
             part: None,
-            state: if *drawn { Stand::Done } else { Stand::Pending },
+            state: if *drawn { FrameStatus::Done } else { FrameStatus::Pending },
             pixels: drawn.then_some(1),
         };
         drawn.iter().enumerate().map(frame).collect()
@@ -283,7 +283,7 @@ mod tests {
     #[test]
     fn only_what_changes_is_told_again() {
         let mut last = None;
-        let mut tell = |done, drawn: &[bool]| RunTell::since(&mut last, state(done), frames(drawn));
+        let mut tell = |done, drawn: &[bool]| RunUpdate::since(&mut last, state(done), frames(drawn));
         let first = tell(0, &[false; 3]).unwrap();
         assert_eq!((first.frames.map(|frames| frames.len()), first.changed.len()), (Some(3), 0));
         assert!(tell(0, &[false; 3]).is_none());

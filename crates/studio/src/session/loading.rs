@@ -4,7 +4,7 @@
 use super::{Change, Session};
 use crate::examples;
 use crate::project::Project;
-use crate::protocol::{Source, Tell};
+use crate::protocol::{ServerMessage, Source};
 
 impl Session {
     /// Puts a text in place of the one that is shown, or into a new file of this name.
@@ -13,7 +13,7 @@ impl Session {
         project: &mut Project,
         from: Source,
         new: Option<&str>,
-        tell: &mut Tell,
+        tell: &mut ServerMessage,
     ) -> Change {
         let file = self.place(project).file;
         let text = match from {
@@ -29,7 +29,7 @@ impl Session {
         match new {
             None => {
                 let splices = project.files[file].replace(&text);
-                self.told(splices, tell);
+                self.send_splices(splices, tell);
                 self.select(project, Vec::new());
             }
             Some(name) => match project.create(name, &text) {

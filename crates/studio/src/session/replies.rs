@@ -3,7 +3,7 @@
 use rayfold_scene::{Command, Scene};
 
 use super::hold::Held;
-use super::sight::grid_path;
+use super::viewport::grid_path;
 use super::{Answer, Change, Session};
 use crate::document::Splice;
 use crate::edits;
@@ -11,13 +11,13 @@ use crate::handles::handles;
 use crate::line::Line;
 use crate::pictures::Wanted;
 use crate::project::Project;
-use crate::protocol::{FaultState, FileState, LineState, LinesChanged, State, Tell};
+use crate::protocol::{FaultState, FileState, LineState, LinesChanged, ServerMessage, State};
 use crate::tables::role;
 use crate::values::Values;
 use crate::view::Projection;
 
 impl Session {
-    pub(super) fn answer(&mut self, project: &Project, mut tell: Tell, change: Change) -> Answer {
+    pub(super) fn answer(&mut self, project: &Project, mut tell: ServerMessage, change: Change) -> Answer {
         // An outline is that of a picture: with another one it is drawn anew, or goes while things move.
         match change {
             Change::Still if tell.outline.is_none() => self.outline(project, &mut tell),
@@ -70,12 +70,12 @@ impl Session {
             if !matches!(self.held, Some(Held::Turn(_)))
                 && let Some(&line) = self.selection.last()
                 && let Some(values) = lines.get(line).and_then(|text| Values::of(text, now.time))
-                && !now.stage.is_in_group(line)
+                && !now.source_map.is_in_group(line)
                 && !self.is_locked(project, line)
             {
                 shown = handles(line, &values, &projection, around);
             }
-            (way, marks) = self.motion_path(project, &projection, &now.stage);
+            (way, marks) = self.motion_path(project, &projection, &now.source_map);
             if self.free.is_some() {
                 grid = grid_path(&projection, self.bounds(project));
             }
@@ -123,7 +123,7 @@ impl Session {
     }
 
     /// What is selected, locked and copied stays with its lines.
-    pub(super) fn told(&mut self, splices: Vec<Splice>, tell: &mut Tell) {
+    pub(super) fn send_splices(&mut self, splices: Vec<Splice>, tell: &mut ServerMessage) {
         let file = self.shown_file;
         if splices.iter().any(|splice| splice.removed != splice.inserted.len())
             && !matches!(self.held, Some(Held::Turn(_)))

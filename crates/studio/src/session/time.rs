@@ -6,16 +6,16 @@ use rayfold_scene::{Command, Mode};
 
 use super::held_keys::HeldKeys;
 use super::hold::Held;
-use super::sight::picture_of;
+use super::viewport::picture_of;
 use super::{Change, Session};
 use crate::edits;
 use crate::error::words;
 use crate::frame::Frame;
 use crate::line::Line;
 use crate::project::Project;
-use crate::protocol::{Ghost, Inspected, Switch, Tell, TimeState, TimeWish};
+use crate::protocol::{Ghost, Inspected, ServerMessage, Switch, TimeState, TimelineEdit};
 use crate::silhouette::View;
-use crate::stage::Stage;
+use crate::source_map::SourceMap;
 use crate::tables::FieldTable;
 use crate::tracks::{self, Tracks};
 use crate::values::{Keying, Values, curve};
@@ -52,14 +52,19 @@ impl Session {
         script.and_then(|script| script.frame_numbers(place.frame)).unwrap_or((1, 1))
     }
 
-    pub(super) fn time_wish(&mut self, project: &mut Project, wish: TimeWish, tell: &mut Tell) -> Change {
+    pub(super) fn edit_timeline(
+        &mut self,
+        project: &mut Project,
+        wish: TimelineEdit,
+        tell: &mut ServerMessage,
+    ) -> Change {
         let time = self.time(project);
         let lines = self.file_lines(project);
         let set = |changed: Vec<(usize, Line)>| {
             changed.into_iter().map(|(at, line)| edits::set(at, line)).collect::<Vec<_>>()
         };
         let splices = match wish {
-            TimeWish::Switch { what, on } => {
+            TimelineEdit::Switch { what, on } => {
                 match what {
                     Switch::AutoKey => self.auto_key = on,
                     Switch::Path => self.path = on,
@@ -68,23 +73,23 @@ impl Session {
                 self.outline(project, tell);
                 return Change::Nothing;
             }
-            TimeWish::Key { lines: which } => set(which
+            TimelineEdit::Key { lines: which } => set(which
                 .iter()
                 .filter_map(|&at| {
                     let line = lines.get(at)?;
                     Some((at, tracks::toggled(line, &tracks::main_numbers(line), time)?))
                 })
                 .collect()),
-            TimeWish::Toggle { line, numbers } => {
+            TimelineEdit::Toggle { line, numbers } => {
                 let changed = lines.get(line).and_then(|text| tracks::toggled(text, &numbers, time));
                 set(changed.map(|text| (line, text)).into_iter().collect())
             }
-            TimeWish::Grab { keys } => {
+            TimelineEdit::Grab { keys } => {
                 let gesture = self.next_gesture();
                 self.held = Some(Held::Keys(HeldKeys::new(self.file_lines(project), &keys, gesture)));
                 return Change::Nothing;
             }
-            TimeWish::Move { by } => {
+            TimelineEdit::Move { by } => {
                 let Some(Held::Keys(held)) = &self.held else { return Change::Nothing };
                 if !by.is_finite() {
                     return Change::Nothing;
@@ -94,25 +99,27 @@ impl Session {
                 tell.outline = Some(String::new());
                 return Change::Moving;
             }
-            TimeWish::Remove { keys } => set(tracks::removed(lines, &keys)),
-            TimeWish::Copy { keys } => {
+            TimelineEdit::Remove { keys } => set(tracks::removed(lines, &keys)),
+            TimelineEdit::Copy { keys } => {
                 self.copied = tracks::copied(lines, &keys);
                 return Change::Nothing;
             }
-            TimeWish::Paste => set(tracks::pasted(lines, &self.copied, time, self.selection.last().copied())),
-            TimeWish::Ease { keys, mode, cycle } => {
+            TimelineEdit::Paste => {
+                set(tracks::pasted(lines, &self.copied, time, self.selection.last().copied()))
+            }
+            TimelineEdit::Ease { keys, mode, cycle } => {
                 let mode = Mode::ALL.iter().copied().find(|known| known.name() == mode);
                 set(mode.map(|mode| tracks::eased(lines, &keys, mode, cycle)).unwrap_or_default())
             }
-            TimeWish::Pace { fps } => {
+            TimelineEdit::Pace { fps } => {
                 let file = self.place(project).file;
                 if let Err(error) = project.set_fps(file, fps) {
                     tell.notice = Some(words(&error));
                 }
                 return Change::Nothing;
             }
-            TimeWish::Frames { count } => {
-                edits::set_frames(lines, &self.shown(project).stage, count.clamp(1, FRAMES))
+            TimelineEdit::Frames { count } => {
+                edits::set_frames(lines, &self.shown(project).source_map, count.clamp(1, FRAMES))
             }
         };
         self.edit(project, splices, None, tell);
@@ -182,10 +189,11 @@ impl Session {
         &self,
         project: &Project,
         projection: &Projection,
-        stage: &Stage,
+        source_map: &SourceMap,
     ) -> (String, String) {
         let nothing = (String::new(), String::new());
-        let Some(&at) = self.selection.last().filter(|line| self.path && !stage.is_in_group(**line)) else {
+        let Some(&at) = self.selection.last().filter(|line| self.path && !source_map.is_in_group(**line))
+        else {
             return nothing;
         };
         let Some(line) = self.line(project, at).filter(|line| line.bytes().contains(&b'(')) else {
@@ -244,12 +252,12 @@ impl Session {
             }
             let frame = usize::try_from(place.frame as i64 + after * step).ok()?;
             let then = Frame::new(Some(script), lines, frame);
-            if !then.stage.objects.iter().any(|line| chosen.contains(line)) {
+            if !then.source_map.objects.iter().any(|line| chosen.contains(line)) {
                 return None;
             }
             let scene = picture_of(then.scene.clone()?, &now);
             let view = View { scene: &scene, boxes: then.boxes() };
-            let is_in = |object| then.stage.line_of(object).is_some_and(|line| chosen.contains(&line));
+            let is_in = |object| then.source_map.line_of(object).is_some_and(|line| chosen.contains(&line));
             let path = view.ghost(is_in).ok()?;
             (!path.is_empty()).then_some(Ghost { path, after: after as i32 })
         };

@@ -13,7 +13,7 @@ use crate::extent;
 use crate::line::Line;
 use crate::pictures::Motion;
 use crate::project::Project;
-use crate::protocol::{Navigation, Standpoint, Tell};
+use crate::protocol::{Navigation, ServerMessage, ViewPreset};
 use crate::silhouette::View;
 use crate::view::{Bounds, Orbit, Projection};
 
@@ -63,7 +63,7 @@ impl Session {
     /// The same, if its objects are those of the lines.
     pub(super) fn sound_scene(&self, project: &Project) -> Option<Scene> {
         let is_sound = project.files[self.place(project).file].is_sound();
-        let count = self.shown(project).stage.object_count();
+        let count = self.shown(project).source_map.object_count();
         self.scene(project).filter(|scene| is_sound && scene.objects.len() == count)
     }
 
@@ -71,7 +71,7 @@ impl Session {
         let shown = self.shown(project);
         let lamps = || {
             let lines = self.file_lines(project);
-            let lights = shown.stage.lights.iter().filter_map(|&line| lines.get(line));
+            let lights = shown.source_map.lights.iter().filter_map(|&line| lines.get(line));
             edits::places(lights.collect::<Vec<_>>(), shown.time)
         };
         shown.bounds().or_else(lamps).unwrap_or(Bounds { low: DVec3::splat(-1.0), high: DVec3::splat(1.0) })
@@ -81,14 +81,13 @@ impl Session {
     fn selected_bounds(&self, project: &Project) -> Option<Bounds> {
         let (shown, chosen) = (self.shown(project), self.chosen());
         let objects = self.sound_scene(project).and_then(|scene| {
-            let own = scene
-                .objects
-                .iter()
-                .enumerate()
-                .filter(|(at, _)| shown.stage.line_of(*at).is_some_and(|line| chosen.contains(&line)));
+            let own =
+                scene.objects.iter().enumerate().filter(|(at, _)| {
+                    shown.source_map.line_of(*at).is_some_and(|line| chosen.contains(&line))
+                });
             extent::bounds(own.map(|(_, object)| object))
         });
-        let lights = shown.stage.lights.iter().filter(|line| chosen.contains(*line));
+        let lights = shown.source_map.lights.iter().filter(|line| chosen.contains(*line));
         let lights = lights.filter_map(|&line| self.line(project, line));
         objects.or_else(|| edits::places(lights.collect::<Vec<_>>(), shown.time))
     }
@@ -120,23 +119,23 @@ impl Session {
         let view = View { scene: &scene, boxes: shown.boxes() };
         let found = if inside { view.pick(column, row).ok().flatten()? } else { return None };
         let (origin, direction) = Projection::new(&scene).ray(DVec2::new(column + 0.5, row + 0.5));
-        let line = shown.stage.line_of(found.object)?;
+        let line = shown.source_map.line_of(found.object)?;
         (!self.is_locked(project, line)).then(|| (line, origin + found.distance * direction))
     }
 
     /// The outline of some lines' objects.
     fn outline_of(&self, project: &Project, is_in: impl Fn(usize) -> bool) -> Option<String> {
         let shown = self.shown(project);
-        if !shown.stage.objects.iter().any(|&line| is_in(line)) {
+        if !shown.source_map.objects.iter().any(|&line| is_in(line)) {
             return None;
         }
         let scene = self.sound_scene(project)?;
         let view = View { scene: &scene, boxes: shown.boxes() };
-        view.outline(|object| shown.stage.line_of(object).is_some_and(&is_in)).ok()
+        view.outline(|object| shown.source_map.line_of(object).is_some_and(&is_in)).ok()
     }
 
     /// What is under the pointer now, and its outline, if that is something else than before.
-    pub(super) fn hover(&mut self, project: &Project, x: f64, y: f64, tell: &mut Tell) {
+    pub(super) fn hover(&mut self, project: &Project, x: f64, y: f64, tell: &mut ServerMessage) {
         let line = self.pick(project, x, y).map(|(line, _)| line);
         tell.hovered = Some(line);
         if line != self.hovered {
@@ -147,7 +146,7 @@ impl Session {
         }
     }
 
-    pub(super) fn outline(&self, project: &Project, tell: &mut Tell) {
+    pub(super) fn outline(&self, project: &Project, tell: &mut ServerMessage) {
         let chosen = self.chosen();
         let path = self.outline_of(project, |line| chosen.contains(&line));
         tell.outline = Some(path.unwrap_or_default());
@@ -174,16 +173,16 @@ impl Session {
         Some(self.free.unwrap_or_else(|| Orbit::from_camera(&scene.camera, self.bounds(project))))
     }
 
-    pub(super) fn look(&mut self, project: &Project, at: Standpoint) {
+    pub(super) fn look(&mut self, project: &Project, at: ViewPreset) {
         let bounds = self.bounds(project);
         let quarter = std::f64::consts::FRAC_PI_2;
         self.free = match at {
-            Standpoint::Script => None,
-            Standpoint::Free => self.orbit(project),
-            Standpoint::Front => Some(Orbit::at(bounds, 0.0, 0.0)),
-            Standpoint::Side => Some(Orbit::at(bounds, quarter, 0.0)),
-            Standpoint::Top => Some(Orbit::at(bounds, 0.0, quarter)),
-            Standpoint::Selection => {
+            ViewPreset::Script => None,
+            ViewPreset::Free => self.orbit(project),
+            ViewPreset::Front => Some(Orbit::at(bounds, 0.0, 0.0)),
+            ViewPreset::Side => Some(Orbit::at(bounds, quarter, 0.0)),
+            ViewPreset::Top => Some(Orbit::at(bounds, 0.0, quarter)),
+            ViewPreset::Selection => {
                 let what = self.selected_bounds(project).unwrap_or(bounds);
                 let from = self.orbit(project);
                 from.map(|from| Orbit { half_fov: from.half_fov, ..Orbit::at(what, from.yaw, from.pitch) })
@@ -200,20 +199,20 @@ impl Session {
         });
     }
 
-    pub(super) fn keep_camera(&mut self, project: &mut Project, tell: &mut Tell) -> Change {
+    pub(super) fn keep_camera(&mut self, project: &mut Project, tell: &mut ServerMessage) -> Change {
         let shown = self.shown(project);
         let Some(scene) = &shown.scene else { return Change::Nothing };
         let aspect = f64::from(scene.screen.width()) / f64::from(scene.screen.height());
         let Some(Ok(camera)) = self.free.map(|orbit| orbit.camera(aspect)) else { return Change::Nothing };
-        let stage = &shown.stage;
+        let source_map = &shown.source_map;
         let lines = self.file_lines(project);
         let numbers = camera_numbers(&camera, self.step(project));
-        let old = stage.camera.filter(|&at| lines[at].command() == Some(Command::Camera));
+        let old = source_map.camera.filter(|&at| lines[at].command() == Some(Command::Camera));
         let splice = match old {
             Some(at) => lines[at].with_numbers(0, &numbers).map(|line| edits::set(at, line)),
             None => {
                 let line = Line::new(Command::Camera.name()).with_numbers(0, &numbers);
-                let at = stage.camera.or(stage.screen).map_or(0, |at| at + 1);
+                let at = source_map.camera.or(source_map.screen).map_or(0, |at| at + 1);
                 line.map(|line| Splice { at, removed: 0, inserted: vec![line] })
             }
         };
