@@ -53,7 +53,7 @@ pub(crate) fn chain(error: &Error) -> String {
 }
 
 /// Whether another try could end otherwise.
-pub(crate) fn may_pass(error: &Error) -> bool {
+pub(crate) fn is_transient(error: &Error) -> bool {
     !matches!(error, Error::Key { .. })
 }
 

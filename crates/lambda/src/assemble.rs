@@ -7,7 +7,7 @@ use rayfold_pipeline::sweep::sweep;
 use rayfold_pipeline::{Error, Policy};
 use serde_json::Value;
 
-use crate::answer::{Answer, BatchItem, Failed, Outcome, chain, may_pass};
+use crate::answer::{Answer, BatchItem, Failed, Outcome, chain, is_transient};
 use crate::context::{Call, Context};
 use crate::event::{Event, FAILURE_QUEUE, Message, Sweep, Unreadable};
 use crate::logs::ms;
@@ -101,7 +101,7 @@ async fn write_down<S: Store>(context: &Context<S>, call: &Call, failure: &Failu
         Ok(Recorded::GivenUp(_)) => "given up".to_owned(),
         Ok(Recorded::Refused(_)) => "refused".to_owned(),
         Ok(Recorded::LeftToSweep) => "left to the sweep".to_owned(),
-        Err(error) if may_pass(&error) => {
+        Err(error) if is_transient(&error) => {
             tracing::error!(request_id = %call.request_id, key = failure.key, error = chain(&error), "failed");
             return Err(error);
         }

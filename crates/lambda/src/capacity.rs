@@ -15,7 +15,7 @@ pub(crate) const FEW_RAYS: u64 = 1 << 24;
 pub(crate) const STRIP: u32 = 16;
 
 /// The most strips that are drawn to measure a frame.
-const MOST_STRIPS: u32 = 16;
+const MAX_STRIPS: u32 = 16;
 
 /// A frame is drawn in one piece if that is estimated to take at most this share of the time that is left. Estimates by a
 /// few strips were off by a factor of up to 1.7 (docs/decisions/frames-in-bands.md).
@@ -37,7 +37,7 @@ const PIXELS_SHARE: f64 = 0.5;
 const IMAGE_BYTES: u64 = 9;
 
 /// The most bands that a frame is cut into where nobody says otherwise: each is an invocation that somebody pays.
-pub const MOST_BANDS: NonZeroU32 = NonZeroU32::new(64).expect("64 is not zero");
+pub const MAX_BANDS: NonZeroU32 = NonZeroU32::new(64).expect("64 is not zero");
 
 /// What an invocation has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,7 +50,7 @@ pub struct Capacity {
 
 impl Default for Capacity {
     fn default() -> Self {
-        Self { memory: None, most_bands: MOST_BANDS }
+        Self { memory: None, most_bands: MAX_BANDS }
     }
 }
 
@@ -197,7 +197,7 @@ fn megabytes(bytes: u64) -> u64 {
 /// it. Together they are at most a sixteenth of a high frame.
 pub(crate) fn strips(height: u32) -> impl Iterator<Item = Range<u32>> {
     let rows_of_strips = height.div_ceil(STRIP);
-    let count = (rows_of_strips / MOST_STRIPS).clamp(1, MOST_STRIPS);
+    let count = (rows_of_strips / MAX_STRIPS).clamp(1, MAX_STRIPS);
     let bits = count.next_power_of_two().trailing_zeros();
     let order = (0..count.next_power_of_two())
         .map(move |k| if bits == 0 { 0 } else { k.reverse_bits() >> (u32::BITS - bits) });

@@ -9,7 +9,7 @@ use std::num::{NonZeroU32, NonZeroU64};
 use anyhow::Context as _;
 use rayfold_scene::Limits;
 
-use crate::capacity::{Capacity, MOST_BANDS};
+use crate::capacity::{Capacity, MAX_BANDS};
 
 /// The default limits, changed by the variables that `variable` finds: `RAYFOLD_MAX_SCRIPT_BYTES`, `RAYFOLD_MAX_OBJECTS`,
 /// `RAYFOLD_MAX_LIGHTS`, `RAYFOLD_MAX_PIXELS` and `RAYFOLD_MAX_FRAMES` (of one script).
@@ -50,7 +50,7 @@ pub(crate) fn capacity(variable: impl Fn(&str) -> Option<String>) -> anyhow::Res
     let bands = number(&variable, "RAYFOLD_MAX_BANDS")?.map(|bands| u32::try_from(bands).unwrap_or(u32::MAX));
     Ok(Capacity {
         memory: megabytes.map(|megabytes| megabytes.saturating_mul(1 << 20)),
-        most_bands: bands.and_then(NonZeroU32::new).unwrap_or(MOST_BANDS),
+        most_bands: bands.and_then(NonZeroU32::new).unwrap_or(MAX_BANDS),
     })
 }
 

@@ -2,7 +2,7 @@
 
 use rayfold_pipeline::Error;
 
-use crate::answer::{Answer, Failed, Outcome, chain, may_pass};
+use crate::answer::{Answer, Failed, Outcome, chain, is_transient};
 use crate::event::ObjectEvent;
 
 /// Works on each record of our bucket by its key, whatever becomes of the others.
@@ -27,7 +27,7 @@ where
         }
         match record(key.clone()).await {
             Ok(what) => answer.outcomes.push(Outcome { of: key, what }),
-            Err(error) if may_pass(&error) => {
+            Err(error) if is_transient(&error) => {
                 tracing::error!(request_id, key, error = chain(&error), "failed");
                 failed.push((key, error));
             }
