@@ -1,11 +1,11 @@
-//! Turns frames into blocks, each of which turns what a viewer sees before it into its frame.
+//! The quantiser: turns each frame into the GIF block that updates the canvas from the previous frame to it.
 //!
-//! Two frames are worked on at once: while one is drawn, the next one is prepared. To prepare a frame is to [compare
-//! it](crate::needs) with what will be seen before it, and to [plan](crate::plan) how it is drawn; to draw it is to choose
-//! its indices, in [stripes](crate::stripe).
+//! Two frames are processed at once: while one is drawn, the next one is prepared. Preparing a frame means
+//! [comparing](crate::update_map) it with the canvas before it, and [planning](crate::plan) how to draw it. Drawing
+//! it means choosing its indices, in [stripes](crate::stripe).
 //!
-//! Between two frames a quantiser can be written down. What follows from the rest is not written but worked out anew: the
-//! histogram, the palette, and which of its entries is nearest to each colour.
+//! The state of a quantiser can be saved between two frames. Only what cannot be derived is stored. The histogram,
+//! the palette and the nearest entry of each colour are computed again.
 
 use std::io;
 
@@ -24,36 +24,37 @@ use crate::state::{StateReader, StateWriter, damaged};
 use crate::stripe::{self, Colours, Layout, Row, Stripe};
 use crate::update_map::{EXACT_SKIP_ERROR, PixelUpdate, Previous, SKIP_ERROR, UpdateMap};
 
-/// Parts of a frame whose colours are counted in parallel.
+/// The number of parts of a frame whose colours are counted in parallel.
 const PARTS: usize = 2;
 
-/// If at least this part of a frame is drawn because it changed, it is divided into so many stripes: there the file grows
-/// little by more of them. Several for each thread, as one of them has prepared the next frame and begins later.
+/// If at least this part of a frame is drawn because it changed, it is divided into this many stripes,
+/// because the file grows little by them there. There are several per thread: one thread has prepared the
+/// next frame and starts later.
 const MOST: f64 = 0.5;
 const STRIPES_IF_MOST: usize = 5;
-/// With so many colours a code table is soon full, so that a second stripe makes the file hardly larger.
+/// With this many colours a code table fills soon, so a second stripe hardly enlarges the file.
 const MANY_COLOURS: usize = 4096;
 
-/// Turns frames into blocks, one after the other.
+/// A converter of frames to blocks, one after the other.
 #[derive(Debug)]
 pub(crate) struct Quantiser {
-    /// Whether no frame [drifts](Kind).
+    /// No frame [drifts](Kind).
     exact: bool,
     /// The frame that is drawn next.
     prepared: Option<Prepared>,
-    /// What a viewer sees after the last block.
+    /// The canvas after the last block.
     seen: RgbImage,
     budget: RefineBudget,
-    /// Used for each frame anew.
+    /// Histograms that are reused for each frame.
     parts: Vec<Histogram>,
-    /// All colours of a frame.
+    /// A histogram of all colours of a frame.
     whole: Histogram,
     spare: Option<Buffers>,
-    /// Mean level error of what the last palette draws.
+    /// The mean level error of the pixels drawn with the last palette.
     drawn_error: f32,
 }
 
-/// What a frame is prepared in.
+/// The buffers in which a frame is prepared.
 #[derive(Debug)]
 struct Buffers {
     updates: UpdateMap,
@@ -66,15 +67,15 @@ struct Buffers {
 struct Prepared {
     frame: RgbImage,
     delay_cs: u16,
-    /// Whether there is none before it.
+    /// There is no frame before it.
     first: bool,
-    /// See [`Kind`].
+    /// The frame drifts (see [`Kind`]).
     drifts: bool,
     buffers: Buffers,
     plan: Plan,
 }
 
-/// What it takes to prepare a frame.
+/// The inputs and buffers for preparing a frame.
 struct Preparation<'a> {
     pixels: &'a [[u8; 3]],
     width: usize,
@@ -88,7 +89,7 @@ struct Preparation<'a> {
 }
 
 impl Quantiser {
-    /// `exact`: whether frames of few colours are exact also where they drift.
+    /// Makes a quantiser. `exact`: frames of few colours stay exact also if they drift.
     pub(crate) fn new(exact: bool) -> Self {
         Self {
             exact,
@@ -104,7 +105,7 @@ impl Quantiser {
 
     /// Takes the next frame, and returns the block of the one before it.
     pub(crate) fn push(&mut self, frame: RgbImage, delay_cs: u16) -> Option<Block> {
-        // The whole step runs in the pool: otherwise each part of it would have to wait for a thread.
+        // The whole step runs in the pool. Otherwise each part of it would have to wait for a thread.
         rayon::scope(|_| self.step(frame, delay_cs))
     }
 
@@ -139,7 +140,7 @@ impl Quantiser {
                     },
                 )
             }
-            // What will be seen is the previous frame itself.
+            // The canvas will be the previous frame itself.
             Some(previous) if matches!(previous.plan, Plan::Lossless(_)) => rayon::join(
                 || {
                     let compared = preparation.compare(&previous.frame);
@@ -164,7 +165,7 @@ impl Quantiser {
         Some(block)
     }
 
-    /// Looks at the frame that is drawn next once more, now that it is known what is seen before it.
+    /// Revises the plan of the frame that is drawn next, now that the canvas before it is known.
     fn settle(&mut self) {
         let Self { prepared, seen, parts, budget, .. } = self;
         let Some(Prepared {
@@ -187,7 +188,7 @@ impl Quantiser {
         }
     }
 
-    /// The block of the last frame.
+    /// Returns the block of the last frame.
     pub(crate) fn finish(&mut self) -> Option<Block> {
         rayon::scope(|_| self.settle());
         let last = self.prepared.take()?;
@@ -195,14 +196,14 @@ impl Quantiser {
     }
 }
 
-/// How a prepared frame is drawn, as a suspended animation holds it.
+/// Tags for the plan of a prepared frame in a suspended animation.
 const LOSSLESS: u8 = 0;
 const LOSSY: u8 = 1;
-/// With pixels that stay refined out of a loan.
+/// The plan refines static pixels out of a reservation.
 const LOSSY_WITH_RESERVATION: u8 = 2;
 
 impl Quantiser {
-    /// Writes down what later blocks depend on. Nothing before the first frame.
+    /// Writes the state on which later blocks depend. Writes nothing before the first frame.
     pub(crate) fn write(&self, state: &mut StateWriter) -> io::Result<()> {
         let Some(Prepared { frame, delay_cs, first, drifts, buffers, plan }) = &self.prepared else {
             return Ok(());
@@ -220,7 +221,7 @@ impl Quantiser {
             }
         }
         state.bytes(self.seen.as_raw())?;
-        // Mostly small: the frame as it differs from what is seen before it.
+        // The frame as its difference from the canvas, which is mostly small.
         for (now, seen) in rows(frame).zip(rows(&self.seen)) {
             let differences: Vec<u8> =
                 now.iter().zip(seen).map(|(now, seen)| now.wrapping_sub(*seen)).collect();
@@ -233,7 +234,7 @@ impl Quantiser {
         Ok(())
     }
 
-    /// Reads what was written for frames of a size.
+    /// Reads the state that was written for frames of a size.
     pub(crate) fn read(
         state: &mut StateReader<'_>,
         (width, height): (u32, u32),
@@ -296,8 +297,8 @@ impl Buffers {
 }
 
 impl Preparation<'_> {
-    /// Finds out what the frame needs, and what it may use of the allowance; no loan if all of it is drawn. `seen`: what a
-    /// viewer sees before the previous frame is drawn.
+    /// Compares the frame with the canvas, and reserves a part of the refine budget. Makes no reservation if all of
+    /// the frame is drawn. `seen`: the canvas before the previous frame is drawn.
     fn compare(&mut self, seen: &RgbImage) -> (Kind, Option<Reservation>) {
         let Self { pixels, width, previous, drawn_error, exact, .. } = *self;
         let before = previous.map(|previous| (pixels_of(&previous.frame), previous.drifts));
@@ -316,7 +317,7 @@ impl Preparation<'_> {
         (kind, Some(reservation))
     }
 
-    /// How the frame is drawn, and whether it drifts.
+    /// Plans how the frame is drawn. Returns also whether it drifts.
     fn plan(self, (kind, reservation): (Kind, Option<Reservation>)) -> (Plan, bool) {
         let Self { pixels, width, parts, whole, budget, buffers: Buffers { updates, histogram }, .. } = self;
         let mut reservation = reservation;
@@ -343,7 +344,7 @@ impl Preparation<'_> {
 }
 
 impl Prepared {
-    /// What the next frame is compared with. `seen`: what a viewer sees before this one is drawn.
+    /// Returns the data with which the next frame is compared. `seen`: the canvas before this frame is drawn.
     fn seen_after<'a>(&'a self, seen: &'a RgbImage, error: f32, skip_error: f32) -> Previous<'a> {
         Previous {
             frame: pixels_of(&self.frame),
@@ -358,7 +359,7 @@ impl Prepared {
         }
     }
 
-    /// Returns the block, and which of the pixels that stay were drawn anew.
+    /// Draws the frame. Returns the block, and the static pixels that were redrawn.
     fn draw(&self, seen: &mut RgbImage) -> (Block, Vec<Redrawn>) {
         let (width, pixels) = (self.frame.width() as usize, pixels_of(&self.frame));
         let seen = seen.as_chunks_mut::<3>().0;
@@ -383,8 +384,8 @@ fn pixels_of(image: &RgbImage) -> &[[u8; 3]] {
     image.as_raw().as_chunks().0
 }
 
-/// How many stripes at least a frame is divided into, given the part of it that is drawn because it changed and the number
-/// of its colours.
+/// Returns the least number of stripes of a frame. `changed`: the part of it that is drawn because it changed.
+/// `colours`: the number of its colours.
 fn least_stripes(changed: f64, colours: usize) -> usize {
     match colours {
         _ if changed >= MOST => STRIPES_IF_MOST,
@@ -437,7 +438,7 @@ mod tests {
         assert_eq!(least_stripes(MOST, 1), STRIPES_IF_MOST);
     }
 
-    /// Many colours, of which those from row `from` on are `by` levels higher.
+    /// A frame of many colours, which from row `from` on are `by` levels higher.
     fn frame(from: u32, by: u8) -> RgbImage {
         let level = |x: u32, y: u32| [x as u8 * 2, y as u8 * 2, (x + y) as u8];
         RgbImage::from_fn(64, 64, |x, y| {
@@ -461,7 +462,7 @@ mod tests {
         let Some(Prepared { first: false, plan: Plan::Lossy(plan), .. }) = &quantiser.prepared else {
             panic!("{:?}", quantiser.prepared)
         };
-        // What is refined above it is left for a later frame, or is part of the area.
+        // Pixels refined above it wait for a later frame, or are part of the area.
         assert!(plan.area.is_some_and(|area| area.bottom == 64 && area.top <= 48));
         assert_eq!(plan.changed, 0.25);
         assert!(plan.reservation.is_some());

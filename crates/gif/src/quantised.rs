@@ -1,4 +1,4 @@
-//! A frame's colours by those of a palette: which colours it has, and which of them is drawn for each colour.
+//! The colours of a frame drawn with those of a palette: the palette, and the entry for each colour.
 
 use rayon::prelude::*;
 
@@ -8,26 +8,26 @@ use crate::nearest::{self, Nearest};
 use crate::palette::{Guesses, Palette, Sample};
 use crate::update_map::PixelUpdate;
 
-/// Mean squared error (see [`colour`](crate::colour)) up to which a palette of half as many colours is taken: it takes up
-/// half as many bytes, and the indices fewer, too.
+/// The mean squared error (see [`colour`](crate::colour)) up to which a palette of half as many colours is used. Such
+/// a palette takes half as many bytes, and its indices take fewer bytes, too.
 const GOOD_ENOUGH: f32 = 0.8;
-/// Added to it: this divided by the number of pixels drawn, but at most `AT_MOST`. Where little is drawn, the palette is
-/// much of the file.
+/// The error allowed in addition is this divided by the number of pixels drawn, but at most `AT_MOST`. If few pixels
+/// are drawn, the palette is much of the file.
 const BY_PIXELS: f32 = 5000.0;
 const AT_MOST: f32 = 3.0;
-/// The fewest colours that a palette is halved to, transparent included.
+/// The smallest palette after halving, transparent included.
 const FEWEST: usize = 16;
-/// A frame with more bins keeps its large palette: a smaller one would hardly do, and takes long to make.
+/// A frame with more bins keeps its large palette: a smaller one would hardly suffice, and takes long to compute.
 const MOST_BINS_HALVED: usize = 4096;
 
-/// The most colours that a palette takes in because of the bound.
+/// The largest number of colours that are added to a palette because of the bound.
 const MAX_ADDED: usize = 64;
-/// With more colours that are too far off, a palette is not mended.
+/// A palette is not repaired if more colours than this are too far off.
 const MAX_FAR: usize = 1 << 9;
-/// Pixels that are looked at together.
+/// Pixels that one thread processes at a time.
 const PART: usize = 1 << 14;
 
-/// A palette, the entry nearest to each bin, and the mean squared error of what is drawn.
+/// A palette, the entry nearest to each bin, and the mean squared error of the pixels drawn.
 #[derive(Debug)]
 pub(crate) struct Quantised {
     pub(crate) palette: Palette,
@@ -36,26 +36,26 @@ pub(crate) struct Quantised {
 }
 
 impl Quantised {
-    /// With at most so many colours.
+    /// Quantises to at most `size` colours.
     pub(crate) fn new(histogram: &Histogram, bins: &[Sample], size: usize) -> Self {
         let (palette, guesses) = Palette::of_bins(histogram, bins, size);
         Self::of(palette, &guesses, histogram, bins)
     }
 
-    /// With the colours of a palette.
+    /// Quantises to the colours of a palette.
     pub(crate) fn of(palette: Palette, guesses: &Guesses, histogram: &Histogram, bins: &[Sample]) -> Self {
         let nearest = Nearest::of_bins(bins, &palette, guesses);
         let error = nearest::mean_error(histogram, &nearest);
         Self { palette, nearest, error }
     }
 
-    /// Halves the palette as long as its error stays small enough. One index of it is left for transparent.
+    /// Halves the palette as long as its error stays small enough. One index is left for transparent.
     pub(crate) fn of_fewer_colours(mut self, histogram: &Histogram, bins: &[Sample]) -> Self {
         if bins.len() > MOST_BINS_HALVED {
             return self;
         }
         let bound = GOOD_ENOUGH + (BY_PIXELS / histogram.pixels() as f32).min(AT_MOST);
-        // Half as many colours have twice the error or more.
+        // Half as many colours have at least twice the error.
         while self.error * 2.0 <= bound {
             let size = (self.palette.colours.len() + 1).next_power_of_two() / 2;
             if size < FEWEST {
@@ -70,7 +70,7 @@ impl Quantised {
         self
     }
 
-    /// Changes entries so that each colour that is drawn has one within `bound`; `None` if that cannot be.
+    /// Replaces entries so that each colour drawn has one within `bound`. Returns `None` if that is impossible.
     pub(crate) fn within(
         mut self,
         (pixels, updates): (&[[u8; 3]], &[PixelUpdate]),
@@ -84,7 +84,7 @@ impl Quantised {
             if far.is_empty() {
                 return Some(self);
             }
-            // The one first that stands in for most of the others.
+            // First the colour that can replace most of the others.
             let mut added = Vec::new();
             let covered =
                 |rgb, far: &[[u8; 3]]| far.iter().filter(|far| levels_off(**far, rgb) <= bound).count();
@@ -111,7 +111,7 @@ impl Quantised {
         None
     }
 
-    /// The colours that are drawn and have no entry within `bound`; `None` if there are too many.
+    /// Returns the colours that are drawn and have no entry within `bound`, or `None` if there are too many.
     fn too_far(
         &self,
         (pixels, updates): (&[[u8; 3]], &[PixelUpdate]),
@@ -140,7 +140,7 @@ impl Quantised {
         (found.len() < MAX_FAR).then_some(found)
     }
 
-    /// So many of the colours of the palette, without those that others can stand in for best.
+    /// Returns `count` colours of the palette: those that others could replace best are left out.
     fn most_useful(&self, bins: &[Bin], count: usize) -> Vec<[u8; 3]> {
         let colours = &self.palette.colours;
         if colours.len() <= count {
@@ -156,7 +156,7 @@ impl Quantised {
         costs[..count].iter().map(|&(_, at)| colours[at]).collect()
     }
 
-    /// With other colours, most of which are the same.
+    /// Quantises to other colours, most of which are those of this palette.
     fn with(&self, colours: Vec<[u8; 3]>, histogram: &Histogram, bins: &[Sample]) -> Self {
         let place = |rgb: &[u8; 3]| {
             colours.binary_search(rgb).unwrap_or_else(|next| next.min(colours.len() - 1)) as u8

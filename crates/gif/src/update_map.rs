@@ -1,14 +1,14 @@
-//! Which pixels of a frame need to be drawn.
+//! The update map of a frame: for each pixel, whether it is drawn.
 //!
-//! A frame is compared with what a viewer will see before it. That is known before the previous frame is drawn, so both
-//! frames can be worked on at once: where the previous frame leaves a pixel, the viewer sees what was seen before; where
-//! it draws one, the palette's nearest entry is assumed; what it may leave counts as left. Where another index was chosen, the
-//! next comparison finds it. Before a frame is drawn itself, it is known what is seen, and what would be left too far off is
-//! [drawn](Needs::draw_what_is_off).
+//! A frame is compared with the canvas that a viewer will see before it. Both frames can be processed at once,
+//! because the canvas is estimated before the previous frame is drawn. A pixel that the previous frame leaves shows
+//! what was seen before. A pixel that it draws is assumed to show the palette's nearest entry. A pixel that it may
+//! leave counts as left. If another index was chosen, the next comparison finds it. Before a frame is drawn itself,
+//! the canvas is known, and pixels that would be left too far off are [drawn](UpdateMap::draw_what_is_off).
 //!
-//! The frame is divided into tiles. A tile whose changes are small is left as a whole. Of the pixels that stay as they were
-//! but are seen wrong, the worst of each tile are refined: drawn once more with a better colour. Tiles apart from all
-//! changes are refined only when together they are worth the larger block.
+//! The frame is divided into tiles. A tile whose changes are small is left as a whole. Of the static pixels that are
+//! seen wrong, the worst of each tile are refined, that is, redrawn with a better colour. Tiles away from all changes
+//! are refined only if together they are worth the larger block.
 
 use rayon::prelude::*;
 
@@ -18,47 +18,47 @@ use crate::histogram::Histogram;
 use crate::nearest::Nearest;
 use crate::refine_budget::StaticPixels;
 
-/// Width and height of a tile, which is drawn or left as a whole: single pixels drawn among others that are left cost as
-/// many bytes as if all were drawn.
+/// The width and height of a tile. A tile is drawn or left as a whole: single pixels drawn among others that are left
+/// cost as many bytes as if all were drawn.
 const TILE: usize = 8;
 /// A tile is left if its mean [level error](colour::level_error), beyond that of a drawn pixel, is at most this.
 pub(crate) const SKIP_ERROR: f32 = 20.0;
-/// The same where the palette has all colours of the frame: there an error is seen more easily.
+/// The same limit if the palette has all colours of the frame: an error is seen more easily there.
 pub(crate) const EXACT_SKIP_ERROR: f32 = 6.0;
-/// A tile with a pixel of a larger level error is never left: almost three levels.
+/// A tile is always redrawn if one of its pixels has a larger level error; this is almost three levels.
 pub(crate) const MAX_SKIPPED_ERROR: f32 = 50.0;
 /// The level error up to which a pixel that changes may be left in a tile that is drawn.
 const SEEN_RIGHT: f32 = 2.0;
-/// The same of a pixel that could be left in the frame before: a level in each channel.
+/// The same limit for a pixel that could be left in the frame before: one level in each channel.
 const SEEN_RIGHT_AGAIN: f32 = 6.0;
-/// The squared error (see [`colour`]) above which a pixel that stays needs a better colour.
+/// The squared error (see [`colour`]) above which a static pixel needs a better colour.
 const SEEN_WRONG: f32 = 1.5;
-/// Of these, the worst of a tile are refined: from this part of the tile's mean error on. Only they are worth the flicker.
+/// Pixels are refined from this part of the tile's mean error on: only the worst of a tile are worth the flicker.
 const AMONG_WORST: f32 = 0.8;
-/// How many pixels the area of a frame may grow by for each pixel that is refined. Even pixels that are left cost bytes:
-/// LZW learns the lengths of their runs one by one.
+/// The number of pixels by which the area of a frame may grow per pixel refined. Even pixels that are left cost
+/// bytes, because LZW learns the lengths of their runs one by one.
 const GROWN_BY: usize = 6;
 
-/// What a pixel needs.
+/// The update of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PixelUpdate {
-    /// To be left as it is seen.
+    /// The pixel is left as it is seen.
     Keep,
-    /// To be left or drawn, whichever makes the file smaller.
+    /// The pixel is left or drawn, whichever makes the file smaller.
     Either,
-    /// It stays but is seen wrong: to be drawn with a colour that is much better, else left.
+    /// The pixel is static but seen wrong: it is drawn with a colour that is much better, else left.
     Refine,
-    /// To be drawn.
+    /// The pixel is drawn.
     Draw,
 }
 
 impl PixelUpdate {
-    /// Whether it may take a colour of the palette that is made for it.
+    /// Returns whether the pixel may use a colour of the palette that is made for the frame.
     pub(crate) fn may_draw(self) -> bool {
         matches!(self, PixelUpdate::Draw | PixelUpdate::Refine)
     }
 
-    /// As a suspended animation holds it.
+    /// Encodes the update for a suspended animation.
     pub(crate) fn to_byte(self) -> u8 {
         match self {
             PixelUpdate::Keep => 0,
@@ -80,17 +80,17 @@ impl PixelUpdate {
 pub(crate) struct Previous<'a> {
     pub(crate) frame: &'a [[u8; 3]],
     pub(crate) updates: &'a [PixelUpdate],
-    /// What a viewer sees before it.
+    /// The canvas before the previous frame is drawn.
     pub(crate) seen: &'a [[u8; 3]],
-    /// Mean level error of what it draws.
+    /// The mean level error of the pixels that it draws.
     pub(crate) error: f32,
     /// [`SKIP_ERROR`] or [`EXACT_SKIP_ERROR`].
     pub(crate) skip_error: f32,
-    /// Its colours, and the nearest palette entry of each; `None`: it is drawn without error.
+    /// Its colours, and the nearest palette entry of each; `None` if it is drawn without error.
     pub(crate) nearest: Option<(&'a Histogram, &'a [Nearest])>,
 }
 
-/// What pixels need, row by row.
+/// The updates of all pixels, row by row.
 #[derive(Debug, Default)]
 pub(crate) struct UpdateMap {
     width: usize,
@@ -98,25 +98,26 @@ pub(crate) struct UpdateMap {
     tiles: Vec<TileUpdate>,
 }
 
-/// What a tile needs.
+/// The update of a tile.
 #[derive(Debug, Clone, Copy, Default)]
 struct TileUpdate {
-    /// Whether any of it is to be drawn because it changes.
+    /// A pixel of the tile is drawn because it changes.
     changes: bool,
-    /// How many pixels are to be refined, and the mean of their squared errors.
+    /// The number of pixels to refine; `error` is the mean of their squared errors.
     wrong: u32,
     error: f32,
 }
 
 impl UpdateMap {
-    /// Those that a suspended animation has come to: [`count`](Self::count) counts them as they are.
+    /// Makes the map of a suspended animation, whose updates are final: [`count`](Self::count) counts
+    /// them as they are.
     pub(crate) fn decided(width: usize, pixels: Vec<PixelUpdate>) -> Self {
         let tiles = width.div_ceil(TILE) * pixels.len().div_ceil(TILE * width);
         let as_it_is = TileUpdate { changes: false, wrong: 0, error: f32::INFINITY };
         Self { width, pixels, tiles: vec![as_it_is; tiles] }
     }
 
-    /// All of a frame is to be drawn.
+    /// Marks all pixels of a frame as drawn.
     pub(crate) fn draw_all(&mut self, width: usize, pixels: usize) {
         self.width = width;
         self.pixels.clear();
@@ -124,8 +125,7 @@ impl UpdateMap {
         self.tiles.clear();
     }
 
-    /// Compares a frame with the one before it. `refining`: whether pixels that stay may be refined. Returns those that
-    /// stay.
+    /// Compares a frame with the one before it. `refining`: static pixels may be refined. Returns the static pixels.
     pub(crate) fn compare(
         &mut self,
         pixels: &[[u8; 3]],
@@ -156,11 +156,11 @@ impl UpdateMap {
         compared.reduce(StaticPixels::none, StaticPixels::join)
     }
 
-    /// Refines no tile outside of the area that changes, unless what is refined there is worth the pixels that the area
-    /// grows by. It becomes worth more with each frame that it has waited for.
+    /// Drops refinements outside of the area that changes, unless they are worth the pixels by which the area grows.
+    /// They are worth more with each frame that they have waited.
     ///
-    /// `least`: the error from which a tile may be refined. `waited`: frames in a row that refined nothing outside, plus
-    /// one. Returns the new `waited`.
+    /// `least`: the error from which a tile may be refined. `waited`: the number of frames in a row that refined
+    /// nothing outside, plus one. Returns the new `waited`.
     pub(crate) fn confine(&mut self, least: f32, waited: usize) -> usize {
         let columns = self.width.div_ceil(TILE);
         let Some(inside) = Area::around(&self.tiles, columns, |tile| tile.changes) else { return waited };
@@ -187,7 +187,7 @@ impl UpdateMap {
         waited + 1
     }
 
-    /// Draws the pixels that would be left further off than `bound`, now that it is known what is seen of them. Returns
+    /// Marks the pixels as drawn that would be left further off than `bound`, now that the canvas is known. Returns
     /// whether there are any.
     pub(crate) fn draw_what_is_off(&mut self, pixels: &[[u8; 3]], seen: &[[u8; 3]], bound: u8) -> bool {
         let part = pixels.len().div_ceil(rayon::current_num_threads());
@@ -207,9 +207,9 @@ impl UpdateMap {
         found.reduce(|| false, |a, b| a || b)
     }
 
-    /// Counts the colours of the pixels that are to be drawn or refined, into `all` with the help of `others`, each of
-    /// which takes a part of the frame. Pixels of tiles with an error below `least` are not refined, but kept. Returns how
-    /// many pixels are to be drawn.
+    /// Counts the colours of the pixels that are drawn or refined into `all`. Each of `others` counts a part of the
+    /// frame in parallel. Pixels of tiles with an error below `least` are kept instead of refined. Returns the number
+    /// of pixels that are drawn.
     pub(crate) fn count(
         &mut self,
         pixels: &[[u8; 3]],
@@ -256,7 +256,7 @@ impl UpdateMap {
 }
 
 impl<'a> Previous<'a> {
-    /// The squared error with which a colour will be drawn.
+    /// Returns the squared error with which a colour will be drawn.
     fn error_of(&self, rgb: [u8; 3]) -> f32 {
         let entry = self.nearest.and_then(|(histogram, nearest)| nearest.get(histogram.find(rgb)?));
         entry.map_or(0.0, |entry| entry.error)
@@ -319,16 +319,17 @@ fn compare_band(
     }
 }
 
-/// What is known of a tile's pixels.
+/// The comparison of a tile's pixels.
 #[derive(Debug)]
 struct Tile {
-    /// Given if pixels that stay may be refined.
+    /// The metric, if static pixels may be refined.
     refine: Option<LocalMetric>,
     pixels: usize,
-    /// The sum of the level errors of all that changed, beyond that of a drawn pixel, and the largest level error of one.
+    /// The sum of the level errors of the changed pixels beyond that of a drawn pixel; `worst` is the largest
+    /// level error of one.
     excess: f32,
     worst: f32,
-    /// Pixels that stay and are seen wrong, the sum of their squared errors, and each of these.
+    /// The number of static pixels that are seen wrong, the sum of their squared errors, and each of these.
     wrong: u32,
     sum_wrong: f32,
     errors: [f32; TILE * TILE],
@@ -347,7 +348,7 @@ impl Tile {
         }
     }
 
-    /// Decides what the pixels of a row need.
+    /// Decides the updates of the pixels of a row.
     fn compare(
         &mut self,
         row: usize,
@@ -368,7 +369,8 @@ impl Tile {
             (&previous.frame[..count], &previous.seen[..count], &previous.updates[..count]);
         for (k, update) in updates[..count].iter_mut().enumerate() {
             let (now, was, seen) = (pixels[k], frame[k], shown[k]);
-            // What may be left is mostly left. Were it taken as drawn, one small change after the other would be left.
+            // Pixels that may be left mostly are. If they counted as drawn, one small change after the
+            // other would be left.
             let left = matches!(drawn[k], PixelUpdate::Keep | PixelUpdate::Either);
             *update = if now == was {
                 let error = match self.refine {
@@ -403,7 +405,7 @@ impl Tile {
         }
     }
 
-    /// The error from which on a pixel that stays is among the worst.
+    /// Returns the error from which a static pixel is among the worst.
     fn least_wrong(&self) -> f32 {
         AMONG_WORST * self.sum_wrong / self.wrong.max(1) as f32
     }
@@ -439,7 +441,7 @@ impl Tile {
 mod tests {
     use super::*;
 
-    /// 20 x 20 tiles, of which the first changes and those given are to be refined.
+    /// A map of 20 x 20 tiles. The first changes, and those given are to be refined.
     fn updates(wrong: &[(usize, usize)]) -> UpdateMap {
         let mut tiles = vec![TileUpdate::default(); 400];
         tiles[0].changes = true;
