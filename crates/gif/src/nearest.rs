@@ -6,7 +6,7 @@ use crate::colour;
 use crate::histogram::Histogram;
 use crate::palette::{Guesses, Palette, Sample};
 
-/// The palette entry nearest to a colour, and the squared distance between them (see [`colour`](crate::colour)).
+/// The palette entry nearest to a colour, and the squared distance between them (see [`colour`]).
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Nearest {
     pub(crate) index: u8,
