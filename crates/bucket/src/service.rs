@@ -1,8 +1,8 @@
-//! S3's operations, by the storage.
+//! S3's operations on the storage.
 //!
-//! One module a family: `buckets`, `reads`, `writes`, `copies`, `deletes`, `lists`, `versions`, `uploads` (in parts),
-//! `notifications`, `cross_origin` (rules for other sites' pages). Conditions are `conditions`'; a body on its way in is
-//! `ingest`'s, out `body_stream`'s. What a request may ask for beyond its operation is judged before, by `gate`.
+//! There is a module per family: `buckets`, `reads`, `writes`, `copies`, `deletes`, `lists`, `versions`, `uploads`
+//! (in parts), `notifications`, `cross_origin` (CORS rules). `conditions` evaluates conditions, `ingest` receives a
+//! body, and `body_stream` sends one. `gate` has checked before that the request asks for nothing unsupported.
 
 mod body_stream;
 mod buckets;
@@ -32,14 +32,14 @@ use crate::identity::hide_missing_key;
 use crate::records::{self, key};
 use crate::storage::{Batch, Kind, Snapshot, Storage, Table};
 
-/// See the module.
+/// The operations of S3, see the module.
 #[derive(Clone)]
 pub(crate) struct Service {
     storage: Storage,
     region: Arc<str>,
 }
 
-/// Who asks, for events.
+/// The caller of an operation, as recorded in events.
 #[derive(Clone, Debug)]
 pub(crate) struct Caller {
     principal: String,
@@ -47,7 +47,7 @@ pub(crate) struct Caller {
 }
 
 impl Caller {
-    /// What an operation is given besides its input.
+    /// Extracts the caller from a request.
     fn of<T>(request: &S3Request<T>) -> Self {
         let principal = request.credentials.as_ref().map(|c| c.access_key.clone()).unwrap_or_default();
         let origin = request.extensions.get::<Origin>().cloned().unwrap_or_default();
@@ -55,11 +55,11 @@ impl Caller {
     }
 }
 
-/// Why a change was not made.
+/// The reason why a change was not made.
 pub(crate) enum ChangeError {
-    /// By the request: nothing was changed.
+    /// The request was refused. Nothing was changed.
     Refused(Box<S3Error>),
-    /// By the disk.
+    /// The storage failed.
     Storage(StorageError),
 }
 
@@ -84,7 +84,7 @@ impl Service {
         self.storage.snapshot().map_err(|reason| unavailable(&reason))
     }
 
-    /// Runs a change. It must not stop by a refusal after its first write.
+    /// Runs a change. The change must not refuse after its first write.
     async fn change<T, F>(&self, kind: Kind, function: F) -> Answer<T>
     where
         T: Send + 'static,
@@ -98,14 +98,14 @@ impl Service {
         settled.await.map_err(|reason| unavailable(&reason))?
     }
 
-    /// The bucket, or `NoSuchBucket`.
+    /// Returns the bucket, or `NoSuchBucket`.
     fn bucket(&self, snapshot: &Snapshot, name: &str) -> Answer<records::Bucket> {
         records::find(snapshot, Table::Buckets, name.as_bytes())
             .map_err(unreadable)?
             .ok_or_else(no_such_bucket)
     }
 
-    /// The object, or `NoSuchBucket` or `NoSuchKey`.
+    /// Returns the object, or `NoSuchBucket` or `NoSuchKey`.
     fn object(&self, snapshot: &Snapshot, bucket: &str, key: &str) -> Answer<records::Object> {
         self.bucket(snapshot, bucket)?;
         let row = key::object(bucket, key.as_bytes());
@@ -113,7 +113,7 @@ impl Service {
     }
 }
 
-/// Each operation is its family's function of the same name.
+/// Each operation calls its handler in the module of its family.
 #[async_trait::async_trait]
 impl S3 for Service {
     async fn list_buckets(
@@ -285,8 +285,8 @@ impl S3 for Service {
     }
 
     async fn get_object(&self, req: S3Request<GetObjectInput>) -> S3Result<S3Response<GetObjectOutput>> {
-        let told = hide_missing_key(&req.extensions);
-        self.handle_get_object(req).await.map_err(told)
+        let hide = hide_missing_key(&req.extensions);
+        self.handle_get_object(req).await.map_err(hide)
     }
 
     async fn head_object(&self, req: S3Request<HeadObjectInput>) -> S3Result<S3Response<HeadObjectOutput>> {
@@ -323,8 +323,8 @@ impl S3 for Service {
     }
 
     async fn copy_object(&self, req: S3Request<CopyObjectInput>) -> S3Result<S3Response<CopyObjectOutput>> {
-        let told = hide_missing_key(&req.extensions);
-        self.handle_copy_object(req).await.map(S3Response::new).map_err(told)
+        let hide = hide_missing_key(&req.extensions);
+        self.handle_copy_object(req).await.map(S3Response::new).map_err(hide)
     }
 
     async fn delete_object(
@@ -356,8 +356,8 @@ impl S3 for Service {
         &self,
         req: S3Request<UploadPartCopyInput>,
     ) -> S3Result<S3Response<UploadPartCopyOutput>> {
-        let told = hide_missing_key(&req.extensions);
-        self.handle_upload_part_copy(req).await.map(S3Response::new).map_err(told)
+        let hide = hide_missing_key(&req.extensions);
+        self.handle_upload_part_copy(req).await.map(S3Response::new).map_err(hide)
     }
 
     async fn complete_multipart_upload(

@@ -1,4 +1,4 @@
-//! The JSON of a policy document, read strictly: every refusal names what is refused and where it stands.
+//! The JSON of a policy document, parsed strictly: every error names the refused part and its position.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -11,16 +11,16 @@ use super::condition::{Condition, Key, Operator};
 use super::pattern::Pattern;
 use super::statement::{self, Effect, Policy};
 
-/// The start of the ARN of every bucket and object.
+/// The prefix of the ARNs of all buckets and objects.
 const ARN: &str = "arn:aws:s3:::";
 
 impl FromStr for Policy {
     type Err = serde_json::Error;
 
-    /// Reads a document.
+    /// Parses a policy document.
     ///
     /// # Errors
-    /// What is wrong and where, also for whatever is valid in IAM and not understood here.
+    /// The problem and its position, also for anything that is valid in IAM but not supported here.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         read(text)
     }
@@ -125,7 +125,7 @@ impl TryFrom<String> for Resource {
     }
 }
 
-/// `${aws:username}` and the like, which only IAM can resolve.
+/// Refuses policy variables such as `${aws:username}`, which only IAM can resolve.
 fn without_variables(text: &str) -> Result<(), String> {
     if text.contains("${") {
         return Err(format!("`{text}` has a policy variable, which is not supported"));
@@ -133,7 +133,7 @@ fn without_variables(text: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Operator, then key, then values.
+/// Conditions, nested in the JSON as operator, key and values.
 #[derive(Default)]
 struct Conditions(Vec<Condition>);
 
@@ -174,7 +174,7 @@ impl<'de> Deserialize<'de> for Conditions {
     }
 }
 
-/// What one operator is applied to.
+/// The keys and values of one operator.
 struct Keys(Vec<(Key, Vec<String>)>);
 
 impl<'de> Deserialize<'de> for Keys {
@@ -208,7 +208,7 @@ impl<'de> Deserialize<'de> for Keys {
     }
 }
 
-/// A condition's value: a string, or a truth value for `Null`.
+/// A value of a condition: a string, or a Boolean for `Null`.
 struct Text(String);
 
 impl<'de> Deserialize<'de> for Text {
@@ -236,7 +236,7 @@ impl<'de> Deserialize<'de> for Text {
     }
 }
 
-/// What stands alone or in a list that is not empty.
+/// A value alone or a list that is not empty.
 struct OneOrMany<T>(Vec<T>);
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for OneOrMany<T> {
@@ -335,7 +335,7 @@ mod tests {
         assert!(read(&twice).unwrap_err().to_string().contains("List1"));
     }
 
-    /// A value of another kind is told what may stand in its place.
+    /// The error for a value of a wrong type names the right ones.
     #[test]
     fn what_may_stand_there_is_said() {
         let with = |condition: &str| {

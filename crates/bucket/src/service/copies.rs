@@ -1,4 +1,4 @@
-//! CopyObject: a body is read and written anew, so that a copy has an ETag and a checksum of its own.
+//! CopyObject: a body is read and written again, so that a copy has its own ETag and checksum.
 
 use s3s::dto::*;
 use s3s::{S3Request, s3_error};
@@ -19,7 +19,7 @@ impl Service {
         req: S3Request<CopyObjectInput>,
     ) -> Answer<CopyObjectOutput> {
         let caller = Caller::of(&req);
-        // Conditions on the destination have no place in the input yet.
+        // The input of `s3s` has no conditions on the destination yet.
         let header = |name: &str| {
             req.headers.get(name).map(|value| ETagCondition::parse_http_header(value.as_bytes()))
         };
@@ -114,7 +114,7 @@ impl Service {
     }
 }
 
-/// Bucket and key of a copy's source.
+/// Returns bucket and key of a copy's source.
 pub(super) fn source(source: &CopySource) -> Answer<(String, String)> {
     match source {
         CopySource::Bucket { bucket, key, version_id } => {
@@ -129,7 +129,7 @@ pub(super) fn source(source: &CopySource) -> Answer<(String, String)> {
     }
 }
 
-/// Whether the copy's headers are the request's.
+/// Returns whether the headers of the request replace those of the source.
 fn directive(directive: Option<&MetadataDirective>) -> Answer<bool> {
     match directive.map(MetadataDirective::as_str) {
         None | Some(MetadataDirective::COPY) => Ok(false),

@@ -1,4 +1,4 @@
-//! DeleteObject and DeleteObjects: what is not there is deleted as well.
+//! DeleteObject and DeleteObjects. Deleting a missing object succeeds.
 
 use s3s::dto::*;
 use s3s::{S3Request, s3_error};
@@ -10,7 +10,7 @@ use crate::identity::DeniedKeys;
 use crate::records::{self, find, key, release};
 use crate::storage::{Batch, Bodies, Kind, Table};
 
-/// Of one request: S3's.
+/// S3's limit on the keys of a request.
 const MAX_KEYS: usize = 1000;
 
 impl Service {
@@ -90,7 +90,7 @@ impl Service {
     }
 }
 
-/// Removes an object, on its condition, and tells of it if it was there.
+/// Removes an object under its condition, and writes an event if it existed.
 fn remove(
     batch: &mut Batch<'_>,
     ids: &Bodies,

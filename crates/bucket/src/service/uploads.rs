@@ -1,4 +1,5 @@
-//! Uploads in parts. A part is a body of its own; completing an upload writes the list of its parts, and copies nothing.
+//! Uploads in parts. A part is a body of its own. Completing an upload writes the list of its
+//! parts, and copies nothing.
 
 use hyper::StatusCode;
 use hyper::header::HOST;
@@ -19,13 +20,13 @@ use crate::records::{
 };
 use crate::storage::{Batch, Kind, Table, View};
 
-/// Part numbers begin at 1: S3's.
+/// S3's largest part number. The first is 1.
 const MAX_PARTS: i32 = 10_000;
 
-/// Every part but the last: S3's.
+/// S3's limit on the size of every part but the last.
 const SMALLEST_PART: u64 = 5 * 1024 * 1024;
 
-/// Random bytes of an upload's id.
+/// The number of random bytes in an upload's id.
 const ID_BYTES: usize = 16;
 
 impl Service {
@@ -89,7 +90,7 @@ impl Service {
         })
     }
 
-    /// The upload, or `NoSuchUpload`.
+    /// Returns the upload, or `NoSuchUpload`.
     pub(super) fn upload(&self, bucket: &str, object_key: &str, id: &str) -> Answer<records::Upload> {
         let snapshot = self.snapshot()?;
         self.bucket(&snapshot, bucket)?;
@@ -118,7 +119,8 @@ impl Service {
                 named.map_or("null", Algorithm::name).to_ascii_lowercase()
             )));
         }
-        // A client that named no algorithm may check its parts by another one: they are then digested anew at the end.
+        // A client that named no algorithm may check its parts by another one. They are then digested
+        // again at the end.
         let expected =
             ExpectedBody::of_request(&req.headers, req.trailing_headers.clone(), upload.algorithm)?;
         let body = input.body.ok_or_else(|| s3_error!(IncompleteBody, "a body is missing"))?;
@@ -180,7 +182,7 @@ impl Service {
         Ok(UploadPartCopyOutput { copy_part_result: Some(result), ..UploadPartCopyOutput::default() })
     }
 
-    /// Keeps a part in the place of an earlier one of its number.
+    /// Stores a part, in place of an earlier one with its number.
     async fn part_kept(
         &self,
         bucket: String,
@@ -238,7 +240,7 @@ impl Service {
             let there = admit(batch, &to)?;
             let row = key::upload(&to.bucket, &to.key, &id);
             let Some(upload) = find::<records::Upload>(batch, Table::Uploads, &row)? else {
-                // Completed before, and still what is there: the answer may have been lost.
+                // The upload was completed before and the object is still there: the response may have been lost.
                 let existing = there.1;
                 return existing
                     .filter(|object| object.upload.as_ref() == Some(&id))
@@ -302,21 +304,21 @@ impl Service {
     }
 }
 
-/// A part as the client lists it.
+/// A part in the client's list.
 struct Wanted {
     number: u16,
     etag: String,
     checksum: Option<(Algorithm, String)>,
 }
 
-/// What the client says of the whole.
+/// The client's data about the whole object.
 struct Claim {
     kind: Option<String>,
     value: Option<(Algorithm, String)>,
     size: Option<u64>,
 }
 
-/// An object made of parts.
+/// An object composed of parts.
 struct Chosen {
     layout: Layout,
     size: u64,
@@ -324,7 +326,7 @@ struct Chosen {
     checksum: Option<checksum::Checksum>,
 }
 
-/// The client's list: at least one part, in ascending order.
+/// Parses the client's list: at least one part, in ascending order.
 fn wanted(listed: Vec<CompletedPart>) -> Answer<Vec<Wanted>> {
     if listed.is_empty() || listed.len() > usize::try_from(MAX_PARTS).unwrap_or_default() {
         return Err(s3_error!(MalformedXML, "You must specify between 1 and {MAX_PARTS} parts"));
@@ -354,7 +356,7 @@ fn wanted(listed: Vec<CompletedPart>) -> Answer<Vec<Wanted>> {
     Ok(wanted)
 }
 
-/// Finds the parts that the client lists, and checks what it says of them.
+/// Finds the parts in the client's list, and checks the client's data about them.
 fn choose(
     batch: &Batch<'_>,
     id: &str,
@@ -431,7 +433,7 @@ fn choose(
     Ok(Chosen { layout: Layout { parts }, size, etag, checksum })
 }
 
-/// S3's ETag of parts: the MD5 of their MD5s, and how many they are.
+/// Computes S3's ETag of parts: the MD5 of their MD5s, and their number.
 fn combined(md5s: &[String]) -> String {
     use s3s::crypto::{Checksum as _, Md5};
     let digit = |byte: u8| {
@@ -452,7 +454,7 @@ fn part_number(number: i32) -> Answer<u16> {
     })
 }
 
-/// `bytes=first-last`, both there and within the source.
+/// Parses `bytes=first-last`. Both must be given and lie within the source.
 fn copied_range(range: &str, size: u64) -> Answer<std::ops::Range<u64>> {
     let malformed = || {
         invalid_argument(
@@ -474,7 +476,7 @@ fn copied_range(range: &str, size: u64) -> Answer<std::ops::Range<u64>> {
     Ok(first..last + 1)
 }
 
-/// Where the object is that a request is about, as the client called it.
+/// Returns the URL of the request's object, with the host that the client used.
 fn location(req: &S3Request<CompleteMultipartUploadInput>) -> String {
     let named = req.headers.get(HOST).and_then(|host| host.to_str().ok());
     let host = named.or(req.uri.authority().map(Authority::as_str)).unwrap_or_default();
@@ -487,7 +489,7 @@ mod tests {
 
     #[test]
     fn the_etag_of_parts_is_as_s3_makes_it() {
-        // Of two parts, the MD5s of "a" and "b": as Python's hashlib has it.
+        // The MD5s of "a" and "b"; the result was computed with Python's hashlib.
         let parts =
             ["0cc175b9c0f1b6a831c399e269772661", "92eb5ffee6ae2fec3ad71c777531578f"].map(str::to_owned);
         assert_eq!(combined(&parts), "96e024ba2074fe77e8e965ba43a704be-2");

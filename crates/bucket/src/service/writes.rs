@@ -68,7 +68,7 @@ impl Service {
     }
 }
 
-/// What the fields of a browser's form say of its file, as a put says it in headers.
+/// Converts the fields of a browser's form to the headers of a put.
 fn said_in_form(input: &PutObjectInput) -> Answer<HeaderMap> {
     let length = input.content_length.unwrap_or_default().to_string();
     let algorithm = input.checksum_algorithm.as_ref().map(|name| name.as_str().to_owned());
@@ -91,7 +91,7 @@ fn said_in_form(input: &PutObjectInput) -> Answer<HeaderMap> {
     Ok(said)
 }
 
-/// `aws-chunked` is how the body travelled, not what it is.
+/// Returns the encoding without `aws-chunked`, which describes the transfer and not the content.
 pub(super) fn stored_encoding(encoding: Option<String>) -> Option<String> {
     let encoding = encoding?;
     let kept: Vec<&str> = encoding
@@ -102,7 +102,7 @@ pub(super) fn stored_encoding(encoding: Option<String>) -> Option<String> {
     (!kept.is_empty()).then(|| kept.join(", "))
 }
 
-/// The checksum's value, if it is of this algorithm.
+/// Returns the checksum's value if it has this algorithm.
 pub(super) fn of(checksum: Option<&Checksum>, algorithm: Algorithm) -> Option<String> {
     checksum.filter(|checksum| checksum.algorithm == algorithm).map(|checksum| checksum.value.clone())
 }
