@@ -1,5 +1,4 @@
-//! Edits of a script that are more than one number: new objects, copies, what is hidden, what falls down. Lines in,
-//! splices out.
+//! Edits of a script that affect more than one number: new objects, copies, hidden lines. Lines in, splices out.
 
 use glam::DVec3;
 use rayfold_scene::{Command, Kind, Parameter, Presence, parse_curve};
@@ -21,18 +20,19 @@ const COLORS: [[f64; 3]; 6] = [
     [0.75, 0.75, 0.75],
 ];
 
-/// What a script needs before anything of it can be seen.
+/// The lines that a script needs before an object is visible.
 const SCREEN: &str = "Screen 960 540";
 const CAMERA: &str = "Camera 0 3 9  0 -0.28 -1  0 1 0  1  -0.8 -0.45  0.8 0.45";
 const BACKGROUND: &str = "Background 0.86 0.9 0.95";
 const SUN: &str = "Ilight 0.8 0.8 0.8  0.6 -1 -0.5   # sun";
 
-/// One line in place of another.
+/// Replaces one line by another.
 pub(crate) fn set(line: usize, to: Line) -> Splice {
     Splice { at: line, removed: 1, inserted: vec![to] }
 }
 
-/// A new line of a command: an object of about `size` that stands on `ground`, the `count`th in its script.
+/// Makes the line for a new object or light of about `size`, which stands on `ground` and is the
+/// `count`th in its script.
 pub(crate) fn new_line(command: Command, ground: DVec3, size: f64, count: usize) -> Line {
     let decimals = (2.0 - size.log10().floor()).clamp(0.0, 12.0) as usize;
     let round = |x: f64| format!("{x:.decimals$}").parse::<f64>().unwrap_or(x);
@@ -79,7 +79,8 @@ pub(crate) fn new_line(command: Command, ground: DVec3, size: f64, count: usize)
     Line::new(&text)
 }
 
-/// Adds a line of a frame, with all that is missing to see it; what is done, and where the line is then.
+/// Adds a line to a frame, with all missing lines that make it visible. Returns the changes, and the new
+/// index of the line.
 pub(crate) fn add(lines: &[Line], source_map: &SourceMap, line: Line) -> (Vec<Splice>, usize) {
     let mut before = Vec::new();
     if source_map.screen.is_none() {
@@ -106,11 +107,11 @@ pub(crate) fn add(lines: &[Line], source_map: &SourceMap, line: Line) -> (Vec<Sp
     if source_map.trace.is_none() {
         inserted.push(Line::new(Command::Trace.name()));
     }
-    // A new line behind a last one without an end begins where that one gets its end.
+    // A new line after a last line without an end starts where that one gets its end.
     (vec![Splice { at, removed: 0, inserted }], place)
 }
 
-/// Lines go; from the last to the first.
+/// Removes lines, from the last to the first.
 pub(crate) fn remove(lines: &[usize]) -> Vec<Splice> {
     let mut lines = lines.to_vec();
     lines.sort_unstable();
@@ -118,7 +119,7 @@ pub(crate) fn remove(lines: &[usize]) -> Vec<Splice> {
     lines.into_iter().rev().map(|at| Splice { at, removed: 1, inserted: Vec::new() }).collect()
 }
 
-/// Lines again, each behind itself and a little aside; the lines of the copies.
+/// Copies lines, each after itself and a little aside. Returns the changes and the lines of the copies.
 pub(crate) fn duplicate(lines: &[Line], which: &[usize], aside: f64) -> (Vec<Splice>, Vec<usize>) {
     let mut which: Vec<_> = which.iter().copied().filter(|&line| line < lines.len()).collect();
     which.sort_unstable();
@@ -134,7 +135,7 @@ pub(crate) fn duplicate(lines: &[Line], which: &[usize], aside: f64) -> (Vec<Spl
     (which.iter().rev().map(|&at| copy(at)).collect(), copies)
 }
 
-/// A line with all its positions moved; those numbers that stay are not touched.
+/// Moves all positions of a line. Numbers that do not change are not rewritten.
 pub(crate) fn moved(line: &Line, by: DVec3, keying: Keying) -> Option<Line> {
     let values = Values::of(line, keying.time)?;
     values.positions().try_fold(line.clone(), |line, (first, position)| {
@@ -144,7 +145,7 @@ pub(crate) fn moved(line: &Line, by: DVec3, keying: Keying) -> Option<Line> {
     })
 }
 
-/// The command that a comment hides; its line without the sign.
+/// Returns the command line that is hidden in a comment.
 pub(crate) fn hidden(line: &Line) -> Option<Line> {
     let text = line.text();
     let inner = text.trim_start().strip_prefix('#')?;
@@ -168,7 +169,7 @@ pub(crate) fn hidden(line: &Line) -> Option<Line> {
     is_meant.then_some(inner)
 }
 
-/// Lines become comments; if all of them are hidden, commands again.
+/// Turns lines into comments. If all of them are hidden, turns them back into commands.
 pub(crate) fn hide(lines: &[Line], which: &[usize]) -> Vec<Splice> {
     let which = || which.iter().filter_map(|&at| Some((at, lines.get(at)?)));
     let back: Vec<_> = which().filter_map(|(at, line)| Some(set(at, hidden(line)?))).collect();
@@ -181,7 +182,7 @@ pub(crate) fn hide(lines: &[Line], which: &[usize]) -> Vec<Splice> {
         .collect()
 }
 
-/// A line changes places with the neighbour of its kind.
+/// Exchanges a line with its neighbour of the same kind.
 pub(crate) fn reorder(
     lines: &[Line],
     source_map: &SourceMap,
@@ -198,7 +199,7 @@ pub(crate) fn reorder(
     Some((vec![Splice { at: first, removed: last + 1, inserted }], other))
 }
 
-/// The `Trace` of a frame is so many frames.
+/// Sets the number of frames of a frame's `Trace`.
 pub(crate) fn set_frames(lines: &[Line], source_map: &SourceMap, count: u32) -> Vec<Splice> {
     let number = |count: u32| f64::from(count);
     let old = source_map.frames.and_then(|at| Some((at, lines.get(at)?)));
@@ -215,14 +216,14 @@ pub(crate) fn set_frames(lines: &[Line], source_map: &SourceMap, count: u32) -> 
         let inserted = vec![frames(count)];
         return vec![Splice { at: lines.len(), removed: 0, inserted }];
     };
-    // Those that follow stay what they were.
+    // Later traces keep their frames.
     let follows = lines[trace + 1..].iter().any(|line| line.command() == Some(Command::Trace));
     let behind = Splice { at: trace + 1, removed: 0, inserted: vec![frames(1)] };
     let before = Splice { at: trace, removed: 0, inserted: vec![frames(count)] };
     if follows { vec![behind, before] } else { vec![before] }
 }
 
-/// Where the lamps and groups of some lines are.
+/// Returns the bounds of the positions of some lines' lamps and groups.
 pub(crate) fn places<'a>(lines: impl IntoIterator<Item = &'a Line>, time: f64) -> Option<Bounds> {
     let values = lines.into_iter().filter_map(|line| Values::of(line, time));
     Bounds::of(values.filter(|values| role(values.command) != Role::Camera).flat_map(|values| {

@@ -1,9 +1,10 @@
-//! What can be dragged: an object by its body, along an axis, by its corners, its radius, a light by its direction; and
-//! which numbers of its line become what.
+//! The handles that can be dragged, and the numbers that a drag changes: an object by its body, along an axis, by its
+//! corners or its radius, and a light by its direction.
 //!
-//! It knows commands only by the kinds of their parameters: a position is a handle, a length is one at its distance
-//! from the first position, a direction is the tip of an arrow; angles and a scale are turned and pulled (`rotate_handles`). Invariant: a drag is computed from what stood when it
-//! began, so that going back to its start changes nothing.
+//! Knows commands only by the kinds of their parameters. A position is a handle. A length is a handle at that
+//! distance from the first position. A direction is the tip of an arrow. Angles and a scale have handles of
+//! their own (`rotate_handles`). Invariant: a drag is computed from the state at its start, so returning to
+//! the start changes nothing.
 
 use std::cell::Cell;
 
@@ -17,82 +18,82 @@ use crate::tables::{Role, fields, role};
 use crate::values::{Keying, Values, changed};
 use crate::view::Projection;
 
-/// How long arrows are, in pixels of the picture.
+/// The length of an arrow in pixels of the picture.
 const ARROW: f64 = 72.0;
 
-/// Where the handle of a plane is along its two axes, in arrows.
+/// The position of a plane's handle along its two axes, in arrows.
 const PLANE: f64 = 0.35;
 
-/// A surface that is seen more slanted than this sine is not dragged along: a pixel would be miles.
+/// A surface seen at a smaller sine of its slant is not dragged along, because a pixel would be a huge distance.
 const SLANTED: f64 = 0.12;
 
-/// A grid's width that dragging snaps to, in pixels, at least.
+/// The smallest width of the snapping grid in pixels.
 const SNAP: f64 = 12.0;
 
-/// What is taken hold of.
+/// The kind of a handle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "what")]
 pub(crate) enum HandleKind {
-    /// All of the selected lines, along the ground.
+    /// All selected lines, along the ground.
     Body,
-    /// All of them, along an axis: 0 is x.
+    /// All selected lines, along an axis: 0 is x.
     Axis {
-        /// Which.
+        /// The index of the axis.
         axis: usize,
     },
-    /// All of them, along the plane across an axis: 0 is that of y and z.
+    /// All selected lines, along the plane across an axis: 0 is the plane of y and z.
     Plane {
-        /// Across which.
+        /// The index of the axis across the plane.
         axis: usize,
     },
     /// The position whose numbers begin here.
     Point {
-        /// Of the line's numbers, from 0.
+        /// The index in the line's numbers, from 0.
         first: usize,
     },
     /// The length that is this number.
     Length {
-        /// Of the line's numbers, from 0.
+        /// The index in the line's numbers, from 0.
         first: usize,
     },
     /// The direction whose numbers begin here.
     Direction {
-        /// Of the line's numbers, from 0.
+        /// The index in the line's numbers, from 0.
         first: usize,
     },
     /// One of the angles whose numbers begin here.
     Turn {
-        /// Of the line's numbers, from 0.
+        /// The index in the line's numbers, from 0.
         first: usize,
-        /// Which: 0 is about x.
+        /// The axis of the angle: 0 is x.
         axis: usize,
     },
     /// The scale that is this number.
     Scale {
-        /// Of the line's numbers, from 0.
+        /// The index in the line's numbers, from 0.
         first: usize,
     },
 }
 
-/// Something to take hold of, in the picture.
+/// A handle in the picture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Handle {
-    /// What it does.
+    /// The kind of the handle.
     pub(crate) grip: HandleKind,
-    /// Its line in the script, from 0.
+    /// The index of its line in the script, from 0.
     pub(crate) line: usize,
-    /// For those who cannot see it.
+    /// A description for screen readers.
     pub(crate) label: String,
-    /// Where it is, in pixels.
+    /// The position in pixels.
     pub(crate) at: [f64; 2],
-    /// Where the line to it starts, in pixels.
+    /// The start of the line to the handle, in pixels.
     pub(crate) from: [f64; 2],
-    /// The way along which it goes, as the path of an SVG.
+    /// The path along which the handle moves, as an SVG path.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub(crate) way: String,
 }
 
-/// The handles of a line with these values; `around` is where lights without a place are shown.
+/// Returns the handles of a line with these values. `around` is the point where lights without a position are shown.
 pub(crate) fn handles(number: usize, values: &Values, projection: &Projection, around: DVec3) -> Vec<Handle> {
     let mut handles = Vec::new();
     let mut add = |grip, from: DVec3, to: DVec3, label: &str, way: String| {
@@ -120,7 +121,7 @@ pub(crate) fn handles(number: usize, values: &Values, projection: &Projection, a
         }
         let (_, _, w) = projection.axes();
         for (axis, names) in ["y and z", "x and z", "x and y"].into_iter().enumerate() {
-            // Seen edge on, a plane is a line.
+            // A plane that is seen edge on is a line.
             if w[axis].abs() > SLANTED {
                 let to = middle + PLANE * arrow * (DVec3::ONE - DVec3::AXES[axis]);
                 add(HandleKind::Plane { axis }, middle, to, &format!("along {names}: place"), straight());
@@ -185,51 +186,51 @@ pub(crate) fn handles(number: usize, values: &Values, projection: &Projection, a
     handles
 }
 
-/// The middle of some positions.
+/// Returns the mean of some positions.
 fn middle(positions: &[(usize, DVec3)]) -> DVec3 {
     positions.iter().map(|(_, position)| position).sum::<DVec3>() / positions.len().max(1) as f64
 }
 
-/// Where the handle of a line's length number `index` lies.
+/// Returns the direction of the handle of a line's length number `index`.
 fn toward(index: usize, projection: &Projection) -> DVec3 {
     let (right, up, _) = projection.axes();
     if index == 0 { right } else { up }
 }
 
-/// A light is shown where it comes from.
+/// Returns -1 for a light, which is shown where it comes from, else 1.
 fn facing(command: Command) -> f64 {
     if role(command) == Role::Light { -1.0 } else { 1.0 }
 }
 
-/// A drag: what it began with.
+/// A drag with its start.
 #[derive(Clone, Debug)]
 pub(crate) struct Drag {
     grip: HandleKind,
-    /// The lines, as they were.
+    /// The original lines.
     lines: Vec<(usize, Line, Values)>,
-    /// Where it was taken hold of, in the world.
+    /// The grabbed point in the world.
     grabbed: DVec3,
     keying: Keying,
-    /// How far it has turned, so that several turns are.
+    /// The degrees turned so far, so that a drag can make several turns.
     turned: Cell<f64>,
 }
 
-/// How a drag is to be taken.
+/// The modifiers of a drag.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 pub(crate) struct DragOptions {
-    /// Up and down instead of along the ground.
+    /// Move up and down instead of along the ground.
     #[serde(default)]
     pub(crate) upright: bool,
-    /// In steps of a grid.
+    /// Move in steps of a grid.
     #[serde(default)]
     pub(crate) snap: bool,
-    /// Numbers that change are moved for all frames.
+    /// Move curves as a whole, in all frames.
     #[serde(default)]
     pub(crate) whole: bool,
 }
 
 impl Drag {
-    /// Takes hold of some lines; `grabbed` is the point of an object that was hit, if one was.
+    /// Starts a drag of some lines. `grabbed` is the point of an object that was hit, if there is one.
     pub(crate) fn new(
         grip: HandleKind,
         lines: Vec<(usize, Line)>,
@@ -256,7 +257,7 @@ impl Drag {
         Some(Self { grip, lines, grabbed, keying, turned: Cell::new(0.0) })
     }
 
-    /// The lines as they become when the pointer goes from one point of the picture to another.
+    /// Returns the lines after the pointer has moved from one point of the picture to another.
     pub(crate) fn to(
         &self,
         projection: &Projection,
@@ -275,7 +276,7 @@ impl Drag {
                 Some((*number, line))
             })
         };
-        // Everything goes as the pointer does on a plane, along these axes.
+        // Everything follows the pointer on a plane, along these axes.
         let along = |normal: DVec3, axes| match between(projection, self.grabbed, normal, from, to) {
             Some(by) => moved(axes, by).collect(),
             None => self.start(),
@@ -367,8 +368,8 @@ impl Drag {
         vec![(*number, change(line, values).unwrap_or_else(|| line.clone()))]
     }
 
-    /// The plane that a free drag goes along, and which coordinates it changes: the ground, or upright, or the picture's
-    /// own plane where the ground is seen edge on.
+    /// Returns the plane of a free drag, and the coordinates that it changes: the ground, or an upright plane, or the
+    /// picture's own plane if the ground is seen edge on.
     fn plane(&self, projection: &Projection, options: DragOptions) -> (DVec3, [bool; 3]) {
         let (_, _, w) = projection.axes();
         if options.upright {
@@ -382,21 +383,21 @@ impl Drag {
     }
 }
 
-/// How far the pointer goes along a plane.
+/// Returns the movement of the pointer along a plane.
 fn between(projection: &Projection, through: DVec3, normal: DVec3, from: DVec2, to: DVec2) -> Option<DVec3> {
     let start = meet(projection.ray(from), through, normal)?;
     let end = meet(projection.ray(to), through, normal)?;
     Some(end - start)
 }
 
-/// Where a ray meets a plane.
+/// Returns the intersection of a ray and a plane.
 fn meet((origin, direction): (DVec3, DVec3), through: DVec3, normal: DVec3) -> Option<DVec3> {
     let distance = (through - origin).dot(normal) / direction.dot(normal);
     let point = origin + distance * direction;
     (distance > 0.0 && point.is_finite()).then_some(point)
 }
 
-/// Where a ray meets a sphere, or comes nearest to it.
+/// Returns the intersection of a ray and a sphere, or the point of the sphere nearest to the ray.
 fn on_sphere((origin, direction): (DVec3, DVec3), center: DVec3, radius: f64) -> DVec3 {
     let along = (center - origin).dot(direction);
     let nearest = origin + along * direction;
@@ -404,21 +405,22 @@ fn on_sphere((origin, direction): (DVec3, DVec3), center: DVec3, radius: f64) ->
     if room > 0.0 { nearest - room.sqrt() * direction } else { nearest }
 }
 
-/// What numbers are rounded to where a pixel is so much: a tenth of it at least, in powers of ten.
+/// Returns the step to which numbers are rounded, given the extent of a pixel: the power of ten at or below half a
+/// pixel, or at or above the snapping grid.
 fn step(pixel: f64, snap: bool) -> f64 {
     let least = if snap { SNAP * pixel } else { 0.5 * pixel };
     let power = if snap { least.log10().ceil() } else { least.log10().floor() };
     if power.is_finite() { 10f64.powi(power.clamp(-12.0, 12.0) as i32) } else { 1e-3 }
 }
 
-/// A multiple of a power of ten, as its shortest decimal.
+/// Returns the multiple of a power of ten nearest to `x`, as its shortest decimal.
 fn rounded(x: f64, step: f64) -> f64 {
     let decimals = -step.log10().round();
     let x = (x / step).round() * step;
     if decimals > 0.0 { format!("{x:.*}", decimals as usize).parse().unwrap_or(x) } else { x.round() }
 }
 
-/// A position moved along some of the axes; those along which it does not move keep their numbers.
+/// Moves a position along some of the axes. The other coordinates keep their numbers.
 fn shifted(position: DVec3, by: DVec3, axes: [bool; 3], step: f64) -> [f64; 3] {
     let mut to = position.to_array();
     for axis in (0..3).filter(|&axis| axes[axis]) {
@@ -430,7 +432,7 @@ fn shifted(position: DVec3, by: DVec3, axes: [bool; 3], step: f64) -> [f64; 3] {
     to
 }
 
-/// The sum, without the noise of the last bits: as many decimals as the longer of the two has.
+/// Returns the sum without rounding noise: it has as many decimals as the longer of the two numbers.
 fn exactly(x: f64, way: f64, step: f64) -> f64 {
     let sum = x + way;
     let of = |x: f64| x.to_string().split_once('.').map_or(0, |(_, decimals)| decimals.len());
@@ -447,7 +449,7 @@ mod tests {
 
     const STILL: Keying = Keying { time: 1.0, first: 1.0, auto: false, whole: false };
 
-    /// The handles of a line at the first frame.
+    /// Returns the handles of a line at the first frame.
     fn handles(number: usize, line: &Line, projection: &Projection, around: DVec3) -> Vec<Handle> {
         super::handles(number, &Values::of(line, 1.0).unwrap(), projection, around)
     }

@@ -1,7 +1,7 @@
-//! A page at work: what it looks at, what it has selected and what it drags; each of its wishes becomes changes of the
-//! project and what it is told of them.
+//! The editor session of one page: view, selection, drag. Turns each message of the page into edits of the
+//! project and a reply.
 //!
-//! Knows no socket and no thread: wishes come in, values go out, so that tests need neither.
+//! Knows no socket and no thread, so tests need neither.
 
 mod editing;
 mod held_keys;
@@ -33,67 +33,67 @@ use crate::values::changed;
 use crate::view::Orbit;
 use hold::Held;
 
-/// Bytes of a text that the page sends for a line.
+/// The largest text that the page may send for a line, in bytes.
 const TEXT: usize = 1 << 20;
 
-/// A page at work.
+/// The editor session of a page.
 #[derive(Debug)]
 pub(crate) struct Session {
     size: (u32, u32),
     frame: usize,
-    /// The free camera, if one looks through it.
+    /// The free camera, if it is in use.
     free: Option<Orbit>,
     selection: Vec<usize>,
     held: Option<Held>,
-    /// How many wishes were heard.
+    /// The number of messages received.
     asked: u32,
     gestures: u64,
     /// The line that is being typed in, and its gesture.
     typing: Option<(usize, u64)>,
     pictures: u32,
-    /// Lines that cannot be taken hold of in the picture, each with its file. They are kept as long as the page is open: the
-    /// script does not say it.
+    /// The lines that cannot be dragged in the picture, each with its file. They last as long as the page is open,
+    /// because the script does not contain them.
     locked: Vec<(usize, usize)>,
-    /// What is under the pointer.
+    /// The line of the object under the pointer.
     hovered: Option<usize>,
-    /// Whether still numbers become curves when they are changed.
+    /// Changing a constant number makes it a curve.
     auto_key: bool,
-    /// Whether the way of what is selected is shown.
+    /// The motion path of the selection is shown.
     path: bool,
-    /// Whether it is outlined where it is at other frames.
+    /// The selection is outlined at other frames.
     onion: bool,
     copied: Vec<Copied>,
-    /// What the page was told last.
+    /// The state that was sent to the page last.
     tracks: Option<Tracks>,
     files: Vec<FileState>,
     shown_file: usize,
-    /// What the server is to do about the GIF.
+    /// The action that the server is to take on the GIF.
     output: Option<Output>,
 }
 
-/// What the server is to do about the GIF.
+/// An action on the GIF.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Output {
-    /// Begin.
+    /// Start rendering the GIF.
     Render,
-    /// Stop.
+    /// Stop rendering the GIF.
     Cancel,
 }
 
-/// What follows from a wish.
+/// The result of a message.
 #[derive(Debug, Default)]
 pub(crate) struct Answer {
-    /// What the page is told.
+    /// The reply to the page.
     pub(crate) tell: ServerMessage,
-    /// The picture that it gets.
+    /// The picture that the page gets.
     pub(crate) picture: Option<Wanted>,
     /// The page has shown a picture.
     pub(crate) shown: bool,
-    /// What to do about the GIF.
+    /// The action on the GIF.
     pub(crate) output: Option<Output>,
 }
 
-/// What a wish has changed.
+/// The effect of a message on the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Change {
     Nothing,
@@ -104,7 +104,7 @@ enum Change {
 }
 
 impl Session {
-    /// A page that has just opened, and what it is told first.
+    /// Makes the session of a page that has just opened, and its first reply.
     pub(crate) fn open(project: &Project) -> (Self, Answer) {
         let mut session = Self {
             size: (960, 540),
@@ -140,7 +140,7 @@ impl Session {
         (session, answer)
     }
 
-    /// Does what the page asks for.
+    /// Handles a message of the page.
     pub(crate) fn ask(&mut self, project: &mut Project, ask: ClientMessage) -> Answer {
         self.asked = self.asked.wrapping_add(1);
         let mut tell = ServerMessage::default();
@@ -154,7 +154,7 @@ impl Session {
         }
     }
 
-    /// Looks whether others have written the file that is shown, and writes what has rested.
+    /// Adopts changes that other programs made to the shown file, and writes pending changes.
     pub(crate) fn tick(&mut self, project: &mut Project) -> Option<Answer> {
         let saved = project.save(false);
         let place = self.place(project);
@@ -178,7 +178,7 @@ impl Session {
         Some(self.answer(project, tell, change))
     }
 
-    /// `None` where there is nothing to tell.
+    /// Handles a message. Returns `None` if there is nothing to reply.
     fn run(&mut self, project: &mut Project, ask: ClientMessage, tell: &mut ServerMessage) -> Option<Change> {
         if !matches!(
             ask,
@@ -240,7 +240,7 @@ impl Session {
                 let to = self.line(project, line).and_then(|line| changed(line, first, &values, keying));
                 let is_fit = values.iter().all(|value| value.is_finite()) && first + values.len() <= 64;
                 match to {
-                    // The page's own gestures and the pointer's are not to meet.
+                    // The page's own gestures must differ from those of the pointer.
                     Some(to) if is_fit => {
                         self.edit(project, vec![edits::set(line, to)], gesture.map(|g| g << 1 | 1), tell);
                         if gesture.is_some() { Change::Moving } else { Change::Still }
@@ -408,7 +408,7 @@ impl Session {
         self.file_lines(project).get(at)
     }
 
-    /// The frame that is shown.
+    /// Returns the frame that is shown.
     fn shown(&self, project: &Project) -> Arc<Frame> {
         let place = self.place(project);
         project.files[place.file].frame(place.frame)
@@ -416,7 +416,7 @@ impl Session {
 
     fn select(&mut self, project: &Project, lines: Vec<usize>) {
         let count = self.file_lines(project).len();
-        // Of a line that is named twice the last place counts.
+        // If a line is named twice, the last position counts.
         let mut named = HashSet::new();
         let last = |line: &usize| *line < count && named.insert(*line);
         self.selection = lines.into_iter().rev().filter(last).collect();

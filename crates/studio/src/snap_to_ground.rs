@@ -1,6 +1,7 @@
-//! Objects onto the ground, and onto what is below them.
+//! Dropping objects onto the ground, and onto the objects below them.
 //!
-//! Where an object ends the tracer says: rays from below find its underside, rays from there what it would meet.
+//! The tracer finds the surfaces: rays from below find the underside of an object, and rays from there
+//! the surface below it.
 
 use glam::DVec3;
 use rayfold_scene::{Object, Scene};
@@ -14,17 +15,18 @@ use crate::line::Line;
 use crate::source_map::SourceMap;
 use crate::values::{Keying, tidy};
 
-/// Rays a side, odd so that the middle is looked at, too.
+/// The number of rays per side, odd so that the middle is tested, too.
 const SIDE: usize = 33;
 
-/// How often the neighbourhood of the place that is met first is looked at again, each time this much finer.
+/// The number of times that the area around the first contact is searched again, each time at a finer scale.
 const ROUNDS: usize = 4;
 const FINER: f64 = 8.0;
 
-/// How far above an underside rays begin, in sizes of the object, so that they meet what it lies on.
+/// The distance above an underside at which rays start, in sizes of the object, so that they hit
+/// a surface in contact.
 const LIFT: f64 = 1e-6;
 
-/// Objects fall together until one of them rests on what is below, or on the height 0 where nothing is.
+/// Drops objects together until one of them rests on an object below, or on the height 0 if there is none.
 pub(crate) fn drop_down(
     lines: &[Line],
     source_map: &SourceMap,
@@ -40,7 +42,7 @@ pub(crate) fn drop_down(
     down(lines, which, fall, keying)
 }
 
-/// Objects stand on the height 0 with their lowest point, each for itself.
+/// Moves each object so that its lowest point is at the height 0.
 pub(crate) fn to_ground(
     lines: &[Line],
     source_map: &SourceMap,
@@ -62,7 +64,7 @@ fn down(lines: &[Line], which: &[usize], by: f64, keying: Keying) -> Vec<Splice>
     chosen.filter_map(|(at, line)| Some(set(at, moved(line, DVec3::NEG_Y * tidy(by), keying)?))).collect()
 }
 
-/// How far some objects fall before they meet others or the height 0; less than 0 where they are below it.
+/// Returns the distance that objects fall until they touch others or the height 0. Negative if they are below it.
 fn fall(scene: &Scene, own: Vec<Object>, others: Vec<Object>) -> Option<f64> {
     let around = bounds(&own)?;
     let size = around.high - around.low;
@@ -71,7 +73,7 @@ fn fall(scene: &Scene, own: Vec<Object>, others: Vec<Object>) -> Option<f64> {
     below.objects = others.into();
     let mut middle = around.center();
     let mut half = 0.5 * size.max(DVec3::splat(1e-9 * size.length()));
-    // Where nothing is below.
+    // The distance if no object is below.
     let ground = around.low.y;
     let mut least: Option<f64> = None;
     for _ in 0..ROUNDS {
@@ -84,7 +86,7 @@ fn fall(scene: &Scene, own: Vec<Object>, others: Vec<Object>) -> Option<f64> {
     Some(least.unwrap_or(ground))
 }
 
-/// The least distance between undersides and what is below them, over a square, and where it is.
+/// Returns the smallest distance between undersides and the surfaces below them within a square, and its position.
 fn nearest(own: &Scene, below: &Scene, middle: DVec3, half: DVec3, low: f64) -> Option<(Option<f64>, DVec3)> {
     let step = |at: usize| at as f64 / ((SIDE - 1) as f64 / 2.0) - 1.0;
     let starts: Vec<DVec3> = (0..SIDE * SIDE)

@@ -1,7 +1,7 @@
-//! Which lines of a script a frame is made of: the line of each object that the tracer numbers, of the lights, and of
-//! what is set.
+//! The map from a frame to lines of its script: the line of each of the tracer's objects, of the lights,
+//! and of the settings.
 //!
-//! A group that is used is as many objects of the tracer as it draws, and one line: that of its `Use`.
+//! A used group is as many of the tracer's objects as it draws, but one line: that of its `Use`.
 
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
@@ -12,45 +12,45 @@ use crate::line::Line;
 use crate::tables::{Role, role};
 use crate::values::Values;
 
-/// The number of a `Use` that scales; 0 hides what it draws.
+/// The index of the scale of a `Use`; the scale 0 hides the group.
 const SCALE: usize = 6;
 
 /// The lines of a frame, from 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct SourceMap {
-    /// Those of its objects and of the groups that it uses, in the tracer's order.
+    /// The lines of its objects and of the groups that it uses, in the tracer's order.
     pub(crate) objects: Vec<usize>,
-    /// How many objects of the tracer there are up to each of these lines, and with it.
+    /// For each of these lines, the number of the tracer's objects up to and including it.
     drawn: Vec<usize>,
-    /// Those of its lights.
+    /// The lines of its lights.
     pub(crate) lights: Vec<usize>,
-    /// That of its camera; none where there is only the camera that holds until one is set.
+    /// The line of its camera; `None` if it has the default camera.
     pub(crate) camera: Option<usize>,
-    /// That of its size.
+    /// The line of its size.
     pub(crate) screen: Option<usize>,
-    /// That of its background.
+    /// The line of its background.
     pub(crate) background: Option<usize>,
-    /// That of the `Clear` that it begins with.
+    /// The line of the `Clear` with which it begins.
     cleared: Option<usize>,
-    /// That of its numbers of frames.
+    /// The line of its frame numbers.
     pub(crate) frames: Option<usize>,
-    /// That of its `Trace`; where it is missing new lines go to the end.
+    /// The line of its `Trace`. If it is missing, new lines go to the end.
     pub(crate) trace: Option<usize>,
-    /// From `Group` to `End`, up to its `Trace`.
+    /// The groups up to its `Trace`, each from `Group` to `End`.
     groups: Vec<RangeInclusive<usize>>,
 }
 
-/// Groups as they are read.
+/// The groups read so far.
 #[derive(Default)]
 struct Groups {
-    /// How many objects each draws.
+    /// The number of objects that each group draws.
     drawn: HashMap<String, usize>,
     open: Option<(usize, String, usize)>,
 }
 
 impl SourceMap {
-    /// The lines of frame `frame` of a script, counted from 0, as it is at a time. Beyond the last `Trace`: what stands at the
-    /// end.
+    /// Makes the map of frame `frame` of a script, counted from 0, at a time. Beyond the last `Trace` it is the
+    /// state at the end.
     pub(crate) fn of(lines: &[Line], frame: usize, time: f64) -> Self {
         let mut source_map = Self::default();
         let mut groups = Groups::default();
@@ -101,7 +101,7 @@ impl SourceMap {
         source_map
     }
 
-    /// An object, or what a group draws, in the group that is open or in the picture.
+    /// Adds an object or a used group, to the open group or to the picture.
     fn draw(&mut self, groups: &mut Groups, line: usize, count: usize) {
         match &mut groups.open {
             Some((_, _, drawn)) => *drawn = drawn.saturating_add(count),
@@ -112,23 +112,23 @@ impl SourceMap {
         }
     }
 
-    /// How many objects the tracer has.
+    /// Returns the number of the tracer's objects.
     pub(crate) fn object_count(&self) -> usize {
         self.drawn.last().copied().unwrap_or(0)
     }
 
-    /// The line of an object of the tracer.
+    /// Returns the line of one of the tracer's objects.
     pub(crate) fn line_of(&self, object: usize) -> Option<usize> {
         self.objects.get(self.drawn.partition_point(|&end| end <= object)).copied()
     }
 
-    /// Whether a line stands in the definition of a group.
+    /// Returns whether a line is in the definition of a group.
     pub(crate) fn is_in_group(&self, line: usize) -> bool {
         let at = self.groups.partition_point(|group| *group.end() < line);
         self.groups.get(at).is_some_and(|group| group.contains(&line))
     }
 
-    /// Where a new object or light of this frame goes: behind what it has, in front of its `Trace`.
+    /// Returns the line for a new object or light of this frame: after its existing ones and before its `Trace`.
     pub(crate) fn end(&self, lines: &[Line]) -> usize {
         let groups = self.groups.last().map(|group| group.end());
         let set = self.camera.iter().chain(&self.screen).chain(&self.background).chain(&self.cleared);
@@ -141,7 +141,7 @@ impl SourceMap {
     }
 }
 
-/// How many frames a `Trace` is behind a `Frames`.
+/// Returns the number of frames of a `Trace` after a `Frames` line.
 fn frames(line: &Line) -> Option<usize> {
     let values = Values::of(line, 1.0)?;
     let whole =

@@ -13,7 +13,7 @@ use crate::tables::{Role, role};
 use crate::view::Projection;
 
 impl Session {
-    /// Makes changes of the file that is shown, as one step.
+    /// Changes the shown file, as one step.
     pub(super) fn edit(
         &mut self,
         project: &mut Project,
@@ -29,13 +29,13 @@ impl Session {
         if splices.is_empty() {
             return;
         }
-        // Several splices are one step also where there is no gesture.
+        // Several splices are one step even without a gesture.
         let gesture = gesture.unwrap_or_else(|| self.next_gesture());
         let done = project.files[file].apply(splices, Some(gesture));
         self.send_splices(done, tell);
     }
 
-    /// The pointer's gestures are even.
+    /// Returns a new gesture. Those of the pointer are even.
     pub(super) fn next_gesture(&mut self) -> u64 {
         self.gestures += 1;
         self.gestures << 1
@@ -91,7 +91,7 @@ impl Session {
         self.outline(project, tell);
     }
 
-    /// Lines become a group, which is selected then.
+    /// Makes a group of lines and selects it.
     pub(super) fn group(&mut self, project: &mut Project, lines: &[usize], tell: &mut ServerMessage) {
         let shown = self.shown(project);
         let Some(scene) = self.sound_scene(project) else { return };
@@ -105,7 +105,7 @@ impl Session {
         }
     }
 
-    /// A group is taken apart; its lines are selected then.
+    /// Takes a group apart and selects its lines.
     pub(super) fn ungroup(&mut self, project: &mut Project, line: usize, tell: &mut ServerMessage) {
         match groups::ungroup(self.file_lines(project), line) {
             Ok((splices, place)) => {
@@ -117,12 +117,12 @@ impl Session {
         }
     }
 
-    /// Whether a line cannot be taken hold of in the picture.
+    /// Returns whether a line cannot be dragged in the picture.
     pub(super) fn is_locked(&self, project: &Project, line: usize) -> bool {
         self.locked.contains(&(self.place(project).file, line))
     }
 
-    /// The lines of the file that is shown which cannot be taken hold of.
+    /// Returns the lines of the shown file that cannot be dragged.
     pub(super) fn locked_lines(&self, project: &Project) -> Vec<usize> {
         let file = self.place(project).file;
         self.locked.iter().filter(|(of, _)| *of == file).map(|(_, line)| *line).collect()

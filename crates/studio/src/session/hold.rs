@@ -1,4 +1,4 @@
-//! What the pointer holds, from its press to its release.
+//! The object that the pointer holds, from its press to its release.
 
 use glam::DVec2;
 
@@ -10,12 +10,12 @@ use crate::project::Project;
 use crate::protocol::{Navigation, ServerMessage};
 use crate::view::Projection;
 
-/// What the pointer holds.
+/// The object that the pointer holds.
 #[derive(Debug)]
 pub(super) enum Held {
-    /// Lines.
+    /// Lines, with the point where the drag started.
     Drag(Drag, DVec2),
-    /// The free camera; where the pointer was last.
+    /// The free camera, with the last position of the pointer.
     Turn(DVec2),
     /// Keys of the timeline.
     Keys(HeldKeys),

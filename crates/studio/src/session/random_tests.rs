@@ -1,4 +1,4 @@
-//! Whatever a page wishes, in whatever order: undoing all of it gives the bytes that were there.
+//! Random messages of a page: undoing all of them restores the original bytes.
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
@@ -9,13 +9,13 @@ use crate::handles::DragOptions;
 use crate::protocol::{LineState, Navigation, Source, Switch, TimelineEdit, ViewPreset};
 use crate::tracks::KeyPlace;
 
-/// Lines of all kinds, with both ends of lines, a byte-order mark, and no end of the last.
+/// Lines of all kinds, with both line ends, a byte-order mark, and no end of the last line.
 const TEXT: &str = "\u{feff}# a scene\r\nScreen 48 27\nLook 0 2 8  0 0 0  40\r\nIlight 1 1 1 .5 -1 -.3 # sun\n\n\
                     Material grey diffuse .5 .5 (1:.5 50:.2)\n\tSphere 1.0 , 0 (smooth 1:1 9:2) 0  .1 .1 .1 .9 .2 .2   # ball\n\
                     Box -3 -1 -3 3 0 3 grey\nGroup table\nCylinder .5  0 0 0  0 1 0  grey\nEnd\nUse table  2.5 0 0 # one\n\
                     Frames 9\nTrace\n# \u{20ac} no command\nClear\nTrace";
 
-/// How many wishes in all.
+/// The total number of messages.
 const WISHES: usize = 10_000;
 
 fn number() -> impl Strategy<Value = f64> {
@@ -146,7 +146,7 @@ fn ten_thousand_wishes_and_undos_end_in_the_same_bytes() {
             let mut changes = 0;
             for wish in wishes {
                 let before = desk.text();
-                let told = format!("{wish:?}");
+                let shown = format!("{wish:?}");
                 let tell = desk.ask(wish).tell;
                 changes += usize::from(desk.text() != before);
                 if let Some(lines) = tell.lines {
@@ -155,7 +155,7 @@ fn ten_thousand_wishes_and_undos_end_in_the_same_bytes() {
                 for splice in tell.splices {
                     page.splice(splice.at..splice.at + splice.removed, splice.lines);
                 }
-                prop_assert_eq!(&page, &desk.session.lines(&desk.project), "the page knows all of {}", told);
+                prop_assert_eq!(&page, &desk.session.lines(&desk.project), "the page knows all of {}", shown);
             }
             prop_assert!(changes > 50, "{} changes", changes);
             let (edited, mut steps) = (desk.text(), 0);

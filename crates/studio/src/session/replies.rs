@@ -1,4 +1,4 @@
-//! What the page is told: how everything stands, and which lines have changed.
+//! The replies to the page: the state, and the changed lines.
 
 use rayfold_scene::{Command, Scene};
 
@@ -18,7 +18,7 @@ use crate::view::Projection;
 
 impl Session {
     pub(super) fn answer(&mut self, project: &Project, mut tell: ServerMessage, change: Change) -> Answer {
-        // An outline is that of a picture: with another one it is drawn anew, or goes while things move.
+        // An outline belongs to a picture. With another picture it is recomputed, or removed while the picture moves.
         match change {
             Change::Still if tell.outline.is_none() => self.outline(project, &mut tell),
             Change::Moving if tell.outline.is_none() => tell.outline = Some(String::new()),
@@ -48,7 +48,7 @@ impl Session {
             }
         };
         if change != Change::Nothing {
-            // What was outlined may look otherwise now.
+            // The outline of the object under the pointer may have changed.
             self.hovered = None;
         }
         tell.tracks = self.new_tracks(project);
@@ -122,13 +122,13 @@ impl Session {
         self.file_lines(project).iter().map(line_state).collect()
     }
 
-    /// What is selected, locked and copied stays with its lines.
+    /// Adds changes of lines to the reply. Moves the selection, the locks and the copied keys along with their lines.
     pub(super) fn send_splices(&mut self, splices: Vec<Splice>, tell: &mut ServerMessage) {
         let file = self.shown_file;
         if splices.iter().any(|splice| splice.removed != splice.inserted.len())
             && !matches!(self.held, Some(Held::Turn(_)))
         {
-            // What is held stands elsewhere now.
+            // The held object may have another line now.
             self.held = None;
         }
         for splice in &splices {
@@ -154,7 +154,7 @@ impl Session {
     }
 }
 
-/// Where a line is after a change; `None` if it has gone.
+/// Returns the index of a line after a change, or `None` if it was removed.
 fn after(splice: &Splice, line: usize) -> Option<usize> {
     let (end, inserted) = (splice.at + splice.removed, splice.inserted.len());
     if line < splice.at || line < end && inserted == splice.removed {

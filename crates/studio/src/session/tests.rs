@@ -1,4 +1,4 @@
-//! A page's wishes, without a browser.
+//! Messages of a page, without a browser.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use crate::handles::{DragOptions, Handle, HandleKind};
 use crate::protocol::{Source, State};
 use crate::view::Projection;
 
-/// A page and the script that it has open.
+/// A page and its open script.
 pub(super) struct Desk {
     _folder: tempfile::TempDir,
     path: PathBuf,
@@ -36,7 +36,7 @@ impl Desk {
         String::from_utf8(self.project.files[0].document.bytes()).unwrap()
     }
 
-    /// What the file holds.
+    /// Returns the content of the file.
     pub(super) fn on_disk(&self) -> String {
         fs::read_to_string(&self.path).unwrap()
     }
@@ -45,7 +45,7 @@ impl Desk {
         self.ask(ClientMessage::Hover { x: -1.0, y: -1.0 }).tell.state.unwrap()
     }
 
-    /// Where the object of a line is seen.
+    /// Returns a point of the picture that shows the object of a line.
     pub(super) fn seen(&mut self, line: usize) -> DVec2 {
         let scene = self.session.scene(&self.project).unwrap();
         for y in (0..scene.screen.height()).step_by(4) {
@@ -242,7 +242,7 @@ fn handles_lead_to_the_numbers_of_the_line() {
     assert!(text.contains("\nBox -3 -1 -3 3 0.") && text.contains(" 3 0 0 0 .5 .5 .5\n"), "{text}");
 }
 
-/// All example scenes: whichever object of the first script is moved, the difference is its line.
+/// In all example scenes: if any object of the first script is moved, only its line differs.
 #[test]
 fn touching_one_object_of_each_example_changes_its_line_alone() {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
@@ -283,7 +283,7 @@ fn a_huge_script_is_edited_line_by_line() {
     let mut desk = Desk::new(&text);
     let answer = desk.ask(ClientMessage::Set { line: 50_000, first: 1, values: vec![7.5], gesture: Some(1) });
     assert!(answer.picture.is_some() && answer.tell.lines.is_none());
-    assert_eq!(answer.tell.splices.len(), 1, "what is told is small");
+    assert_eq!(answer.tell.splices.len(), 1, "the reply is small");
     assert_eq!(answer.tell.splices[0].lines.len(), 1);
     desk.ask(ClientMessage::Undo);
     assert_eq!(desk.text(), text);
@@ -320,7 +320,7 @@ fn a_copy_under_a_new_name_is_shown_and_the_old_one_stays() {
         session.ask(&mut project, ClientMessage::Load { from: Source::Shown, new: Some("b.txt".into()) });
     let state = answer.tell.state.unwrap();
     assert_eq!((state.file, state.frame, state.frames), (1, 1, 3));
-    assert_eq!(answer.tell.lines.unwrap().len(), TEXT.split('\n').count(), "its lines are told");
+    assert_eq!(answer.tell.lines.unwrap().len(), TEXT.split('\n').count(), "the reply has its lines");
     assert_eq!(answer.tell.files.unwrap().len(), 3);
     assert_eq!(fs::read_to_string(folder.path().join("b.txt")).unwrap(), TEXT);
     session.ask(&mut project, ClientMessage::Text { line: 0, text: "# b".into() });

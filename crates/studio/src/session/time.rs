@@ -1,4 +1,4 @@
-//! Time: keys and what is done with them, the frame that is shown, and where things are at others.
+//! The timeline: edits of keys, the shown frame, and the selection at other frames.
 
 use std::fmt::Write;
 
@@ -21,31 +21,31 @@ use crate::tracks::{self, Tracks};
 use crate::values::{Keying, Values, curve};
 use crate::view::Projection;
 
-/// Frames of a script, at most, that the page asks for.
+/// The largest number of frames that the page may set.
 const FRAMES: u32 = 1_000_000;
 
-/// Places of a motion path, at most.
+/// The largest number of points of a motion path.
 const PLACES: usize = 400;
 
-/// How many ghosts before the frame that is shown, and behind it.
+/// The number of ghosts before the shown frame, and after it.
 const GHOSTS: i64 = 2;
 
-/// Parts that the frames are divided into by ghosts.
+/// The number of parts into which ghosts divide the frames.
 const PARTS: i64 = 12;
 
 impl Session {
-    /// The time of the frame that is shown.
+    /// Returns the time of the shown frame.
     pub(super) fn time(&self, project: &Project) -> f64 {
         self.shown(project).time
     }
 
-    /// How a change is written that is made now.
+    /// Returns the way in which a change at the shown frame is written.
     pub(super) fn keying(&self, project: &Project) -> Keying {
         let (first, _) = self.range(project);
         Keying { time: self.time(project), first: first.into(), auto: self.auto_key, whole: false }
     }
 
-    /// The frames of the `Trace` that is shown.
+    /// Returns the frames of the shown `Trace`.
     fn range(&self, project: &Project) -> (u32, u32) {
         let place = self.place(project);
         let script = project.files[place.file].script.as_ref();
@@ -123,7 +123,7 @@ impl Session {
             }
         };
         self.edit(project, splices, None, tell);
-        // There may be fewer now.
+        // There may be fewer frames now.
         self.show(project, self.frame, tell);
         self.outline(project, tell);
         Change::Still
@@ -145,7 +145,7 @@ impl Session {
         }
     }
 
-    /// The tracks, if the page knows others.
+    /// Returns the tracks if they have changed since they were sent.
     pub(super) fn new_tracks(&mut self, project: &Project) -> Option<Tracks> {
         let tracks = project.files[self.place(project).file].tracks();
         if self.tracks.as_ref() == Some(tracks) {
@@ -155,7 +155,7 @@ impl Session {
         self.tracks.clone()
     }
 
-    /// The parameters of a line, as they are now.
+    /// Returns the current parameters of a line.
     pub(super) fn inspected(&self, project: &Project, at: usize) -> Option<Inspected> {
         let line = self.line(project, at)?;
         let time = self.time(project);
@@ -184,7 +184,7 @@ impl Session {
         })
     }
 
-    /// The way of what is selected, and where its keys are, as paths of an SVG.
+    /// Returns the motion path of the selection and its keys, as SVG paths.
     pub(super) fn motion_path(
         &self,
         project: &Project,
@@ -216,7 +216,7 @@ impl Session {
         for place in places {
             let seen = place.and_then(|place| projection.point(place));
             if let Some(at) = seen {
-                // Writing to a text cannot fail.
+                // Writing to a string cannot fail.
                 let _ = write!(way, "{}{:.1} {:.1}", if is_open { 'L' } else { 'M' }, at.x, at.y);
             }
             is_open = seen.is_some();
@@ -232,7 +232,7 @@ impl Session {
         (way, marks)
     }
 
-    /// Outlines of what is selected at other frames, seen from where one looks now.
+    /// Returns outlines of the selection at other frames, in the current view.
     pub(super) fn ghosts(&self, project: &Project) -> Vec<Ghost> {
         let place = self.place(project);
         let file = &project.files[place.file];
@@ -265,7 +265,7 @@ impl Session {
     }
 }
 
-/// The parameters of a material's clauses, as they stand in its line.
+/// Returns the parameters of a material's clauses, in the order of its line.
 fn clause_fields(line: &Line) -> Vec<FieldTable> {
     let mut fields: Vec<FieldTable> = Vec::new();
     for slot in tracks::slots(line) {

@@ -31,7 +31,7 @@ fn key(line: usize, number: usize, frame: f64) -> KeyPlace {
     KeyPlace { line, number, frame }
 }
 
-/// The only line that differs.
+/// Returns the only line that differs.
 fn changed(desk: &Desk) -> String {
     let text = desk.text();
     let new: Vec<_> = text.split('\n').zip(TEXT.split('\n')).filter(|(new, old)| new != old).collect();
@@ -171,7 +171,7 @@ fn several_become_a_group_and_undo_takes_it_back() {
     desk.ask(ClientMessage::Undo);
     assert_eq!(desk.text(), TEXT);
     let answer = desk.ask(ClientMessage::Group { lines: vec![0, 3] });
-    assert!(answer.tell.notice.is_some_and(|told| told.contains("select some first")));
+    assert!(answer.tell.notice.is_some_and(|notice| notice.contains("select some first")));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What is seen: the scene of the viewport, what lies under a point of it, and from where it is looked at.
+//! The viewport: its scene, the object under a point of it, and its camera.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -17,23 +17,23 @@ use crate::protocol::{Navigation, ServerMessage, ViewPreset};
 use crate::silhouette::View;
 use crate::view::{Bounds, Orbit, Projection};
 
-/// Pixels of a picture, at most.
+/// The largest number of pixels of a picture.
 pub(super) const PIXELS: u64 = 8 << 20;
 
-/// Lines of the grid in each direction from the middle.
+/// The number of grid lines in each direction from the middle.
 const GRID: i32 = 10;
 
-/// Pieces of the horizon all around.
+/// The number of pieces of the whole horizon.
 const HORIZON: i32 = 72;
 
-/// How far away the horizon is, in widths of the grid from its middle.
+/// The distance of the horizon from the middle of the grid, in widths of the grid.
 const FAR: f64 = 1e6;
 
-/// What lies so many pixels away is not in the picture.
+/// A point at least this many pixels away is not in the picture.
 const BEYOND: f64 = 1e5;
 
 impl Session {
-    /// What the viewport shows.
+    /// Returns the scene in the viewport.
     pub(super) fn scene(&self, project: &Project) -> Option<Scene> {
         let mut scene = self.shown(project).scene.clone()?;
         let (width, height) = (f64::from(self.size.0), f64::from(self.size.1));
@@ -53,14 +53,14 @@ impl Session {
         Some(scene)
     }
 
-    /// What becomes of it while its shutter is open.
+    /// Returns the motion of the scene while its shutter is open.
     pub(super) fn motion(&self, project: &Project, scene: &Scene) -> Option<Motion> {
         let place = self.place(project);
         let script = project.files[place.file].script.as_ref().filter(|_| scene.shutter.open() > 0.0)?;
         Some(Motion { script: Arc::clone(script), frame: place.frame, is_free: self.free.is_some() })
     }
 
-    /// The same, if its objects are those of the lines.
+    /// Returns the scene if its objects are those of the lines.
     pub(super) fn sound_scene(&self, project: &Project) -> Option<Scene> {
         let is_sound = project.files[self.place(project).file].is_sound();
         let count = self.shown(project).source_map.object_count();
@@ -77,7 +77,7 @@ impl Session {
         shown.bounds().or_else(lamps).unwrap_or(Bounds { low: DVec3::splat(-1.0), high: DVec3::splat(1.0) })
     }
 
-    /// Where what is selected is.
+    /// Returns the bounds of the selection.
     fn selected_bounds(&self, project: &Project) -> Option<Bounds> {
         let (shown, chosen) = (self.shown(project), self.chosen());
         let objects = self.sound_scene(project).and_then(|scene| {
@@ -92,24 +92,24 @@ impl Session {
         objects.or_else(|| edits::places(lights.collect::<Vec<_>>(), shown.time))
     }
 
-    /// What is selected, to be looked up.
+    /// Returns the selected lines as a set.
     pub(super) fn chosen(&self) -> HashSet<usize> {
         self.selection.iter().copied().collect()
     }
 
-    /// Where lights without a place are shown.
+    /// Returns the point where lights without a position are shown.
     pub(super) fn around(&self, project: &Project) -> DVec3 {
         self.free.map_or_else(|| self.bounds(project).center(), |orbit| orbit.target)
     }
 
-    /// What a pixel spans in the middle of the scene, as a power of ten.
+    /// Returns the extent of a pixel in the middle of the scene, as a power of ten.
     pub(super) fn step(&self, project: &Project) -> f64 {
         let pixel = self.scene(project).map(|scene| Projection::new(&scene).pixel_at(self.around(project)));
         let pixel = pixel.filter(|pixel| pixel.is_normal()).unwrap_or(0.01);
         10f64.powi(pixel.log10().floor().clamp(-12.0, 12.0) as i32)
     }
 
-    /// The line of the object under a point of the picture, and where it was hit.
+    /// Returns the line of the object under a point of the picture, and the point that was hit.
     pub(super) fn pick(&self, project: &Project, x: f64, y: f64) -> Option<(usize, DVec3)> {
         let shown = self.shown(project);
         let scene = self.sound_scene(project)?;
@@ -123,7 +123,7 @@ impl Session {
         (!self.is_locked(project, line)).then(|| (line, origin + found.distance * direction))
     }
 
-    /// The outline of some lines' objects.
+    /// Returns the outline of the objects of some lines.
     fn outline_of(&self, project: &Project, is_in: impl Fn(usize) -> bool) -> Option<String> {
         let shown = self.shown(project);
         if !shown.source_map.objects.iter().any(|&line| is_in(line)) {
@@ -134,7 +134,7 @@ impl Session {
         view.outline(|object| shown.source_map.line_of(object).is_some_and(&is_in)).ok()
     }
 
-    /// What is under the pointer now, and its outline, if that is something else than before.
+    /// Adds the line under the pointer to the reply, and its outline if that has changed.
     pub(super) fn hover(&mut self, project: &Project, x: f64, y: f64, tell: &mut ServerMessage) {
         let line = self.pick(project, x, y).map(|(line, _)| line);
         tell.hovered = Some(line);
@@ -167,7 +167,7 @@ impl Session {
         self.free = Some(orbit);
     }
 
-    /// A free camera where one looks from now.
+    /// Returns the free camera, or one at the current view.
     pub(super) fn orbit(&self, project: &Project) -> Option<Orbit> {
         let scene = self.scene(project)?;
         Some(self.free.unwrap_or_else(|| Orbit::from_camera(&scene.camera, self.bounds(project))))
@@ -190,7 +190,7 @@ impl Session {
         };
     }
 
-    /// Looks from here at what is seen there, if that is something.
+    /// Turns the camera to the object under a point, if there is one.
     pub(super) fn aim(&mut self, project: &Project, at: Option<DVec2>) {
         let target = at.and_then(|at| self.pick(project, at.x, at.y)).map(|(_, point)| point);
         self.free = self.orbit(project).map(|orbit| match target {
@@ -222,19 +222,19 @@ impl Session {
     }
 }
 
-/// A scene of another frame as it is seen now.
+/// Returns the scene of another frame with the current camera and screen.
 pub(super) fn picture_of(scene: Scene, now: &Scene) -> Scene {
     Scene { screen: now.screen, camera: now.camera, ..scene }
 }
 
-/// A size of a picture, smaller than asked for where that is too large.
+/// Returns a screen of this size, or a smaller one if it would be too large.
 fn fitted(width: f64, height: f64) -> Option<Screen> {
     let scale = (PIXELS as f64 / (width * height)).sqrt().min(1.0);
     let side = |side: f64| (side * scale).round().max(1.0) as u32;
     Screen::new(side(width), side(height)).ok()
 }
 
-/// The numbers of `Camera`, rounded to what can be seen.
+/// Returns the numbers of `Camera`, rounded to a visible precision.
 fn camera_numbers(camera: &Pinhole, step: f64) -> Vec<f64> {
     let decimals = |step: f64| (-step.log10()).ceil().clamp(0.0, 12.0) as usize;
     let round = |x: f64, decimals: usize| format!("{x:.decimals$}").parse().unwrap_or(x);
@@ -250,7 +250,7 @@ fn camera_numbers(camera: &Pinhole, step: f64) -> Vec<f64> {
     numbers
 }
 
-/// Lines on the height 0 around a scene, and the horizon.
+/// Returns grid lines on the height 0 around a scene, and the horizon.
 pub(super) fn grid_path(projection: &Projection, bounds: Bounds) -> String {
     let step = 10f64.powf((bounds.radius() / 4.0).log10().round());
     let reach = step * f64::from(GRID);
@@ -260,7 +260,7 @@ pub(super) fn grid_path(projection: &Projection, bounds: Bounds) -> String {
     for line in -GRID..=GRID {
         let off = step * f64::from(line);
         for flip in [false, true] {
-            // In pieces: one that goes behind the eye is left out.
+            // In pieces: one that reaches behind the eye is left out.
             for piece in -GRID..GRID {
                 let (from, to) = (step * f64::from(piece), step * f64::from(piece + 1));
                 let ends = if flip { (at(off, from), at(off, to)) } else { (at(from, off), at(to, off)) };
