@@ -1,6 +1,7 @@
-//! The commands of the language, and which is meant by a misspelt one.
+//! The commands of the language, and the correction of misspelt ones.
 //!
-//! The one list of them: each refers to its [`Form`], which stands with what the command makes.
+//! This is the only list of commands. Each refers to its [`Form`], which is defined beside the type
+//! that the command makes.
 
 use std::fmt;
 
@@ -11,28 +12,28 @@ use crate::model::{
     Torus, Triangle, USE,
 };
 
-/// What a command does.
+/// The effect of a command.
 #[derive(Clone, Copy)]
 pub(crate) enum Effect {
     /// Sets the size of the image.
     Screen,
     /// Sets the camera.
     Camera(Reader<Camera>),
-    /// Sets what a ray sees that hits nothing.
+    /// Sets the colour of rays that hit nothing.
     Background,
     /// Sets the lens.
     Lens,
-    /// Sets the rays of a pixel.
+    /// Sets the number of rays per pixel.
     Samples,
-    /// Sets how long a frame is exposed.
+    /// Sets the exposure time of a frame.
     Shutter,
-    /// Sets how colours become levels.
+    /// Sets the conversion of colours to levels.
     Tone,
-    /// Sets how many bounces are followed.
+    /// Sets the largest number of bounces.
     Depth,
-    /// Sets which frames a `Trace` is.
+    /// Sets the frame numbers of a `Trace`.
     Frames,
-    /// Names a material.
+    /// Defines a named material.
     Material,
     /// Starts a group.
     Group,
@@ -50,14 +51,14 @@ pub(crate) enum Effect {
     Trace,
 }
 
-/// From the numbers of a line; all that is wrong with them.
+/// A function that makes an item from the numbers of a line, or returns all errors in them.
 pub(crate) type Reader<T> = fn(&mut Numbers<'_>) -> Result<T, Faults>;
 
 fn read<T: Scripted + Into<U>, U>(numbers: &mut Numbers<'_>) -> Result<U, Faults> {
     T::read(numbers).map(Into::into)
 }
 
-/// Defines [`Command`] from its names, so that the list of all is whole.
+/// Defines [`Command`] from its names, so that the list of all commands is complete.
 macro_rules! commands {
     ($($command:ident: $form:expr, $effect:expr, $summary:literal;)*) => {
         /// A command of the scene language.
@@ -67,24 +68,24 @@ macro_rules! commands {
         }
 
         impl Command {
-            /// All of them, in the order of the documentation.
+            /// All commands, in the order of the documentation.
             pub const ALL: &[Self] = &[$(Self::$command,)*];
 
-            /// How it is written.
+            /// Returns the syntax of the command.
             pub const fn form(self) -> &'static Form {
                 match self {
                     $(Self::$command => &const { $form },)*
                 }
             }
 
-            /// What it is for, in a few words.
+            /// Returns a one-line summary of the command.
             pub const fn summary(self) -> &'static str {
                 match self {
                     $(Self::$command => $summary,)*
                 }
             }
 
-            /// What it does.
+            /// Returns the effect of the command.
             pub(crate) const fn effect(self) -> Effect {
                 match self {
                     $(Self::$command => $effect,)*
@@ -134,7 +135,7 @@ impl fmt::Display for Command {
     }
 }
 
-/// The most numbers that a command takes.
+/// The largest number of numbers of a command.
 pub(crate) const MAX_NUMBERS: usize = {
     let (mut most, mut i) = (0, 0);
     while i < Command::ALL.len() {
@@ -145,8 +146,8 @@ pub(crate) const MAX_NUMBERS: usize = {
     most
 };
 
-/// The commands by the first letters of their names, each letter's as a chain: the place in [`Command::ALL`] of the first,
-/// and behind each the next; `NONE` ends a chain.
+/// An index of the commands by the first letter of their names. Each letter has a chain: `first` is the index in
+/// [`Command::ALL`] of its first command, and `next` that of the one after each. `NONE` ends a chain.
 struct Index {
     first: [u8; 26],
     next: [u8; Command::ALL.len()],
@@ -154,7 +155,7 @@ struct Index {
 
 const NONE: u8 = u8::MAX;
 
-/// So that a line's command is found with a comparison or two.
+/// With this index, the command of a line is found with one or two comparisons.
 const INDEX: Index = {
     let mut index = Index { first: [NONE; 26], next: [NONE; Command::ALL.len()] };
     let mut i = Command::ALL.len();
@@ -168,12 +169,12 @@ const INDEX: Index = {
 };
 
 impl Command {
-    /// Its name.
+    /// Returns the name of the command.
     pub const fn name(self) -> &'static str {
         self.form().name
     }
 
-    /// The command of this name, in any letter case.
+    /// Returns the command with this name, in any letter case.
     pub fn from_name(name: &str) -> Option<Self> {
         let letter = name.bytes().next()?.to_ascii_lowercase().wrapping_sub(b'a');
         let first = *INDEX.first.get(usize::from(letter))?;
@@ -181,13 +182,13 @@ impl Command {
             std::iter::successors(Some(first), |place| INDEX.next.get(usize::from(*place)).copied())
                 .map_while(|place| Self::ALL.get(usize::from(place)).copied())
         };
-        // Most write it as the documentation does, which is compared faster.
+        // Most scripts use the documentation's letter case, which is compared faster.
         chain().find(|c| c.name() == name).or_else(|| chain().find(|c| c.name().eq_ignore_ascii_case(name)))
     }
 
-    /// The command that was probably meant: a slip or two away, or cut short.
+    /// Returns the command that was probably meant: one with a similar name, or one that starts with `name`.
     pub(crate) fn nearest(name: &str) -> Option<Self> {
-        // Longer than that and it is no slip; the distance is quadratic in the length.
+        // A longer word is no typo, and the distance takes quadratic time.
         if name.len() > 40 {
             return None;
         }

@@ -1,6 +1,6 @@
-//! Scene scripts to typed scenes and back, with every diagnostic.
+//! Parser and writer of scene scripts: text to typed scenes and back, with all diagnostics.
 //!
-//! Knows no other crate of the project and does no I/O: text comes in, trees and diagnostics go out.
+//! Knows no other crate of the project and does no I/O: text comes in, scenes and diagnostics go out.
 //!
 //! ```
 //! use rayfold_scene::{Limits, parse};

@@ -1,6 +1,6 @@
-//! The numbers of a line as they stand in a script, each still or a curve, and which conditions they surely keep.
+//! The numbers of a line, each constant or a curve, and the proof that they satisfy constraints.
 //!
-//! Knows forms, but neither what a command makes of the numbers nor where they stand in a text.
+//! Knows forms, but neither the effect of the numbers nor their places in a text.
 
 use std::fmt::{self, Formatter};
 use std::sync::Arc;
@@ -17,11 +17,11 @@ pub(crate) enum Number {
     Animated(Curve),
 }
 
-/// The numbers of a line, shared by all that keep them.
+/// The numbers of a line, shared by all users.
 #[derive(Clone, Debug)]
 pub(crate) struct Row(Arc<[Number]>);
 
-/// The least and the greatest value of a number over some time.
+/// The least and the greatest value of a number in an interval.
 type Range = (f64, f64);
 
 impl Row {
@@ -29,7 +29,7 @@ impl Row {
         Self(numbers.into())
     }
 
-    /// How many were written.
+    /// Returns the number of written numbers.
     pub(crate) fn len(&self) -> usize {
         self.0.len()
     }
@@ -42,7 +42,7 @@ impl Row {
         &self.0
     }
 
-    /// The values at a time; 0 for those that were not written.
+    /// Returns the values at a time; 0 for omitted ones.
     pub(crate) fn at(&self, frame: f64) -> [f64; MAX_NUMBERS] {
         let mut values = [0.0; MAX_NUMBERS];
         for (value, number) in values.iter_mut().zip(self.0.iter()) {
@@ -51,7 +51,7 @@ impl Row {
         values
     }
 
-    /// A bound on the absolute value of number `i` at any time; `None` if it was not written.
+    /// Returns a bound on the absolute value of number `i` at any time, or `None` if it was omitted.
     pub(crate) fn largest(&self, i: usize) -> Option<f64> {
         self.0.get(i).map(|number| match number {
             Number::Constant(value) => value.abs(),
@@ -59,8 +59,8 @@ impl Row {
         })
     }
 
-    /// Whether everything that `form` demands surely holds from one time to another. Where it says no it may hold
-    /// nevertheless. Adds to `work` how many keys were looked at.
+    /// Returns whether the numbers provably satisfy all constraints of `form` in an interval. If not, they may
+    /// satisfy them nevertheless. Adds the number of visited keys to `work`.
     pub(crate) fn provably_satisfies(&self, form: &Form, from: f64, to: f64, work: &mut usize) -> bool {
         let mut ranges = [(0.0, 0.0); MAX_NUMBERS];
         for (range, number) in ranges.iter_mut().zip(self.0.iter()) {
@@ -71,7 +71,7 @@ impl Row {
         }
         let field = |i: usize| &ranges[form.span(i)];
         let alone = (0..form.fields.len()).all(|i| {
-            // What was left out keeps every condition.
+            // An omitted number satisfies every constraint.
             form.span(i).start >= self.len() || keeps(form.fields[i].values, field(i))
         });
         alone && form.constraints.iter().all(|constraint| self.keeps_constraint(form, *constraint, &field))
@@ -100,7 +100,7 @@ impl Row {
         }
     }
 
-    /// As they stand in a line, each behind a blank; words for those that stand for words.
+    /// Writes the numbers as in a line, each after a space. Numbers that represent words are written as words.
     pub(crate) fn write(&self, f: &mut Formatter<'_>) -> fmt::Result {
         for number in self.0.iter() {
             f.write_str(" ")?;
@@ -152,13 +152,13 @@ fn times(a: Range, b: Range) -> Range {
     )
 }
 
-/// Whether two directions are far from parallel, whatever they are in their ranges: by more than a thousand times
-/// what is taken for parallel, which rounding here cannot hide.
+/// Returns whether two directions are far from parallel for all values in their ranges: by more than a thousand times
+/// the tolerance for parallel, which exceeds all rounding errors here.
 fn provably_cross(a: &[Range], b: &[Range]) -> bool {
     let largest =
         |v: &[Range]| v.iter().fold(0.0, |most: f64, (low, high)| most.max(low.abs()).max(high.abs()));
     let (size_a, size_b) = (largest(a), largest(b));
-    // Products of others may overflow or vanish.
+    // Products of other sizes may overflow or underflow.
     let sensible = |size: f64| (1e-100..1e100).contains(&size);
     if !sensible(size_a) || !sensible(size_b) {
         return false;

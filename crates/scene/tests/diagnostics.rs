@@ -1,13 +1,13 @@
-//! What people read about a script with faults, word for word.
+//! The diagnostics of scripts with faults, word for word.
 //!
-//! After a deliberate change `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews what is expected.
+//! After a deliberate change, `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews the expected texts.
 
-mod told;
+mod diagnostic_text;
 
 use expect_test::expect;
 use rayfold_scene::Limits;
 
-use told::{check, check_limited};
+use diagnostic_text::{check, check_limited};
 
 #[test]
 fn a_misspelt_command() {
@@ -345,7 +345,7 @@ fn a_gaze_along_the_view_up() {
 
 #[test]
 fn an_orbit_s_eye_above_the_target_but_for_rounding() {
-    // cos 90° as programs write it.
+    // The cosine of 90° as programs write it.
     for eye in ["3.06e-16 5 0", "0 -5 3.06e-16"] {
         let script = format!("Screen 4 3\nLook {eye} 0 0 0 40\nTrace");
         let parsed = rayfold_scene::parse("a.txt", script.as_bytes(), &rayfold_scene::Limits::default());

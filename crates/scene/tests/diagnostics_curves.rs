@@ -1,13 +1,13 @@
-//! What people read about curves, frames and settings with faults, word for word.
+//! The diagnostics of curves, frames and settings with faults, word for word.
 //!
-//! After a deliberate change `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews what is expected.
+//! After a deliberate change, `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews the expected texts.
 
-mod told;
+mod diagnostic_text;
 
 use expect_test::expect;
 use rayfold_scene::Limits;
 
-use told::{check, check_limited};
+use diagnostic_text::{check, check_limited};
 
 #[test]
 fn a_radius_that_is_negative_at_a_frame() {
@@ -91,7 +91,7 @@ fn an_eye_that_passes_over_the_target() {
     let rayfold_scene::Camera::Look(middle) = camera(1) else { panic!("a look") };
     let (right, up, _) = middle.basis();
     assert_eq!((right.to_array(), up.to_array()), ([1.0, 0.0, 0.0], [0.0, 0.0, -1.0]));
-    // Before and behind it y is up, as anywhere on the way.
+    // Before and after it, y is up, as elsewhere on the way.
     for (frame, side) in [(0, 1.0), (2, -1.0)] {
         let rayfold_scene::Camera::Look(look) = camera(frame) else { panic!("a look") };
         assert!((look.basis().1.x - side).abs() < 0.1, "{frame}");
@@ -568,7 +568,7 @@ fn more_frames_than_the_limit() {
 #[test]
 fn more_frames_than_can_be_looked_at() {
     let limits = Limits { max_frames: Some(usize::MAX), ..Limits::default() };
-    // The radii all but meet at every frame.
+    // The radii nearly meet at every frame.
     check_limited(
         "Screen 4 3\nTorus (cycle 0:1 .1:2 .3:1) (cycle 0:.9999999999999 .1:1.9999999999999 .3:.9999999999999) 0 0 -5 0 1 0 1 \
          0 0 0 0 0\nFrames 4000000000\nTrace",

@@ -1,13 +1,13 @@
-//! What people read about materials and groups with faults, word for word.
+//! The diagnostics of materials and groups with faults, word for word.
 //!
-//! After a deliberate change `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews what is expected.
+//! After a deliberate change, `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews the expected texts.
 
-mod told;
+mod diagnostic_text;
 
 use expect_test::expect;
 use rayfold_scene::Limits;
 
-use told::{check, check_limited};
+use diagnostic_text::{check, check_limited};
 
 #[test]
 fn a_material_that_is_not_there() {

@@ -1,4 +1,4 @@
-//! Clauses: what a `Material` says of a surface.
+//! The clauses of a `Material`.
 
 use glam::DVec3;
 
@@ -7,30 +7,30 @@ use super::material::{Coefficients, Finish, Glass, Material, Pattern, Shine, Wei
 use super::surface::{AMBIENT, DIFFUSE, MIRROR};
 use crate::form::{Constraint, Field, Form, Kind, Names, Numbers, Presence, Subject, Values};
 
-/// The command that names a material.
+/// The command that defines a material.
 pub(crate) const MATERIAL: Form = Form::new("Material", &[]).with_subject(Subject::Defines(Names::Materials));
 
-/// Defines [`Clause`] from its names, so that the list of all is whole.
+/// Defines [`Clause`] from its names, so that the list of all clauses is complete.
 macro_rules! clauses {
     ($($clause:ident: $form:expr, $summary:literal;)*) => {
-        /// What a `Material` can say of a surface, each at most once.
+        /// A clause of a `Material`, each at most once.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Clause {
             $(#[doc = $summary] $clause,)*
         }
 
         impl Clause {
-            /// All of them, in the order of the documentation.
+            /// All clauses, in the order of the documentation.
             pub const ALL: &[Self] = &[$(Self::$clause,)*];
 
-            /// How it is written.
+            /// Returns the syntax of the clause.
             pub const fn form(self) -> &'static Form {
                 match self {
                     $(Self::$clause => &const { $form },)*
                 }
             }
 
-            /// What it says, in a few words.
+            /// Returns a one-line summary of the clause.
             pub const fn summary(self) -> &'static str {
                 match self {
                     $(Self::$clause => $summary,)*
@@ -69,23 +69,23 @@ clauses! {
 }
 
 impl Clause {
-    /// Its name.
+    /// Returns the name of the clause.
     pub const fn name(self) -> &'static str {
         self.form().name
     }
 
-    /// The clause of this name, in any letter case.
+    /// Returns the clause with this name, in any letter case.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|c| c.name().eq_ignore_ascii_case(name))
     }
 
-    /// Whether it is a pattern, of which a material has at most one.
+    /// Returns whether the clause is a pattern. A material has at most one.
     pub(crate) fn is_pattern(self) -> bool {
         self.form().ends_with.is_some()
     }
 }
 
-/// A material that is put together from its clauses.
+/// A material that is assembled from its clauses.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Clauses {
     ambient: DVec3,
@@ -95,7 +95,7 @@ pub(crate) struct Clauses {
 }
 
 impl Clauses {
-    /// Adds a clause; `other` is the material that a pattern names.
+    /// Adds a clause. `other` is the material that a pattern names.
     pub(crate) fn add(
         &mut self,
         clause: Clause,
@@ -120,7 +120,7 @@ impl Clauses {
         Ok(())
     }
 
-    /// The whole.
+    /// Returns the assembled material.
     pub(crate) fn material(self) -> Result<Material, InvalidValue> {
         let coefficients = Coefficients::new(self.ambient, self.diffuse, self.mirror)?;
         Ok(Material::finished(coefficients, self.finish))

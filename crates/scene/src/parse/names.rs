@@ -1,29 +1,29 @@
-//! The names of materials and groups: which there are, which are referred to, and which was probably meant.
+//! The names of materials and groups: definitions, references, and corrections of misspelt names.
 
 use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::report::Line;
 
-/// How many names are compared with one that is unknown, in a whole script: far more than a person gives, few enough
-/// that a large script in which every name is unknown takes no longer than another.
+/// The largest number of names that are compared with unknown ones in a whole script: far more than a person defines,
+/// and few enough that a large script with only unknown names takes no longer than another.
 const MAX_COMPARED: usize = 1 << 20;
 
-/// The things of one kind that have names.
+/// The named items of one kind.
 pub(super) struct Names<'a, T> {
     numbers: HashMap<&'a str, usize>,
     all: Vec<Named<'a, T>>,
     compared: usize,
 }
 
-/// A thing with a name.
+/// A named item and its definition.
 pub(super) struct Named<'a, T> {
     pub(super) name: &'a str,
     pub(super) line: Line<'a>,
-    /// Of the name in the line.
+    /// The range of the name in the line.
     pub(super) span: Range<usize>,
     pub(super) is_used: bool,
-    /// `None` where its definition is faulty.
+    /// The item, or `None` if its definition is faulty.
     pub(super) value: Option<T>,
 }
 
@@ -32,10 +32,10 @@ impl<'a, T> Names<'a, T> {
         Self { numbers: HashMap::new(), all: Vec::new(), compared: 0 }
     }
 
-    /// Gives a name.
+    /// Defines a name.
     ///
     /// # Errors
-    /// The line in which it was given before.
+    /// Returns the line in which the name was defined before.
     pub(super) fn define(
         &mut self,
         name: &'a str,
@@ -52,12 +52,12 @@ impl<'a, T> Names<'a, T> {
         Ok(number)
     }
 
-    /// The line in which a name was given.
+    /// Returns the line in which a name was defined.
     pub(super) fn line_of(&self, name: &str) -> Option<usize> {
         self.numbers.get(name).map(|&i| self.all[i].line.number)
     }
 
-    /// The number of what has this name, which from now on is used.
+    /// Returns the number of a named item, and marks it as used.
     pub(super) fn refer(&mut self, name: &str) -> Option<usize> {
         let number = *self.numbers.get(name)?;
         self.all[number].is_used = true;
@@ -76,9 +76,9 @@ impl<'a, T> Names<'a, T> {
         &self.all
     }
 
-    /// The name that was probably meant: a slip or two away, also in letter case.
+    /// Returns the name that was probably meant: one with a similar spelling, in any letter case.
     pub(super) fn nearest(&mut self, name: &str) -> Option<&'a str> {
-        // Longer than that and it is no slip; the distance is quadratic in the length.
+        // A longer word is no typo, and the distance takes quadratic time.
         if name.len() > 40 {
             return None;
         }

@@ -1,4 +1,4 @@
-//! Doubts about a picture as a whole: what screen, camera and lens are together.
+//! Warnings about a picture as a whole, from the combination of screen, camera and lens.
 
 use std::ops::Range;
 
@@ -10,16 +10,16 @@ use crate::report::{Line, Report};
 use crate::row::Number;
 use crate::script::Value;
 
-/// Screen, camera and lens as they stand, as far as they can be odd together.
+/// The current screen, camera and lens, as far as warnings depend on their combination.
 #[derive(Default)]
 pub(super) struct Picture<'a> {
-    /// The corners of the window of a `Camera`, and where they stand.
+    /// The corners of the window of a `Camera`, with their place.
     window: Option<(Line<'a>, Range<usize>, [f64; 4])>,
     /// Whether the window was compared with the screen.
     is_compared: bool,
     is_orthographic: bool,
     has_camera: bool,
-    /// A lens with a radius that no picture was drawn with.
+    /// A lens with a radius with which no picture was rendered.
     lens: Option<(Line<'a>, Range<usize>)>,
 }
 
@@ -59,7 +59,7 @@ impl<'a> Picture<'a> {
         self.lens = (!is_point).then(|| s.place());
     }
 
-    /// What is odd about the picture that is drawn now, each thing once.
+    /// Reports warnings about the picture that is rendered now, each only once.
     pub(super) fn check(&mut self, screen: Screen, report: &mut Report<'a>) {
         if (self.is_orthographic || !self.has_camera)
             && let Some((line, span)) = self.lens.take()

@@ -1,10 +1,10 @@
-//! When lines with curves are seen, and whether they are in order then.
+//! Checks animated lines in the frames in which they are visible.
 //!
-//! A condition on one number must hold from the first opening of the shutter that sees it to the last closing, which
-//! the curve's ends and keys decide. Conditions on several must hold at each frame's opening, middle and closing. Few
-//! frames are looked at for that: where the ranges of the numbers say that a condition holds over a stretch of frames
-//! they are done, else its halves are looked at, and at last a frame. The work is counted over the whole script
-//! ([`MAX_WORK`]), so that no number of frames takes longer than about a second.
+//! A constraint on one number must hold from the first shutter opening that uses the line to the last closing; the
+//! ends and keys of the curve decide that. Constraints on several numbers must hold at each frame's opening, middle
+//! and closing. Whole ranges of frames are checked at once by the ranges of their numbers. If these do not prove a
+//! constraint, the halves of the range are checked, and finally single frames. The work is counted over the whole
+//! script ([`MAX_WORK`]), so that no number of frames takes longer than about a second.
 
 use std::ops::Range;
 
@@ -17,41 +17,41 @@ use crate::model::{
 use crate::report::{Line, Report};
 use crate::row::{Number, Row};
 
-/// Keys of curves that are looked at, stretch of frames by stretch of frames, in a whole script.
+/// The largest number of keys that are visited, over all ranges of frames in a script.
 const MAX_WORK: usize = 1 << 24;
 
-/// Reading a line counts as much as so many keys.
+/// The number of keys that count as much as reading a line.
 const READING: usize = 32;
 
-/// What a `Trace` is, to those that it sees.
+/// The frames and the shutter of one `Trace`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Exposure {
     pub(super) numbers: FrameNumbers,
-    /// The shutter's share of a frame.
+    /// The open share of the shutter in a frame.
     pub(super) open: f64,
 }
 
-/// When something is seen.
+/// The time in which a line is visible.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct VisibleSpan {
-    /// From the first opening to the last closing.
+    /// The time of the first opening; `to` is that of the last closing.
     pub(super) from: f64,
     pub(super) to: f64,
-    /// The first and the last `Trace` that sees it, those between maybe.
+    /// The Traces from the first to the last that render it. Those between may not.
     traces: Range<usize>,
 }
 
 /// A line, or a part of it, with curves.
 pub(super) struct Animated<'a> {
     pub(super) line: Line<'a>,
-    /// Of each of its numbers.
+    /// The range of each of its numbers in the line.
     pub(super) spans: Vec<Range<usize>>,
     pub(super) row: Row,
     pub(super) origin: Origin,
     pub(super) visible_span: Option<VisibleSpan>,
 }
 
-/// What the numbers belong to.
+/// The item to which the numbers belong.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Origin {
     Command(Command),
@@ -68,7 +68,7 @@ impl Exposure {
     }
 }
 
-/// The last Traces of some, more and more of them.
+/// The last Traces of a script, extended step by step.
 pub(super) struct Suffix<'e> {
     exposures: &'e [Exposure],
     start: usize,
@@ -76,12 +76,12 @@ pub(super) struct Suffix<'e> {
 }
 
 impl<'e> Suffix<'e> {
-    /// None of these.
+    /// Starts with no Traces.
     pub(super) fn of(exposures: &'e [Exposure]) -> Self {
         Self { exposures, start: exposures.len(), visible_span: None }
     }
 
-    /// What those from number `start` on see; it never grows from call to call.
+    /// Returns the visible span of the Traces from number `start` on. `start` must not grow from call to call.
     pub(super) fn from(&mut self, start: usize) -> Option<&VisibleSpan> {
         for i in (start..self.start).rev() {
             let exposure = &self.exposures[i];
@@ -93,7 +93,7 @@ impl<'e> Suffix<'e> {
     }
 }
 
-/// What is seen then too.
+/// Extends a span to include another.
 pub(super) fn join(visible_span: &mut Option<VisibleSpan>, also: Option<&VisibleSpan>) {
     match (visible_span.as_mut(), also) {
         (_, None) => {}
@@ -118,7 +118,7 @@ impl Origin {
         }
     }
 
-    /// What is wrong with these numbers.
+    /// Returns the errors in these numbers.
     fn faults(self, numbers: &mut Numbers<'_>) -> Option<Faults> {
         use crate::form::Scripted;
         match self {
@@ -146,7 +146,7 @@ impl Origin {
     }
 }
 
-/// Looks at all lines with curves at the times at which they are seen.
+/// Checks all lines with curves at the times at which they are visible.
 pub(super) fn check(moving: &[Animated<'_>], exposures: &[Exposure], report: &mut Report<'_>) {
     let mut work = 0;
     for line in moving {
@@ -160,7 +160,7 @@ pub(super) fn check(moving: &[Animated<'_>], exposures: &[Exposure], report: &mu
 }
 
 impl Animated<'_> {
-    /// The conditions on one number; whether all hold.
+    /// Checks the constraints on single numbers. Returns whether all hold.
     fn check_alone(&self, visible_span: &VisibleSpan, report: &mut Report<'_>) -> bool {
         let form = self.origin.form();
         let mut good = true;
@@ -175,7 +175,7 @@ impl Animated<'_> {
                 }
             });
             let Some(mut wrong) = wrong else { continue };
-            // A whole frame says more to a person than the moment before a cycle starts again.
+            // A whole frame is easier to understand than the moment before a cycle restarts.
             let frames = [wrong.frame.round(), wrong.frame.floor(), wrong.frame.ceil()];
             let whole = frames.into_iter().find(|frame| {
                 (visible_span.from..=visible_span.to).contains(frame) && is_wrong(curve.at(*frame))
@@ -192,7 +192,7 @@ impl Animated<'_> {
         good
     }
 
-    /// All conditions, frame by frame where nothing shorter decides.
+    /// Checks all constraints, frame by frame if no range proves them.
     fn check_together(&self, exposures: &[Exposure], work: &mut usize, report: &mut Report<'_>) {
         let form = self.origin.form();
         for exposure in exposures {
@@ -219,7 +219,7 @@ impl Animated<'_> {
         }
     }
 
-    /// Whether something is wrong at one of some times; the first is told.
+    /// Returns whether a constraint fails at one of some times. Reports the first.
     fn is_faulty_at(&self, frames: &[f64], report: &mut Report<'_>) -> bool {
         let form = self.origin.form();
         for &frame in frames {

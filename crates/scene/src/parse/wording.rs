@@ -1,4 +1,4 @@
-//! What a person is told about a fault in a script: what is wrong, what was expected, what to do.
+//! The messages about faults in a script: the problem, the expected text, and advice.
 
 use super::curve::CurveFault;
 use super::number::{self, NumberFault};
@@ -11,7 +11,7 @@ use crate::model::{Clause, InvalidValue, Lint, Screen};
 use crate::report::Fault;
 use crate::shown::{grouped, nearest, quoted};
 
-/// What `Trace` is for.
+/// The help text about `Trace`.
 const TRACE_HELP: &str = "`Trace` renders a frame of everything that stands before it";
 
 pub(super) fn too_large(limit: usize) -> Fault {
@@ -49,7 +49,7 @@ pub(super) fn unknown_command(name: &str, nearest: Option<Command>) -> Fault {
         .help(help)
 }
 
-/// About `word`, which stands in the place of `parameter`; `is_surface` where a material's name could, alone.
+/// Describes `word` in place of `parameter`. `is_surface`: a material's name alone is allowed there.
 pub(super) fn bad_number(fault: NumberFault, parameter: &str, word: &str, is_surface: bool) -> Fault {
     match fault {
         NumberFault::TooLarge => Fault::new(Code::NumberTooLarge, format!("{} is too large", quoted(word)))
@@ -68,9 +68,9 @@ pub(super) fn bad_number(fault: NumberFault, parameter: &str, word: &str, is_sur
     }
 }
 
-/// What a slip of the keyboard or of another program would explain.
+/// Explains a typo or the number format of another program.
 fn hint(word: &str) -> Option<String> {
-    // Longer words are no slips.
+    // Longer words are no typos.
     if word.len() > 100 {
         return None;
     }
@@ -92,13 +92,14 @@ fn hint(word: &str) -> Option<String> {
     None
 }
 
-/// `comma` is a parameter that was probably written with a comma for a point.
+/// Describes missing parameters. `comma` is a parameter that was probably written with a decimal comma.
 pub(super) fn too_few(command: Command, words: &Words, comma: Option<&str>) -> Fault {
     let (missing, _) = command.form().number(words.count());
     miscounted(Code::TooFewParameters, command, words, comma).expected(format!("expected `{missing}` here"))
 }
 
-/// `first` is the first word that is too much; `comma` a parameter that was probably written with a comma for a point.
+/// Describes extra parameters. `first` is the first of them, and `comma` a parameter that was probably written
+/// with a decimal comma.
 pub(super) fn too_many(command: Command, words: &Words, first: &str, comma: Option<&str>) -> Fault {
     let fault =
         miscounted(Code::TooManyParameters, command, words, comma).expected("expected the end of the line");
@@ -121,7 +122,7 @@ fn miscounted(code: Code, command: Command, words: &Words, comma: Option<&str>) 
     })
 }
 
-/// How many parameters a command takes.
+/// Describes the number of parameters of a command.
 fn counts_of(form: &Form) -> String {
     let counts: Vec<_> = form.counts().collect();
     let (first, last) = (counts[0], counts[counts.len() - 1]);
@@ -141,7 +142,7 @@ fn counts_of(form: &Form) -> String {
     }
 }
 
-/// About a number that was probably written with a comma for a point.
+/// Describes a number that was probably written with a decimal comma.
 pub(super) fn decimal_comma(comma: &str) -> Fault {
     Fault::new(Code::DecimalComma, format!("{} is two numbers", quoted(comma)))
         .expected(format!("expected {}, or a blank behind the comma", quoted(&comma.replace(',', "."))))
@@ -153,7 +154,7 @@ fn two_numbers(comma: &str) -> String {
     format!("a comma separates numbers: if {} is to be one, it is {}", quoted(comma), quoted(&one))
 }
 
-/// `word` is the first of the numbers that it is about, in the place of `name` of `field`.
+/// Describes an invalid value. `word` is the first of its numbers, in place of `name` of `field`.
 pub(super) fn invalid(fault: InvalidValue, name: &str, field: &Field, word: &str) -> Fault {
     if let InvalidValue::NotWhole(_, least, most) = fault {
         return not_whole(least, most, name, field, word);
@@ -166,7 +167,7 @@ pub(super) fn invalid(fault: InvalidValue, name: &str, field: &Field, word: &str
     Fault::new(Code::InvalidValue, fault.to_string()).expected(expectation(fault))
 }
 
-/// At a time, in a line with curves.
+/// Describes a value of a line with curves that is invalid at a time.
 pub(super) fn invalid_at(fault: InvalidValue, frame: f64) -> Fault {
     Fault::new(Code::InvalidValue, format!("{fault}, which fails at frame {frame}"))
         .expected(format!("{} at frame {frame}", expectation(fault)))
@@ -207,7 +208,7 @@ fn not_whole(least: u32, most: u32, name: &str, field: &Field, word: &str) -> Fa
         .expected(format!("expected `{name}`, a whole number {range}"))
 }
 
-/// About a curve that stands where `parameter` does.
+/// Describes an error in the curve in place of `parameter`.
 pub(super) fn curve(fault: CurveFault, parameter: &str) -> Fault {
     let malformed = |message: String| Fault::new(Code::MalformedCurve, message);
     let modes = || Mode::ALL.iter().map(|mode| mode.name()).chain([CYCLE]);
@@ -251,14 +252,13 @@ pub(super) fn curve(fault: CurveFault, parameter: &str) -> Fault {
     }
 }
 
-/// A curve where none may stand.
+/// Describes a curve where none is allowed.
 pub(super) fn unwanted_curve(command: Command, parameter: &str) -> Fault {
     Fault::new(Code::UnwantedCurve, format!("`{command}` takes no curves"))
         .expected(format!("expected `{parameter}`, a number"))
 }
 
-/// A curve has a value that `field` does not take.
-/// It is seen `from` one time `to` another.
+/// Describes a value of a curve that `field` does not allow. The curve is visible `from` one time `to` another.
 pub(super) fn wrong_at(field: &Field, moment: Moment, from: f64, to: f64) -> Fault {
     let Moment { frame, value } = moment;
     let takes = match field.values {
@@ -279,14 +279,14 @@ pub(super) fn wrong_at(field: &Field, moment: Moment, from: f64, to: f64) -> Fau
         .expected(format!("expected {takes} {when}"))
 }
 
-/// The conditions of a line with curves would take too long to look at.
+/// Reports that checking the constraints of a line with curves would take too long.
 pub(super) fn too_much_work() -> Fault {
     Fault::new(Code::LimitExceeded, "too many frames to see whether this is in order in each of them")
         .expected("expected fewer frames, or curves that stay away from what is not allowed")
         .help("split the frames among several scripts")
 }
 
-/// `word` is none of the words that `field` takes.
+/// Describes a `word` that `field` does not allow.
 pub(super) fn no_such_word(word: &str, words: &[&str], field: &Field) -> Fault {
     let fault = Fault::new(Code::InvalidValue, format!("{} is no {}", quoted(word), field.names[0]))
         .expected(format!("expected {}", words.join(" or ")));
@@ -296,12 +296,12 @@ pub(super) fn no_such_word(word: &str, words: &[&str], field: &Field) -> Fault {
     }
 }
 
-/// `a`, `b`, `c`.
+/// Joins words to a list: `a`, `b`, `c`.
 fn listed<'a>(words: impl Iterator<Item = &'a str>) -> String {
     words.map(|word| format!("`{word}`")).collect::<Vec<_>>().join(", ")
 }
 
-/// How a name looks.
+/// The help text about names.
 const NAME_HELP: &str = "a name is a letter or `_`, then letters, digits, `_` and `-`";
 
 pub(super) fn no_name(command: Command, names: Names) -> Fault {
@@ -323,7 +323,8 @@ pub(super) fn bad_name(word: &str, names: Names) -> Fault {
         .help(NAME_HELP)
 }
 
-/// `later` is the line in which it is given; `nearest` was perhaps meant.
+/// Describes an unknown name. `later` is the line in which it is defined, and `nearest` a name that
+/// may have been meant.
 pub(super) fn unknown_name(names: Names, name: &str, later: Option<usize>, nearest: Option<&str>) -> Fault {
     let noun = names.noun();
     let message = match later {
@@ -344,7 +345,7 @@ pub(super) fn uses_itself(name: &str) -> Fault {
         .expected("expected a group that is defined before this")
 }
 
-/// `first` is the line in which it was given before.
+/// Describes a second definition. `first` is the line of the first one.
 pub(super) fn defined_twice(names: Names, name: &str, first: usize) -> Fault {
     let noun = names.noun();
     Fault::new(Code::DuplicateName, format!("there is a {noun} {} already, in line {first}", quoted(name)))
@@ -383,7 +384,7 @@ pub(super) fn clause_twice(clause: Clause, first: Clause) -> Fault {
     Fault::new(Code::DuplicateClause, message).expected("expected another clause")
 }
 
-/// `found` numbers are there, the one called `name` is missing.
+/// Describes a clause with `found` numbers, of which the one called `name` is missing.
 pub(super) fn clause_too_short(clause: Clause, name: &str, found: usize) -> Fault {
     let found = if found == 0 { "none".to_string() } else { found.to_string() };
     let takes = counts_of(clause.form());
@@ -408,7 +409,7 @@ pub(super) fn end_without_group() -> Fault {
         .expected("expected a `Group` before this")
 }
 
-/// The group started in line `number`.
+/// Describes a command that is not allowed in the group that started in line `number`.
 pub(super) fn not_in_group(command: Command, name: &str, number: usize) -> Fault {
     Fault::new(Code::Misplaced, format!("`{command}` cannot stand in a group"))
         .expected("expected an object, `Use` or `End`")
@@ -429,7 +430,7 @@ pub(super) fn lens_without_effect() -> Fault {
         .expected("expected a `Look` or `Camera` beside this")
 }
 
-/// `better` is a window that would not.
+/// Warns of pixels that are not square. `better` is a window with square pixels.
 pub(super) fn non_square_pixels(screen: Screen, better: [f64; 4]) -> Fault {
     let better: Vec<_> = better.iter().map(|x| short(*x)).collect();
     Fault::new(Code::SquashedImage, "the picture is squashed: a ball is no circle in it")
@@ -437,12 +438,12 @@ pub(super) fn non_square_pixels(screen: Screen, better: [f64; 4]) -> Fault {
         .help(format!("write for example `{}`", better.join(" ")))
 }
 
-/// A number to six digits.
+/// Formats a number with six digits.
 fn short(x: f64) -> String {
     format!("{x:.5e}").parse::<f64>().unwrap_or(x).to_string()
 }
 
-/// More frames than a script may be.
+/// Describes more frames than the limit of a script.
 pub(super) fn too_many_frames(frames: u64, limit: u64) -> Fault {
     let more = if frames == limit + 1 {
         "this is one more".to_string()
@@ -461,9 +462,9 @@ pub(super) fn too_many_pixels(pixels: u64, limit: u64) -> Fault {
         .help("make the image smaller or raise the limit")
 }
 
-/// With the last `added` there are `count`.
+/// Describes a limit that is exceeded. The last `added` items make the total `count`.
 pub(super) fn beyond_limit(added: usize, count: usize, limit: usize, what: &str) -> Fault {
-    let told = grouped(limit as u64);
+    let limit_text = grouped(limit as u64);
     let more = if added == 1 && count == limit + 1 {
         "this is one more".to_string()
     } else if count == usize::MAX {
@@ -471,8 +472,8 @@ pub(super) fn beyond_limit(added: usize, count: usize, limit: usize, what: &str)
     } else {
         format!("with this there are {}", grouped(count as u64))
     };
-    Fault::new(Code::LimitExceeded, format!("more than {told} {what}"))
-        .expected(format!("expected at most {told}, {more}"))
+    Fault::new(Code::LimitExceeded, format!("more than {limit_text} {what}"))
+        .expected(format!("expected at most {limit_text}, {more}"))
 }
 
 pub(super) fn no_screen() -> Fault {
