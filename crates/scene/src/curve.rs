@@ -64,9 +64,9 @@ impl Mode {
     /// Returns a one-line summary of the mode.
     pub(crate) fn summary(self) -> &'static str {
         match self {
-            Self::Linear => "In straight lines from key to key.",
-            Self::Smooth => "Without corners; it eases in and out, and never overshoots a key.",
-            Self::Step => "The value of the last key stays.",
+            Self::Linear => "Straight lines from key to key.",
+            Self::Smooth => "A smooth curve that eases in and out and never overshoots a key.",
+            Self::Step => "The value of the last key until the next one.",
         }
     }
 }

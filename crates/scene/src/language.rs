@@ -119,7 +119,10 @@ pub struct ModeEntry {
 /// Returns the table of the whole language.
 pub fn language() -> Language {
     let modes = Mode::ALL.iter().map(|mode| ModeEntry { name: mode.name(), about: mode.summary() });
-    let cycle = ModeEntry { name: CYCLE, about: "It starts again at its last key; beside another mode." };
+    let cycle = ModeEntry {
+        name: CYCLE,
+        about: "The curve restarts at its last key; can be combined with another mode.",
+    };
     Language {
         version: VERSION,
         commands: Command::ALL.iter().map(|c| entry(c.form(), c.summary())).collect(),

@@ -686,7 +686,7 @@ fn what_a_clear_removes_before_a_trace_has_no_effect() {
               |
               = help: `Trace` renders a frame of everything that stands before it
 
-            warning: the picture is squashed: a ball is no circle in it
+            warning: the pixels are not square: a sphere looks like an ellipse
              --> a.txt:3:29
               |
             3 | Camera 0 0 5 0 0 -1 0 1 0 1 -1 -1 1 1
@@ -724,24 +724,24 @@ fn a_comma_as_decimal_sign() {
     check(
         "Screen 4 3\nSphere 1,5 0 0 -5 1 0 0 0 0 0 # as 1.5\nTrace",
         expect![[r#"
-        warning: `1,5` is two numbers
-         --> a.txt:2:8
-          |
-        2 | Sphere 1,5 0 0 -5 1 0 0 0 0 0 # as 1.5
-          |        ^^^ expected `1.5`, or a blank behind the comma
-          |
-          = help: the decimal sign is a point, a comma separates numbers"#]],
+            warning: `1,5` is read as two numbers
+             --> a.txt:2:8
+              |
+            2 | Sphere 1,5 0 0 -5 1 0 0 0 0 0 # as 1.5
+              |        ^^^ expected `1.5`, or a space after the comma
+              |
+              = help: the decimal sign is a point, a comma separates numbers"#]],
     );
     check(
         "Screen 4 3\nSphere 1 -0,5 0 -5 1,5 0 0 0 0 0,25\nTrace",
         expect![[r#"
-        warning: `-0,5` is two numbers
-         --> a.txt:2:10
-          |
-        2 | Sphere 1 -0,5 0 -5 1,5 0 0 0 0 0,25
-          |          ^^^^ expected `-0.5`, or a blank behind the comma
-          |
-          = help: the decimal sign is a point, a comma separates numbers"#]],
+            warning: `-0,5` is read as two numbers
+             --> a.txt:2:10
+              |
+            2 | Sphere 1 -0,5 0 -5 1,5 0 0 0 0 0,25
+              |          ^^^^ expected `-0.5`, or a space after the comma
+              |
+              = help: the decimal sign is a point, a comma separates numbers"#]],
     );
 }
 

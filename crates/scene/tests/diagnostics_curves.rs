@@ -152,7 +152,7 @@ fn brackets() {
              --> a.txt:2:8
               |
             2 | Sphere (1:0 25:3 0 0 -5 1 0 0 0 0 0
-              |        ^ expected a `)` behind this, on the same line
+              |        ^ expected a `)` after this, on the same line
 
             error: `)` is not a number
              --> a.txt:3:9
@@ -168,7 +168,7 @@ fn brackets() {
             4 | Sphere () 0 0 -5 1 0 0 0 0 0
               |        ^^ expected frames and values of `R`, such as `1:0 25:3`
 
-            error: `(` fits nowhere
+            error: unexpected `(` in a curve
              --> a.txt:5:13
               |
             5 | Sphere (1:1 (2:2)) 0 0 -5 1 0 0 0 0
@@ -197,7 +197,7 @@ fn modes() {
     check(
         "Screen 4 3\nSphere (smoth 1:1 2:2) 0 0 -5 1 0 0 0 0 0\nSphere (wild 1:1 2:2) 0 0 -5 1 0 0 0 0 0\nSphere (smooth step 1:1 2:2) 0 0 -5 1 0 0 0 0 0\nSphere (1:1 cycle 2:2) 0 0 -5 1 0 0 0 0 0\nSphere (cycle 1:1) 0 0 -5 1 0 0 0 0 0\nTrace",
         expect![[r#"
-            error: `smoth` is no mode of a curve
+            error: unknown curve mode `smoth`
              --> a.txt:2:9
               |
             2 | Sphere (smoth 1:1 2:2) 0 0 -5 1 0 0 0 0 0
@@ -205,7 +205,7 @@ fn modes() {
               |
               = help: did you mean `smooth`?
 
-            error: `wild` is no mode of a curve
+            error: unknown curve mode `wild`
              --> a.txt:3:9
               |
             3 | Sphere (wild 1:1 2:2) 0 0 -5 1 0 0 0 0 0
@@ -213,7 +213,7 @@ fn modes() {
               |
               = help: the modes are `linear`, `smooth`, `step`, `cycle`
 
-            error: `step` stands too late, or twice
+            error: `step` must come before the keys, and only once
              --> a.txt:4:16
               |
             4 | Sphere (smooth step 1:1 2:2) 0 0 -5 1 0 0 0 0 0
@@ -221,7 +221,7 @@ fn modes() {
               |
               = help: a curve starts with at most one of `linear`, `smooth`, `step`, and `cycle`
 
-            error: `cycle` stands too late, or twice
+            error: `cycle` must come before the keys, and only once
              --> a.txt:5:13
               |
             5 | Sphere (1:1 cycle 2:2) 0 0 -5 1 0 0 0 0 0
@@ -242,7 +242,7 @@ fn keys() {
     check(
         "Screen 4 3\nSphere (1:1 25:3 17:2) 0 0 -5 1 0 0 0 0 0\nSphere (1 1 2 2) 0 0 -5 1 0 0 0 0 0\nSphere (1:) 0 0 -5 1 0 0 0 0 0\nSphere (1:1e999) 0 0 -5 1 0 0 0 0 0\nSphere (.:1) 0 0 -5 1 0 0 0 0 0\nTrace",
         expect![[r#"
-            error: frame 17 does not come behind frame 25
+            error: frame 17 must be greater than frame 25
              --> a.txt:2:18
               |
             2 | Sphere (1:1 25:3 17:2) 0 0 -5 1 0 0 0 0 0
@@ -252,13 +252,13 @@ fn keys() {
              --> a.txt:3:9
               |
             3 | Sphere (1 1 2 2) 0 0 -5 1 0 0 0 0 0
-              |         ^ expected `:` and `R` behind this frame
+              |         ^ expected `:` and `R` after this frame
 
             error: a key lacks its value
              --> a.txt:4:9
               |
             4 | Sphere (1:) 0 0 -5 1 0 0 0 0 0
-              |         ^ expected `:` and `R` behind this frame
+              |         ^ expected `:` and `R` after this frame
 
             error: `1e999` is too large
              --> a.txt:5:11
@@ -283,7 +283,7 @@ fn a_curve_that_overflows() {
              --> a.txt:2:11
               |
             2 | Sphere 1 (1:-1e308 2:1e308) 0 -5 1 0 0 0 0 0
-              |           ^^^^^^^^^^^^^^^^ expected values that are nearer to each other, or frames that are not so near"#]],
+              |           ^^^^^^^^^^^^^^^^ expected values closer together, or keys further apart"#]],
     );
 }
 
@@ -518,7 +518,7 @@ fn a_squashed_picture() {
     check(
         "Screen 640 480\nCamera 0 0 5 0 0 -1 0 1 0 1 -1 -1 1 1\nTrace\nTrace\nCamera 0 0 5 0 0 -1 0 1 0 1 -.4 -.3 .4 .3\nTrace",
         expect![[r#"
-            warning: the picture is squashed: a ball is no circle in it
+            warning: the pixels are not square: a sphere looks like an ellipse
              --> a.txt:2:29
               |
             2 | Camera 0 0 5 0 0 -1 0 1 0 1 -1 -1 1 1
@@ -574,11 +574,11 @@ fn more_frames_than_can_be_looked_at() {
          0 0 0 0 0\nFrames 4000000000\nTrace",
         limits,
         expect![[r#"
-            error: too many frames to see whether this is in order in each of them
+            error: too many frames to check this line in every frame
              --> a.txt:2:7
               |
             2 | Torus (cycle 0:1 .1:2 .3:1) (cycle 0:.9999999999999 .1:1.9999999999999 .3:.9999999999999) 0 0 -5 0 1 0 1 0…
-              |       ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^ expected fewer frames, or curves that stay away from what is not allowed
+              |       ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^ expected fewer frames, or curves that stay well within the allowed range
               |
               = help: split the frames among several scripts"#]],
     );

@@ -125,7 +125,7 @@ fn clauses() {
     check(
         "Screen 4 3\nMaterial a\nMaterial b difuse 1 0 0 shine 1 1 1 9\nMaterial c colour 1 0 0\nMaterial d diffuse 1 0 0 diffuse 0 1 0\nMaterial e shine 1 1 diffuse 0 0 0\nMaterial f diffuse 1 x 1\nMaterial g shine 1 1 1 .5 glass 1 1 1 0\nMaterial h diffuse 1 0 0 1\nTrace",
         expect![[r#"
-            error: a material says something of its surface
+            error: this material has no clauses
              --> a.txt:2:11
               |
             2 | Material a
@@ -202,7 +202,7 @@ fn patterns() {
             4 | Material c checker 1 a stripes 1 a
               |                        ^^^^^^^ expected another clause
 
-            error: the material `b` has more than coefficients
+            error: the material `b` cannot be part of a pattern: it has clauses other than `ambient`, `diffuse` and `mirror`
              --> a.txt:5:22
               |
             5 | Material d checker 1 b
@@ -323,7 +323,7 @@ fn an_end_without_a_group() {
     check(
         "Screen 4 3\nEnd\nTrace",
         expect![[r#"
-            error: there is no group that this could end
+            error: `End` without a `Group`
              --> a.txt:2:1
               |
             2 | End
@@ -340,7 +340,7 @@ fn a_group_without_an_end() {
              --> a.txt:3:1
               |
             3 | Group a
-              | ^^^^^ expected an `End` behind its objects"#]],
+              | ^^^^^ expected an `End` after its objects"#]],
     );
 }
 
@@ -455,11 +455,11 @@ fn a_group_that_is_moved_too_far() {
     check(
         "Screen 4 3\nGroup a\nSphere 1 0 0 0 1 0 0 0 0 0\nEnd\nGroup b\nUse a 1e300 0 0 0 0 0 1e10\nEnd\nUse b 0 0 0 0 0 0 1e10\nUse b 0 0 0 0 0 0 .5\nTrace",
         expect![[r#"
-            error: this moves or scales the group further than numbers reach
+            error: the group's position or scale overflows
              --> a.txt:8:7
               |
             8 | Use b 0 0 0 0 0 0 1e10
-              |       ^^^^^^^^^^^^^^^^ expected less; 1.79e308 is the largest number"#]],
+              |       ^^^^^^^^^^^^^^^^ expected values up to 1.79e308"#]],
     );
 }
 

@@ -57,14 +57,14 @@ const ENDS: &[Field] = &[
 ];
 
 clauses! {
-    Ambient: Form::new("ambient", &[AMBIENT]), "The colour that needs no light.";
-    Diffuse: Form::new("diffuse", &[DIFFUSE]), "What is scattered of the light that arrives.";
-    Mirror: Form::new("mirror", WHOLE_MIRROR), "What is mirrored of the colour along the reflected ray.";
-    Shine: Form::new("shine", SHINE), "Highlights.";
-    Glass: Form::new("glass", GLASS), "Light goes through.";
+    Ambient: Form::new("ambient", &[AMBIENT]), "The colour without light.";
+    Diffuse: Form::new("diffuse", &[DIFFUSE]), "The diffuse reflectance.";
+    Mirror: Form::new("mirror", WHOLE_MIRROR), "The share of the colour along the reflected ray.";
+    Shine: Form::new("shine", SHINE), "Specular highlights.";
+    Glass: Form::new("glass", GLASS), "The transmitted share of light, and the index of refraction.";
     Checker: Form::new("checker", SIZE).ending_with(Names::Materials), "Another material in every other cell.";
     Stripes: Form::new("stripes", SIZE).ending_with(Names::Materials), "Another material in every other stripe along x.";
-    Noise: Form::new("noise", SIZE).ending_with(Names::Materials), "Another material here and there.";
+    Noise: Form::new("noise", SIZE).ending_with(Names::Materials), "Another material in a random pattern.";
     Gradient: Form::new("gradient", ENDS).with(&[Constraint::Differ(0, 1)]).ending_with(Names::Materials), "Another material from height a to height b.";
 }
 

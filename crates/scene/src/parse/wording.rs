@@ -144,8 +144,8 @@ fn counts_of(form: &Form) -> String {
 
 /// Describes a number that was probably written with a decimal comma.
 pub(super) fn decimal_comma(comma: &str) -> Fault {
-    Fault::new(Code::DecimalComma, format!("{} is two numbers", quoted(comma)))
-        .expected(format!("expected {}, or a blank behind the comma", quoted(&comma.replace(',', "."))))
+    Fault::new(Code::DecimalComma, format!("{} is read as two numbers", quoted(comma)))
+        .expected(format!("expected {}, or a space after the comma", quoted(&comma.replace(',', "."))))
         .help("the decimal sign is a point, a comma separates numbers")
 }
 
@@ -214,7 +214,7 @@ pub(super) fn curve(fault: CurveFault, parameter: &str) -> Fault {
     let modes = || Mode::ALL.iter().map(|mode| mode.name()).chain([CYCLE]);
     match fault {
         CurveFault::Unclosed => malformed("the curve is not closed".into())
-            .expected("expected a `)` behind this, on the same line"),
+            .expected("expected a `)` after this, on the same line"),
         CurveFault::NoKey => malformed("the curve has no key".into())
             .expected(format!("expected frames and values of `{parameter}`, such as `1:0 25:3`")),
         CurveFault::NotAMode(word) => {
@@ -222,24 +222,26 @@ pub(super) fn curve(fault: CurveFault, parameter: &str) -> Fault {
                 Some(near) => format!("did you mean `{near}`?"),
                 None => format!("the modes are {}", listed(modes())),
             };
-            malformed(format!("{} is no mode of a curve", quoted(&word)))
+            malformed(format!("unknown curve mode {}", quoted(&word)))
                 .expected("expected a mode, or a key such as `25:3`")
                 .help(help)
         }
-        CurveFault::MisplacedMode(word) => malformed(format!("{} stands too late, or twice", quoted(&word)))
-            .expected("expected a key such as `25:3`")
-            .help(format!(
-                "a curve starts with at most one of {}, and `{CYCLE}`",
-                listed(Mode::ALL.iter().map(|mode| mode.name()))
-            )),
-        CurveFault::Stray(mark) => malformed(format!("{} fits nowhere", quoted(&mark)))
+        CurveFault::MisplacedMode(word) => {
+            malformed(format!("{} must come before the keys, and only once", quoted(&word)))
+                .expected("expected a key such as `25:3`")
+                .help(format!(
+                    "a curve starts with at most one of {}, and `{CYCLE}`",
+                    listed(Mode::ALL.iter().map(|mode| mode.name()))
+                ))
+        }
+        CurveFault::Stray(mark) => malformed(format!("unexpected {} in a curve", quoted(&mark)))
             .expected("expected a key such as `25:3`, or `)`"),
         CurveFault::NoValue => malformed("a key lacks its value".into())
-            .expected(format!("expected `:` and `{parameter}` behind this frame")),
+            .expected(format!("expected `:` and `{parameter}` after this frame")),
         CurveFault::BadNumber(fault, "frame", word) => bad_number(fault, "frame", &word, false),
         CurveFault::BadNumber(fault, _, word) => bad_number(fault, parameter, &word, false),
         CurveFault::OutOfOrder(last, frame) => {
-            malformed(format!("frame {frame} does not come behind frame {last}"))
+            malformed(format!("frame {frame} must be greater than frame {last}"))
                 .expected(format!("expected a frame greater than {last}"))
         }
         CurveFault::ShortCycle => malformed("a cycle of one key has no length".into())
@@ -248,7 +250,7 @@ pub(super) fn curve(fault: CurveFault, parameter: &str) -> Fault {
             Code::CurveOverflow,
             format!("the curve becomes too large between frames {from} and {to}"),
         )
-        .expected("expected values that are nearer to each other, or frames that are not so near"),
+        .expected("expected values closer together, or keys further apart"),
     }
 }
 
@@ -281,8 +283,8 @@ pub(super) fn wrong_at(field: &Field, moment: Moment, from: f64, to: f64) -> Fau
 
 /// Reports that checking the constraints of a line with curves would take too long.
 pub(super) fn too_much_work() -> Fault {
-    Fault::new(Code::LimitExceeded, "too many frames to see whether this is in order in each of them")
-        .expected("expected fewer frames, or curves that stay away from what is not allowed")
+    Fault::new(Code::LimitExceeded, "too many frames to check this line in every frame")
+        .expected("expected fewer frames, or curves that stay well within the allowed range")
         .help("split the frames among several scripts")
 }
 
@@ -359,7 +361,7 @@ pub(super) fn unused_name(names: Names) -> Fault {
 }
 
 pub(super) fn no_clause() -> Fault {
-    Fault::new(Code::TooFewParameters, "a material says something of its surface")
+    Fault::new(Code::TooFewParameters, "this material has no clauses")
         .expected("expected a clause, such as `diffuse .8 .2 .1`")
         .help(format!("the clauses are {}", listed(Clause::ALL.iter().map(|clause| clause.name()))))
 }
@@ -400,13 +402,15 @@ pub(super) fn no_pattern_material(clause: Clause) -> Fault {
 }
 
 pub(super) fn unfit_material(name: &str) -> Fault {
-    Fault::new(Code::UnfitMaterial, format!("the material {} has more than coefficients", quoted(name)))
+    Fault::new(Code::UnfitMaterial, format!(
+            "the material {} cannot be part of a pattern: it has clauses other than `ambient`, `diffuse` and `mirror`",
+            quoted(name)
+        ))
         .expected("expected a material of `ambient`, `diffuse` and `mirror` only")
 }
 
 pub(super) fn end_without_group() -> Fault {
-    Fault::new(Code::Misplaced, "there is no group that this could end")
-        .expected("expected a `Group` before this")
+    Fault::new(Code::Misplaced, "`End` without a `Group`").expected("expected a `Group` before this")
 }
 
 /// Describes a command that is not allowed in the group that started in line `number`.
@@ -417,12 +421,12 @@ pub(super) fn not_in_group(command: Command, name: &str, number: usize) -> Fault
 }
 
 pub(super) fn group_not_ended() -> Fault {
-    Fault::new(Code::UnclosedGroup, "this group has no end").expected("expected an `End` behind its objects")
+    Fault::new(Code::UnclosedGroup, "this group has no end").expected("expected an `End` after its objects")
 }
 
 pub(super) fn too_far() -> Fault {
-    Fault::new(Code::NumberTooLarge, "this moves or scales the group further than numbers reach")
-        .expected("expected less; 1.79e308 is the largest number")
+    Fault::new(Code::NumberTooLarge, "the group's position or scale overflows")
+        .expected("expected values up to 1.79e308")
 }
 
 pub(super) fn lens_without_effect() -> Fault {
@@ -433,7 +437,7 @@ pub(super) fn lens_without_effect() -> Fault {
 /// Warns of pixels that are not square. `better` is a window with square pixels.
 pub(super) fn non_square_pixels(screen: Screen, better: [f64; 4]) -> Fault {
     let better: Vec<_> = better.iter().map(|x| short(*x)).collect();
-    Fault::new(Code::SquashedImage, "the picture is squashed: a ball is no circle in it")
+    Fault::new(Code::SquashedImage, "the pixels are not square: a sphere looks like an ellipse")
         .expected(format!("expected a window of the shape {} : {}", screen.width(), screen.height()))
         .help(format!("write for example `{}`", better.join(" ")))
 }
