@@ -50,7 +50,7 @@ pub(crate) fn not_implemented(what: &str) -> S3Error {
 
 /// Refuses a header, parameter or element that occurs twice but is allowed once.
 pub(crate) fn twice(name: &str) -> S3Error {
-    invalid_argument(format!("{name} stands there twice"))
+    invalid_argument(format!("{name} occurs more than once"))
 }
 
 pub(crate) fn wrong_md5() -> S3Error {

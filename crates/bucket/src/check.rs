@@ -231,7 +231,7 @@ impl Examined {
                 let row = row?;
                 if !row.0.as_slice().try_into().is_ok_and(|key: [u8; 8]| self.used.contains(&key)) {
                     if BodyId::of_key(&row.0).is_none() {
-                        self.damaged(format!("a row of {table:?}"), "its key is none");
+                        self.damaged(format!("a row of {table:?}"), "its key is malformed");
                     }
                     self.removed.push((table, row));
                 }

@@ -73,12 +73,12 @@ impl Delivery {
     /// [`Error::Webhook`].
     pub(crate) fn new(storage: Storage, region: &str, webhook: &Webhook) -> Result<Self> {
         let wrong = |reason: &str| Error::Webhook { url: webhook.url.clone(), reason: reason.to_owned() };
-        let uri: Uri = webhook.url.parse().map_err(|_| wrong("it is no URL"))?;
+        let uri: Uri = webhook.url.parse().map_err(|_| wrong("it is not a URL"))?;
         if uri.scheme_str() != Some("http") || uri.host().is_none() {
             return Err(wrong("it does not begin with http:// and a host"));
         }
         let mut authorization = HeaderValue::from_str(&format!("Bearer {}", webhook.token))
-            .map_err(|_| wrong("its token cannot stand in a header"))?;
+            .map_err(|_| wrong("its token has a character that is not allowed in a header"))?;
         authorization.set_sensitive(true);
         let mut connector = HttpConnector::new();
         connector.set_nodelay(true);

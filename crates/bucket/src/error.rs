@@ -29,7 +29,7 @@ pub enum Error {
         known: u32,
     },
     /// A file or folder could not be used.
-    #[error("{}", path.display())]
+    #[error("cannot access {}", path.display())]
     File {
         /// The path of the file or folder.
         path: PathBuf,

@@ -261,7 +261,7 @@ impl Quantiser {
         let updates = state.bytes(pixels)?.into_iter().map(PixelUpdate::of_byte).collect::<Option<Vec<_>>>();
         let updates = UpdateMap::decided(
             width as usize,
-            updates.ok_or_else(|| damaged("a pixel needs what there is not"))?,
+            updates.ok_or_else(|| damaged("a pixel has an unknown update"))?,
         );
         let mut buffers = Buffers { updates, ..Buffers::new() };
         let plan = match kind {

@@ -108,8 +108,7 @@ impl RefineBudget {
 
     pub(crate) fn read(state: &mut StateReader<'_>) -> Result<Self, Error> {
         let (share, difference, waited) = (state.f64()?, state.f64()?, state.u64()?);
-        let waited =
-            u32::try_from(waited).map_err(|_| damaged("it has waited for longer than there can be"))?;
+        let waited = u32::try_from(waited).map_err(|_| damaged("it has waited for too many frames"))?;
         Ok(Self { share, difference, waited: waited as usize })
     }
 

@@ -60,7 +60,9 @@ pub(crate) struct StateReader<'a>(GzDecoder<&'a [u8]>);
 
 impl<'a> StateReader<'a> {
     pub(crate) fn new(state: &'a [u8]) -> Result<Self, Error> {
-        let Some(rest) = state.strip_prefix(&MARK) else { return Err(damaged("it is none of this encoder")) };
+        let Some(rest) = state.strip_prefix(&MARK) else {
+            return Err(damaged("it is not a state of this encoder"));
+        };
         let Some((found, rest)) = rest.split_first_chunk() else { return Err(damaged("it is cut off")) };
         if *found != version().to_le_bytes() {
             return Err(Error::StateVersion);

@@ -363,8 +363,8 @@ impl Row<'_> {
     }
 }
 
-/// Returns the residual that a pixel passes to each of two others: half of the diffused part of the residual that
-/// reached it, plus the intended minus the shown colour.
+/// Returns the residual that a pixel passes to each of two others: half of the diffused part of its own residual. That
+/// is the residual that reached the pixel, plus its intended minus its shown colour.
 fn diffuse(residual: [f32; 3], meant: [f32; 3], shown: [f32; 3]) -> [f32; 3] {
     let channel =
         |k: usize| (residual[k] + meant[k] - shown[k]).clamp(-MAX_RESIDUAL, MAX_RESIDUAL) * (0.5 * DIFFUSED);

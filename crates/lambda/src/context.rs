@@ -92,7 +92,7 @@ fn number<T: FromStr<Err: std::error::Error + Send + Sync + 'static>>(
     name: &str,
 ) -> anyhow::Result<Option<T>> {
     match env::var(name) {
-        Ok(text) => Ok(Some(text.parse().with_context(|| format!("{name}={text} is no number"))?)),
+        Ok(text) => Ok(Some(text.parse().with_context(|| format!("{name}={text} is not a number"))?)),
         Err(_) => Ok(None),
     }
 }

@@ -15,13 +15,10 @@ use crate::model::{
 /// The effect of a command.
 #[derive(Clone, Copy)]
 pub(crate) enum Effect {
-    /// Sets the size of the image.
     Screen,
-    /// Sets the camera.
     Camera(Reader<Camera>),
     /// Sets the colour of rays that hit nothing.
     Background,
-    /// Sets the lens.
     Lens,
     /// Sets the number of rays per pixel.
     Samples,
@@ -35,19 +32,13 @@ pub(crate) enum Effect {
     Frames,
     /// Defines a named material.
     Material,
-    /// Starts a group.
     Group,
-    /// Ends a group.
     End,
-    /// Draws a group.
     Use,
-    /// Adds an object.
     Object(Reader<Object>),
-    /// Adds a light.
     Light(Reader<Light>),
     /// Removes objects and lights.
     Clear,
-    /// Renders frames.
     Trace,
 }
 

@@ -44,7 +44,7 @@ impl Fault {
         Self { code, message: message.into(), expected: None, help: None }
     }
 
-    /// Makes a fault about bytes `fault` of the line. `what` describes the whole text.
+    /// Makes a fault about bytes `fault` of the line. `what` names the kind of text.
     pub(crate) fn not_utf8(line: Line<'_>, fault: Range<usize>, what: &str) -> Self {
         let bytes: Vec<_> = line.bytes[fault].iter().map(|b| format!("0x{b:02X}")).collect();
         Self::new(Code::NotUtf8, format!("this is not UTF-8 text: {}", bytes.join(" ")))

@@ -90,21 +90,21 @@ fn parameters_on_the_next_line() {
     check(
         "Screen 4 3\nSphere 1 0 0 -5 1 0 0\n 0 0 0\nTrace",
         expect![[r#"
-        error: `Sphere` takes 10 to 13 numbers, found 7
-         --> a.txt:2:22
-          |
-        2 | Sphere 1 0 0 -5 1 0 0
-          |                      ^ expected `rr` here
-          |
-          = help: write `Sphere R cx cy cz ar ag ab rr rg rb [sr sg sb]`
+            error: `Sphere` takes 10 to 13 numbers, found 7
+             --> a.txt:2:22
+              |
+            2 | Sphere 1 0 0 -5 1 0 0
+              |                      ^ expected `rr` here
+              |
+              = help: write `Sphere R cx cy cz ar ag ab rr rg rb [sr sg sb]`
 
-        error: unknown command `0`
-         --> a.txt:3:2
-          |
-        3 |  0 0 0
-          |  ^ expected a command
-          |
-          = help: a command and all its parameters stand on one line"#]],
+            error: unknown command `0`
+             --> a.txt:3:2
+              |
+            3 |  0 0 0
+              |  ^ expected a command
+              |
+              = help: a command and all its parameters must be on one line"#]],
     );
 }
 
@@ -142,7 +142,7 @@ fn surplus_parameters() {
             1 | Screen 4 3 Trace
               |            ^^^^^ expected the end of the line
               |
-              = help: every command stands on a line of its own
+              = help: each command needs a line of its own
 
             error: `Triangle` takes 15 to 18 numbers, found 19
              --> a.txt:2:51

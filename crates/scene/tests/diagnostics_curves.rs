@@ -160,7 +160,7 @@ fn brackets() {
             3 | Sphere 1) 0 0 -5 1 0 0 0 0 0
               |         ^ expected `cx`, a number such as 2, -.5 or 1e-3
               |
-              = help: `)` stands in a curve only, as in `(1:0 25:3)`
+              = help: `)` is allowed only in a curve, as in `(1:0 25:3)`
 
             error: the curve has no key
              --> a.txt:4:8
@@ -180,7 +180,7 @@ fn brackets() {
             5 | Sphere (1:1 (2:2)) 0 0 -5 1 0 0 0 0
               |                  ^ expected `cx`, a number such as 2, -.5 or 1e-3
               |
-              = help: `)` stands in a curve only, as in `(1:0 25:3)`
+              = help: `)` is allowed only in a curve, as in `(1:0 25:3)`
 
             error: `:` is not a number
              --> a.txt:6:9
@@ -188,7 +188,7 @@ fn brackets() {
             6 | Sphere 1:1 0 0 -5 1 0 0 0
               |         ^ expected `cx`, a number such as 2, -.5 or 1e-3
               |
-              = help: `:` stands in a curve only, as in `(1:0 25:3)`"#]],
+              = help: `:` is allowed only in a curve, as in `(1:0 25:3)`"#]],
     );
 }
 
@@ -322,7 +322,7 @@ fn curves_where_none_may_stand() {
             5 | Frames (1:4)
               |        ^^^^^ expected `a`, a number
 
-            error: `(1:0)` is no tone
+            error: unknown tone `(1:0)`
              --> a.txt:6:6
               |
             6 | Tone (1:0)
@@ -353,13 +353,13 @@ fn settings_out_of_their_range() {
             3 | Shutter 1.5
               |         ^^^ expected a number from 0 to 1
 
-            error: `gamma` is no tone
+            error: unknown tone `gamma`
              --> a.txt:4:6
               |
             4 | Tone gamma
               |      ^^^^^ expected plain or srgb
 
-            error: `rgb` is no tone
+            error: unknown tone `rgb`
              --> a.txt:5:6
               |
             5 | Tone rgb
@@ -391,7 +391,7 @@ fn settings_out_of_their_range() {
             8 | Frames 2.5
               |        ^^^ expected `a`, a whole number from 1
 
-            error: the first frame must not be behind the last
+            error: the first frame must not be greater than the last
              --> a.txt:9:8
               |
             9 | Frames 9 3

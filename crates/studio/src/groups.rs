@@ -31,7 +31,7 @@ impl Refusal {
         match self {
             Self::NothingDrawn => "Only objects and groups of the picture can be grouped: select some first.",
             Self::SeveralFrames => {
-                "These cannot be a group: a `Trace` or a `Clear` stands between them in the script."
+                "These cannot be a group: a `Trace` or a `Clear` is between them in the script."
             }
             Self::Turned => {
                 "Only a `Use` of a group that is neither turned nor sized, and whose place has no keys, can be taken apart."

@@ -24,7 +24,8 @@ const ARROW: f64 = 72.0;
 /// The position of a plane's handle along its two axes, in arrows.
 const PLANE: f64 = 0.35;
 
-/// A surface seen at a smaller sine of its slant is not dragged along, because a pixel would be a huge distance.
+/// The sine of the smallest angle between the view direction and a plane at which the plane can be dragged along. At
+/// smaller angles, a pixel would be a huge distance.
 const SLANTED: f64 = 0.12;
 
 /// The smallest width of the snapping grid in pixels.

@@ -25,7 +25,8 @@ pub(crate) const SCALE: f64 = 0.75;
 /// The number of line segments of a circle.
 const PIECES: u32 = 48;
 
-/// A plane that is seen at a smaller sine of its slant is rotated by the angle in the picture.
+/// The sine of the smallest angle between a pointer's ray and the plane of rotation at which the rotation follows the
+/// plane. At smaller angles, it follows the angle in the picture.
 const SLANTED: f64 = 0.15;
 
 /// Returns the axis about which a change of angle `axis` rotates, and a perpendicular direction that rotates with it.

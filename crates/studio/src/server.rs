@@ -263,7 +263,7 @@ async fn material(State(shared): State<Arc<Shared>>, request: Request) -> Respon
 async fn preset(request: Request) -> Response {
     let name = request.uri().query().unwrap_or_default();
     let png = tokio::task::block_in_place(|| materials::preset_sphere(name));
-    picture(png, "there is no such material to begin with\n")
+    picture(png, "there is no such starter material\n")
 }
 
 fn picture(png: Result<Option<Vec<u8>>, Error>, missing: &'static str) -> Response {

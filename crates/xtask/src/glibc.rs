@@ -35,7 +35,7 @@ pub(crate) enum Error {
     #[error("needs {0}, and Amazon Linux 2023 has glibc {AMAZON_LINUX_2023}")]
     TooNew(String),
     /// The program needs a library or symbols that are not part of glibc.
-    #[error("needs {0}, which is no part of glibc")]
+    #[error("needs {0}, which is not part of glibc")]
     Foreign(String),
 }
 

@@ -64,6 +64,6 @@ fn height(script: &Script, time: f64) -> anyhow::Result<f64> {
     });
     match ball {
         Some(y) => Ok(y),
-        None => bail!("what is plotted is the height of a ball, and there is none"),
+        None => bail!("the script has no ball whose height could be plotted"),
     }
 }

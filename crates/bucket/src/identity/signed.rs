@@ -111,7 +111,7 @@ pub(super) fn parameter<'a>(query: &'a [(String, String)], name: &str) -> S3Resu
     let mut found = query.iter().filter(|(other, _)| other == name).map(|(_, value)| value.as_str());
     let first = found.next();
     if found.next().is_some() {
-        return Err(s3_error!(InvalidArgument, "{name} stands there twice"));
+        return Err(s3_error!(InvalidArgument, "{name} occurs more than once"));
     }
     Ok(first)
 }

@@ -78,7 +78,7 @@ impl Wish {
                 _ => return Err(Refusal::invalid(format!("the parameter {name} is not supported"))),
             };
             if place.replace(value).is_some() {
-                return Err(Refusal::invalid(format!("{name} stands there twice")));
+                return Err(Refusal::invalid(format!("{name} occurs more than once")));
             }
         }
         let action = action.unwrap_or_default();
@@ -339,7 +339,7 @@ mod tests {
             ("=900", "=43201", "ValidationError", "43201"),
             ("=900", "=x", "ValidationError", "900 to 43200"),
             ("&DurationSeconds=900", "&PolicyArns.member.1.arn=a", "ValidationError", "PolicyArns"),
-            ("&DurationSeconds=900", "&Policy=x", "ValidationError", "twice"),
+            ("&DurationSeconds=900", "&Policy=x", "ValidationError", "more than once"),
         ] {
             assert!(GOOD.contains(good), "{good}");
             let refusal = Wish::read(GOOD.replacen(good, bad, 1).as_bytes()).unwrap_err();

@@ -103,7 +103,7 @@ impl TryFrom<String> for Action {
         if lower == "*" || lower.strip_prefix("s3:").is_some_and(is_name) {
             Ok(Self(Pattern::new(&lower)))
         } else {
-            Err(format!("the action `{text}` is none of S3: expected `s3:` and a name, or `*`"))
+            Err(format!("unknown action `{text}`: expected `s3:` and a name, or `*`"))
         }
     }
 }
@@ -120,7 +120,7 @@ impl TryFrom<String> for Resource {
         if text == "*" || text.strip_prefix(ARN).is_some_and(|rest| !rest.is_empty()) {
             Ok(Self(Pattern::new(&text)))
         } else {
-            Err(format!("the resource `{text}` is none of S3: expected `{ARN}` and a bucket, or `*`"))
+            Err(format!("invalid resource `{text}`: expected `{ARN}` and a bucket, or `*`"))
         }
     }
 }
@@ -156,7 +156,9 @@ impl<'de> Deserialize<'de> for Conditions {
                         Error::custom(format_args!("the condition operator `{name}` is not supported"))
                     })?;
                     if seen.contains(&operator) {
-                        return Err(Error::custom(format_args!("the operator `{name}` stands there twice")));
+                        return Err(Error::custom(format_args!(
+                            "the operator `{name}` occurs more than once"
+                        )));
                     }
                     seen.push(operator);
                     for (key, values) in map.next_value::<Keys>()?.0 {
@@ -195,7 +197,7 @@ impl<'de> Deserialize<'de> for Keys {
                         Error::custom(format_args!("the condition key `{name}` is not supported"))
                     })?;
                     if pairs.iter().any(|(other, _)| *other == key) {
-                        return Err(Error::custom(format_args!("the key `{name}` stands there twice")));
+                        return Err(Error::custom(format_args!("the key `{name}` occurs more than once")));
                     }
                     let values = map.next_value::<OneOrMany<Text>>()?.0;
                     pairs.push((key, values.into_iter().map(|Text(text)| text).collect()));

@@ -19,7 +19,7 @@ use crate::storage::{NewBody, Storage};
 /// than a second sync.
 const ROW_BYTES: usize = 128 * 1024;
 
-/// What is digested and written at a time.
+/// The number of bytes that are digested and written at a time.
 const BLOCK_BYTES: usize = 1024 * 1024;
 
 /// S3's limit on the body of a request.

@@ -176,7 +176,7 @@ pub(super) fn read(file: &dyn Medium, format_1: bool) -> io::Result<Contents> {
             _ => format.later(&bytes, from, last).map(|(next, _)| next),
         };
         let what = match (&found, next) {
-            (Some(entry), _) => Some(format!("entry {} stands where {shown} belongs", entry.number)),
+            (Some(entry), _) => Some(format!("found entry {} in place of {shown}", entry.number)),
             (None, Some(next)) => Some(format!(
                 "{shown} cannot be read, but a later one at byte {next} is whole: this is damage, not the end of an \
                  interrupted write"

@@ -53,7 +53,7 @@ pub enum InvalidValue {
     #[error("the eye and the target must differ")]
     NoGaze,
     /// The last frame comes before the first.
-    #[error("the first frame must not be behind the last")]
+    #[error("the first frame must not be greater than the last")]
     FramesBackwards,
     /// A gradient has no width.
     #[error("the ends of the gradient must differ")]

@@ -37,7 +37,7 @@ pub(super) fn unknown_command(name: &str, nearest: Option<Command>) -> Fault {
     let help = if let Some(command) = nearest {
         format!("did you mean `{}`?", command.name())
     } else if number::parse(name).is_ok() {
-        "a command and all its parameters stand on one line".to_string()
+        "a command and all its parameters must be on one line".to_string()
     } else if ["//", "/*", ";", "%", "--"].iter().any(|mark| name.starts_with(mark)) {
         "a comment starts with `#`".to_string()
     } else {
@@ -59,9 +59,7 @@ pub(super) fn bad_number(fault: NumberFault, parameter: &str, word: &str, is_sur
                 .expected(format!("expected `{parameter}`, a number such as 2, -.5 or 1e-3"));
             match hint(word) {
                 Some(hint) => fault.help(hint),
-                None if is_surface => {
-                    fault.help("the name of a material stands alone, in the place of all coefficients")
-                }
+                None if is_surface => fault.help("the name of a material replaces all coefficients"),
                 None => fault,
             }
         }
@@ -75,10 +73,10 @@ fn hint(word: &str) -> Option<String> {
         return None;
     }
     if Command::from_name(word).is_some() {
-        return Some("every command stands on a line of its own".to_string());
+        return Some("each command needs a line of its own".to_string());
     }
     if matches!(word, ":" | ")") {
-        return Some(format!("{} stands in a curve only, as in `(1:0 25:3)`", quoted(word)));
+        return Some(format!("{} is allowed only in a curve, as in `(1:0 25:3)`", quoted(word)));
     }
     let odd = word.chars().find(|c| !c.is_ascii_graphic())?;
     let code = u32::from(odd);
@@ -104,7 +102,7 @@ pub(super) fn too_many(command: Command, words: &Words, first: &str, comma: Opti
     let fault =
         miscounted(Code::TooManyParameters, command, words, comma).expected("expected the end of the line");
     if Command::from_name(first).is_some() {
-        fault.help("every command stands on a line of its own")
+        fault.help("each command needs a line of its own")
     } else {
         fault
     }
@@ -290,7 +288,7 @@ pub(super) fn too_much_work() -> Fault {
 
 /// Describes a `word` that `field` does not allow.
 pub(super) fn no_such_word(word: &str, words: &[&str], field: &Field) -> Fault {
-    let fault = Fault::new(Code::InvalidValue, format!("{} is no {}", quoted(word), field.names[0]))
+    let fault = Fault::new(Code::InvalidValue, format!("unknown {} {}", field.names[0], quoted(word)))
         .expected(format!("expected {}", words.join(" or ")));
     match nearest(word, words.iter().copied()) {
         Some(near) => fault.help(format!("did you mean `{near}`?")),
@@ -320,7 +318,7 @@ fn usage(command: Command) -> String {
 }
 
 pub(super) fn bad_name(word: &str, names: Names) -> Fault {
-    Fault::new(Code::MalformedName, format!("{} is no name", quoted(word)))
+    Fault::new(Code::MalformedName, format!("invalid name {}", quoted(word)))
         .expected(format!("expected the name of a {}", names.noun()))
         .help(NAME_HELP)
 }
@@ -331,7 +329,7 @@ pub(super) fn unknown_name(names: Names, name: &str, later: Option<usize>, neare
     let noun = names.noun();
     let message = match later {
         Some(line) => format!("the {noun} {} is not known before line {line}", quoted(name)),
-        None => format!("there is no {noun} {}", quoted(name)),
+        None => format!("unknown {noun} {}", quoted(name)),
     };
     let fault = Fault::new(Code::UnknownName, message)
         .expected(format!("expected a {noun} that is defined before this"));
@@ -372,7 +370,7 @@ pub(super) fn unknown_clause(word: &str) -> Fault {
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("the clauses are {}", listed(names())),
     };
-    Fault::new(Code::UnknownClause, format!("{} is no clause of a material", quoted(word)))
+    Fault::new(Code::UnknownClause, format!("unknown material clause {}", quoted(word)))
         .expected("expected a clause")
         .help(help)
 }
@@ -415,7 +413,7 @@ pub(super) fn end_without_group() -> Fault {
 
 /// Describes a command that is not allowed in the group that started in line `number`.
 pub(super) fn not_in_group(command: Command, name: &str, number: usize) -> Fault {
-    Fault::new(Code::Misplaced, format!("`{command}` cannot stand in a group"))
+    Fault::new(Code::Misplaced, format!("`{command}` is not allowed in a group"))
         .expected("expected an object, `Use` or `End`")
         .help(format!("the group {} starts in line {number}; is its `End` missing?", quoted(name)))
 }

@@ -96,7 +96,7 @@ impl Ready {
                 return Err(Refusal { place: Some((fault.line, fault.column)), ..refused(why) });
             }
             let Some(script) = &file.script else {
-                return Err(refused(format!("{} is no script", file.name)));
+                return Err(refused(format!("{} is not a script", file.name)));
             };
             for shot in script.shots() {
                 match size {

@@ -33,19 +33,17 @@ use super::material::Material;
 use crate::form::write_line;
 
 /// An object that a ray can hit.
+#[expect(missing_docs, reason = "the types have the documentation")]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Object {
-    /// A sphere.
     Sphere(Sphere),
-    /// A triangle.
     Triangle(Triangle),
-    /// An axis-aligned box.
+    /// A box whose edges are parallel to the axes.
     Cuboid(Cuboid),
     /// An infinite plane.
     Plane(Plane),
-    /// A flat, round disc.
     Disc(Disc),
-    /// A closed cylinder.
+    /// A cylinder that is closed at both ends.
     Cylinder(Cylinder),
     /// A closed cone or truncated cone.
     Cone(Cone),
