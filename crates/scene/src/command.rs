@@ -126,7 +126,7 @@ impl fmt::Display for Command {
     }
 }
 
-/// The largest number of numbers of a command.
+/// The largest count of numbers that a command takes.
 pub(crate) const MAX_NUMBERS: usize = {
     let (mut most, mut i) = (0, 0);
     while i < Command::ALL.len() {

@@ -29,7 +29,7 @@ impl Row {
         Self(numbers.into())
     }
 
-    /// Returns the number of written numbers.
+    /// Returns the count of written numbers.
     pub(crate) fn len(&self) -> usize {
         self.0.len()
     }

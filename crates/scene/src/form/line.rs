@@ -10,7 +10,7 @@ use crate::model::Material;
 /// A reader of the numbers of a line, parameter by parameter. Omitted numbers are 0.
 pub(crate) struct Numbers<'a> {
     rest: &'a [f64],
-    /// The number of remaining numbers that the script contains.
+    /// The count of remaining numbers that the script contains.
     written: usize,
     /// The material whose name replaces numbers.
     surface: Option<&'a Material>,

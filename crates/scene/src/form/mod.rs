@@ -30,9 +30,9 @@ pub struct Form {
     pub curves: bool,
     /// The name after the numbers, if there is one.
     pub ends_with: Option<Names>,
-    /// The number of required numbers.
+    /// The count of required numbers.
     required: usize,
-    /// The largest number of numbers.
+    /// The largest count of numbers.
     most: usize,
     /// The first number that the name of a material may replace, together with all that follow.
     surface: Option<usize>,
@@ -231,12 +231,12 @@ impl Form {
         Self { curves: false, ..self }
     }
 
-    /// Returns the least and the largest number of numbers.
+    /// Returns the least and the largest count of numbers.
     pub const fn arity(&self) -> (usize, usize) {
         (self.required, self.most)
     }
 
-    /// Returns whether this number of numbers is allowed.
+    /// Returns whether this count of numbers is allowed.
     pub fn takes(&self, count: usize) -> bool {
         if self.required == self.most {
             return count == self.most;
@@ -252,7 +252,7 @@ impl Form {
             })
     }
 
-    /// Returns all allowed numbers of numbers.
+    /// Returns all allowed counts of numbers.
     pub fn counts(&self) -> impl Iterator<Item = usize> {
         (self.required..=self.most).filter(|count| self.takes(*count))
     }
