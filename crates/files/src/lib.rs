@@ -2,7 +2,7 @@
 //!
 //! A file is written under a short random name in its target folder, and renamed when it is complete. If anything
 //! ends the run before that (an error, a full disk, Ctrl-C), the old file stays. A run that is killed leaves its
-//! temporary file behind. A later run that writes into the same folder removes it ([`leftover`]).
+//! temporary file behind. A later run that writes into the same folder removes it (`leftover`).
 //!
 //! [`Folder`] reads a folder as an animation: its scripts, its settings, and misnamed files.
 //!
