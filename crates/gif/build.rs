@@ -1,7 +1,7 @@
-//! Tells one encoder from another: a hash of the sources, and of the versions of what they use, which a suspended animation
-//! carries.
+//! Computes a fingerprint of the encoder: a hash of its sources and of the versions of its dependencies. A
+//! suspended animation carries it.
 //!
-//! What one encoder wrote down is to be taken up by the same one alone. Nobody has to remember to raise a number.
+//! Only the encoder that wrote a state may continue it. Thanks to the hash there is no version number to remember.
 
 use std::path::Path;
 use std::{fs, io};
@@ -20,7 +20,7 @@ fn main() -> io::Result<()> {
     let mut hash = OFFSET;
     for file in files {
         let name = file.file_name().unwrap_or_default().as_encoded_bytes();
-        // Git may have written lines with carriage returns.
+        // Git may have written the lines with carriage returns.
         let text = fs::read(&file)?;
         for byte in name.iter().chain(text.iter().filter(|byte| **byte != b'\r')) {
             hash = (hash ^ u64::from(*byte)).wrapping_mul(PRIME);

@@ -1,5 +1,5 @@
-//! Puts the built page into the library, where it has been built. It never builds it: that takes Node, and whoever
-//! compiles or tests need not have it.
+//! Embeds the built page in the library, if it has been built. Does not build it: that needs Node, which is not
+//! required to compile or test.
 
 use std::path::PathBuf;
 use std::{env, fs, io};
@@ -9,7 +9,7 @@ fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed={}", dist.display());
     let out = PathBuf::from(env::var_os("OUT_DIR").ok_or_else(|| io::Error::other("no OUT_DIR"))?);
     for name in ["index.html", "studio.js", "studio.css"] {
-        // An empty file stands for one that has not been built.
+        // An empty file means that the page has not been built.
         fs::write(out.join(name), fs::read(dist.join(name)).unwrap_or_default())?;
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! What operations answer with: S3's errors, in its words, and moments as it writes them.
+//! The answers of operations: S3's errors in S3's wording, and times in S3's format.
 
 use hyper::StatusCode;
 use redb::StorageError;
@@ -10,7 +10,7 @@ use crate::error::report;
 use crate::records::Moment;
 use crate::storage::Unavailable;
 
-/// What a request ends with: what was asked for, or S3's error.
+/// The result of a request: its output, or S3's error.
 pub(crate) type Answer<T> = Result<T, S3Error>;
 
 pub(crate) fn time(moment: Moment) -> Timestamp {
@@ -48,9 +48,9 @@ pub(crate) fn not_implemented(what: &str) -> S3Error {
     S3Error::with_message(S3ErrorCode::NotImplemented, format!("{what} is not implemented"))
 }
 
-/// A header, parameter or element that may stand there once.
+/// Refuses a header, parameter or element that occurs twice but is allowed once.
 pub(crate) fn twice(name: &str) -> S3Error {
-    invalid_argument(format!("{name} stands there twice"))
+    invalid_argument(format!("{name} occurs more than once"))
 }
 
 pub(crate) fn wrong_md5() -> S3Error {
@@ -62,19 +62,20 @@ pub(crate) fn wrong_checksum(algorithm: Algorithm) -> S3Error {
     s3_error!(BadDigest, "The {name} you specified did not match the calculated checksum.")
 }
 
-/// To an access list other than the owner's: a bucket here has none, as one of S3 whose owner did not ask for them.
+/// Refuses an access list other than the owner's. A bucket of this store has none, like an S3 bucket whose owner
+/// did not enable them.
 pub(crate) fn no_lists() -> S3Error {
     coded("AccessControlListNotSupported", StatusCode::BAD_REQUEST, "The bucket does not allow ACLs")
 }
 
-/// A code that s3s does not know.
+/// Makes an error with a code that s3s does not know.
 pub(crate) fn coded(code: &'static str, status: StatusCode, message: impl Into<String>) -> S3Error {
     let mut error = S3Error::with_message(S3ErrorCode::Custom(code.into()), message.into());
     error.set_status_code(status);
     error
 }
 
-/// What the storage's failures are to a client: a full disk is told apart, as trying again is of no use.
+/// Maps a failure of the storage to S3's error. A full disk has a code of its own, because a retry is useless.
 pub(crate) fn unavailable(reason: &Unavailable) -> S3Error {
     match reason {
         Unavailable::Full => disk_full(),
@@ -87,7 +88,7 @@ pub(crate) fn disk_full() -> S3Error {
     coded("InsufficientStorage", StatusCode::INSUFFICIENT_STORAGE, "the disk is full")
 }
 
-/// A file of a body failed.
+/// Maps a failure of a body's file to S3's error.
 pub(crate) fn file_failed(error: std::io::Error) -> S3Error {
     use std::io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
     match error.kind() {
@@ -96,24 +97,24 @@ pub(crate) fn file_failed(error: std::io::Error) -> S3Error {
     }
 }
 
-/// A snapshot could not be read.
+/// Reports that a snapshot could not be read.
 pub(crate) fn unreadable(error: StorageError) -> S3Error {
     let message = format!("the store could not be read: {error}");
     s3_error!(error, InternalError, "{message}")
 }
 
-/// A stored body is not what was put.
+/// The error that a stored body differs from the one that was put.
 #[derive(Debug, thiserror::Error)]
 #[error("the body of {object} is damaged: {what}")]
 pub(super) struct BodyDamaged {
-    /// Bucket and key.
+    /// The bucket and the key.
     pub(super) object: String,
-    /// What is wrong, and where.
+    /// The damage and its position.
     pub(super) what: String,
 }
 
 impl BodyDamaged {
-    /// Reports it; the answer of a request that has sent nothing yet.
+    /// Reports the damage, and makes the error for a request that has sent nothing yet.
     pub(super) fn refuse(self) -> S3Error {
         report(&self);
         let message = self.to_string();
@@ -121,11 +122,11 @@ impl BodyDamaged {
     }
 }
 
-/// A request's body ended with an error. s3s tells what was wrong with it in words alone.
+/// Maps an error of a request's body to S3's error. s3s describes such an error by text alone.
 pub(crate) fn body_failed(error: &StdError) -> S3Error {
     let text = error.to_string();
     if error.is::<BodyDamaged>() {
-        // Of the source of a copy.
+        // The damaged body is the source of a copy.
         return S3Error::with_message(S3ErrorCode::InternalError, text);
     }
     if text.contains("Sha256Mismatch") {

@@ -1,4 +1,4 @@
-//! Checks a folder as a whole: journal, database, every record and every body. Repairs by setting aside what is damaged.
+//! Checks a whole folder: journal, database, every record and every body. A repair sets damaged files and rows aside.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -12,26 +12,26 @@ use crate::records::{self, Body, LayoutPart, decode, find, key, set};
 use crate::storage::{Bodies, BodyId, Damage, Row, Salvage, Snapshot, Table, View};
 use crate::{Error, Result};
 
-/// What is read of a file at a time.
+/// The number of bytes that are read from a file at a time.
 const BLOCK_BYTES: usize = 1024 * 1024;
 
-/// The state of a folder.
+/// The result of a check.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Report {
-    /// Objects that are whole.
+    /// The number of undamaged objects.
     pub objects: u64,
-    /// Their bytes.
+    /// The sum of their sizes in bytes.
     pub bytes: u64,
     /// Everything that is damaged.
     pub damages: Vec<Damage>,
-    /// The folder that a repair moved damaged files to.
+    /// The folder to which a repair moved damaged files.
     pub set_aside: Option<PathBuf>,
 }
 
-/// Reads all of a store that does not run, and compares it with its checksums. With `repair`, what is damaged is moved to a
-/// folder `set-aside-N` in the store's, with a list, and the rest can be used again; nothing is deleted. Needs as much room on
-/// the disk as two copies of the database.
+/// Reads all of a stopped store, and compares it with its checksums. With `repair`, moves damaged files and rows with
+/// a list to a folder `set-aside-N` inside the store, so that the rest can be used again. Deletes nothing. Needs as
+/// much disk space as two copies of the database.
 ///
 /// # Errors
 /// [`Error::DataInUse`], [`Error::NotOurs`], [`Error::Newer`], [`Error::File`], [`Error::Storage`].
@@ -59,19 +59,19 @@ pub fn check(data: &Path, repair: bool) -> Result<Report> {
     Ok(Report { objects: examined.objects, bytes: examined.bytes, damages, set_aside })
 }
 
-/// What was found in the rows.
+/// The findings in the rows.
 #[derive(Default)]
 struct Examined {
     objects: u64,
     bytes: u64,
     damages: Vec<Damage>,
-    /// Rows that have to go.
+    /// The rows that must be removed.
     removed: Vec<(Table, Row)>,
-    /// Files that have to go.
+    /// The files that must be removed.
     files: Vec<PathBuf>,
-    /// Buckets that have objects and no row.
+    /// The buckets that have objects but no row.
     buckets: BTreeSet<String>,
-    /// Bodies that whole objects and parts refer to.
+    /// The bodies that undamaged objects and parts refer to.
     used: BTreeSet<[u8; 8]>,
 }
 
@@ -80,7 +80,7 @@ impl Examined {
         self.damages.push(Damage { place: place.into(), what: what.into() });
     }
 
-    /// Every record that refers to a body, with the body.
+    /// Examines every record that refers to a body, and the body.
     fn rows(&mut self, rows: &Snapshot, bodies: &Bodies) -> Result<(), StorageError> {
         for row in rows.from(Table::Objects, b"")? {
             let (row_key, value) = row?;
@@ -158,7 +158,7 @@ impl Examined {
         Ok(())
     }
 
-    /// The keys of a body's rows if it is whole, or what is wrong with it.
+    /// Returns the keys of a body's rows if it is undamaged, else the damage.
     fn body(
         &self,
         rows: &Snapshot,
@@ -223,14 +223,15 @@ impl Examined {
         })
     }
 
-    /// Bodies that nothing whole refers to. A kill leaves such files, which are no damage where nothing else is damaged.
+    /// Finds bodies that no undamaged record refers to. A kill leaves such files. They are no damage if
+    /// nothing else is damaged.
     fn strays(&mut self, rows: &Snapshot, files: Vec<(PathBuf, Option<BodyId>)>) -> Result<(), StorageError> {
         for table in [Table::Bodies, Table::Files, Table::Layouts] {
             for row in rows.from(table, b"")? {
                 let row = row?;
                 if !row.0.as_slice().try_into().is_ok_and(|key: [u8; 8]| self.used.contains(&key)) {
                     if BodyId::of_key(&row.0).is_none() {
-                        self.damaged(format!("a row of {table:?}"), "its key is none");
+                        self.damaged(format!("a row of {table:?}"), "its key is malformed");
                     }
                     self.removed.push((table, row));
                 }
@@ -241,7 +242,7 @@ impl Examined {
         Ok(())
     }
 
-    /// Moves what has to go to a folder, with a list.
+    /// Moves the files and rows that must be removed to a folder, with a list.
     fn set_aside(&self, salvage: &Salvage, aside: &Path, damages: &[Damage]) -> Result<()> {
         let write = || {
             let mut list = File::create_new(aside.join("list.txt"))?;
@@ -285,7 +286,7 @@ impl Examined {
     }
 }
 
-/// Reads a file to its end; gives its length.
+/// Reads a file to its end. Returns its length.
 fn read(path: &Path, mut comparison: Option<&mut Comparison>) -> io::Result<u64> {
     let mut file = File::open(path)?;
     let mut block = vec![0; BLOCK_BYTES];

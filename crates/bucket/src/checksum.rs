@@ -1,14 +1,15 @@
-//! Checksums as S3 makes them: of a body as it goes by, and of an upload from its parts.
+//! Checksums as S3 computes them: of a stream of bytes, and of an upload from its parts.
 //!
-//! Every object has one: that which the client named, or CRC-64/NVME. A *full object* checksum is of the bytes; a
-//! *composite* one is of the parts' checksums, with their count behind it.
+//! Every object has a checksum: the one that the client chose, or CRC-64/NVME. A *full object* checksum is
+//! computed from the bytes. A *composite* checksum is computed from the checksums of the parts, and is
+//! followed by their count.
 //! <https://docs.aws.amazon.com/AmazonS3/latest/userguide/checking-object-integrity.html>
 
 use crc_fast::{CrcAlgorithm, checksum_combine};
 use s3s::crypto::{Checksum as _, Crc32, Crc32c, Crc64Nvme, Md5, Sha1, Sha256};
 use serde::{Deserialize, Serialize};
 
-/// How it is computed.
+/// The algorithm of a checksum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub(crate) enum Algorithm {
@@ -19,7 +20,7 @@ pub(crate) enum Algorithm {
     Sha256,
 }
 
-/// Of what.
+/// The input of a checksum: the bytes of the object, or the checksums of its parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "SCREAMING_SNAKE_CASE")]
 pub(crate) enum Kind {
@@ -27,7 +28,7 @@ pub(crate) enum Kind {
     Composite,
 }
 
-/// A checksum, in base64 as headers have it.
+/// A checksum in base64, as headers have it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Checksum {
     pub(crate) algorithm: Algorithm,
@@ -38,7 +39,7 @@ pub(crate) struct Checksum {
 impl Algorithm {
     pub(crate) const ALL: [Self; 5] = [Self::Crc32, Self::Crc32c, Self::Crc64nvme, Self::Sha1, Self::Sha256];
 
-    /// As S3 writes it.
+    /// Returns S3's name of the algorithm.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Crc32 => "CRC32",
@@ -49,7 +50,7 @@ impl Algorithm {
         }
     }
 
-    /// The header that a checksum stands in.
+    /// Returns the name of the header for the checksum.
     pub(crate) fn header(self) -> &'static str {
         match self {
             Self::Crc32 => "x-amz-checksum-crc32",
@@ -60,7 +61,7 @@ impl Algorithm {
         }
     }
 
-    /// The checksum of bytes.
+    /// Computes the checksum of bytes.
     pub(crate) fn of(self, bytes: &[u8]) -> String {
         let mut hasher = Hasher::new(self);
         hasher.update(bytes);
@@ -71,7 +72,7 @@ impl Algorithm {
         Self::ALL.into_iter().find(|algorithm| algorithm.name().eq_ignore_ascii_case(name))
     }
 
-    /// Of the checksum.
+    /// Returns the length of the checksum in bytes.
     pub(crate) fn bytes(self) -> usize {
         match self {
             Self::Crc32 | Self::Crc32c => 4,
@@ -81,7 +82,7 @@ impl Algorithm {
         }
     }
 
-    /// What an upload in parts has when the client does not say.
+    /// Returns the kind of an upload in parts if the client does not choose one.
     pub(crate) fn default_kind(self) -> Kind {
         match self {
             Self::Crc64nvme => Kind::FullObject,
@@ -89,7 +90,7 @@ impl Algorithm {
         }
     }
 
-    /// Whether an upload in parts can have it.
+    /// Returns whether an upload in parts may have this kind.
     pub(crate) fn allows(self, kind: Kind) -> bool {
         match (self, kind) {
             (Self::Crc64nvme, Kind::Composite) | (Self::Sha1 | Self::Sha256, Kind::FullObject) => false,
@@ -101,7 +102,7 @@ impl Algorithm {
 }
 
 impl Kind {
-    /// As S3 writes it.
+    /// Returns S3's name of the kind.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::FullObject => "FULL_OBJECT",
@@ -110,7 +111,7 @@ impl Kind {
     }
 }
 
-/// Computes an ETag and a checksum of bytes that go by.
+/// A computation of an ETag and a checksum of a stream of bytes.
 pub(crate) struct Digests {
     md5: Md5,
     algorithm: Algorithm,
@@ -135,21 +136,21 @@ impl Digests {
         self.hasher.update(bytes);
     }
 
-    /// The MD5, and the checksum.
+    /// Returns the MD5 and the checksum.
     pub(crate) fn finish(self) -> ([u8; 16], Checksum) {
         let value = base64(&self.hasher.finish());
         (self.md5.finalize(), Checksum { algorithm: self.algorithm, kind: Kind::FullObject, value })
     }
 }
 
-/// Compares bytes that go by with the checksum that was stored of them.
+/// A comparison of a stream of bytes with their stored checksum.
 pub(crate) struct Comparison {
     hasher: Hasher,
     expected: String,
 }
 
 impl Comparison {
-    /// `None` for a checksum that is not of the bytes themselves.
+    /// Returns `None` for a checksum that is not computed from the bytes themselves.
     pub(crate) fn with(stored: &Checksum) -> Option<Self> {
         let hasher = Hasher::new(stored.algorithm);
         (stored.kind == Kind::FullObject).then(|| Self { hasher, expected: stored.value.clone() })
@@ -159,7 +160,7 @@ impl Comparison {
         self.hasher.update(bytes);
     }
 
-    /// Whether the bytes so far are those that were stored.
+    /// Returns whether the bytes so far match the stored checksum.
     pub(crate) fn matches(self) -> bool {
         base64(&self.hasher.finish()) == self.expected
     }
@@ -197,8 +198,8 @@ impl Hasher {
     }
 }
 
-/// The checksum of an object out of those of its parts, with their sizes. Nothing when one of them is of another
-/// algorithm, or a kind that the algorithm does not have.
+/// Computes the checksum of an object from the sizes and checksums of its parts. Returns `None` if a part has another
+/// algorithm, or if the algorithm does not allow the kind.
 pub(crate) fn of_parts(algorithm: Algorithm, kind: Kind, parts: &[(u64, &Checksum)]) -> Option<Checksum> {
     if !algorithm.allows(kind) || parts.iter().any(|(_, part)| part.algorithm != algorithm) {
         return None;
@@ -250,7 +251,7 @@ mod tests {
 
     #[test]
     fn checksums_of_known_bytes() {
-        // The published check values of each algorithm, for "123456789".
+        // The published check values of each algorithm for "123456789".
         for (algorithm, hex) in [
             (Algorithm::Crc32, "cbf43926"),
             (Algorithm::Crc32c, "e3069283"),

@@ -1,7 +1,7 @@
-//! Which pages of other sites a browser lets ask the store, and what they see of its answers: CORS, by a bucket's rules.
+//! CORS by a bucket's rules: the web pages of other sites that may send requests, and the response
+//! headers that they see.
 //! <https://docs.aws.amazon.com/AmazonS3/latest/userguide/cors.html>
-//!
-//! The rules are the browser's to obey. They allow nobody anything: every request is signed as without them.
+//! The browser enforces the rules. They grant no rights: every request must be signed as without them.
 
 use hyper::header::{
     ACCESS_CONTROL_ALLOW_CREDENTIALS, ACCESS_CONTROL_ALLOW_HEADERS, ACCESS_CONTROL_ALLOW_METHODS,
@@ -15,27 +15,27 @@ use s3s::{Body, S3Result};
 use crate::answer::coded;
 use crate::records::CorsRule;
 
-/// What a page asks for, of a preflight or of the request itself.
+/// The request that a page wants to make, from a preflight or from the request itself.
 struct Asked<'a> {
     origin: &'a str,
     method: &'a str,
     headers: Vec<String>,
 }
 
-/// What the headers of a request say, if a page of another site has sent it.
+/// The origin and the method of a request from a page of another site.
 pub(crate) struct Origin {
     origin: String,
     method: String,
 }
 
 impl Origin {
-    /// Of a request that is no preflight.
+    /// Reads the headers of a request that is no preflight. Returns `None` if it has no origin.
     pub(crate) fn of(method: &Method, headers: &HeaderMap) -> Option<Self> {
         let origin = headers.get(ORIGIN)?.to_str().ok()?.to_owned();
         Some(Self { origin, method: method.as_str().to_owned() })
     }
 
-    /// Says in an answer what the page may see of it.
+    /// Adds the headers to a response that allow the page to read it.
     pub(crate) fn allow(&self, rules: &[CorsRule], headers: &mut HeaderMap) {
         let asked = Asked { origin: &self.origin, method: &self.method, headers: Vec::new() };
         if let Some(rule) = rules.iter().find(|rule| matches(rule, &asked)) {
@@ -47,7 +47,7 @@ impl Origin {
 /// Answers a preflight.
 ///
 /// # Errors
-/// `BadRequest` for one that does not say what it asks for, `AccessForbidden` where no rule allows it.
+/// `BadRequest` for a preflight without method or origin, `AccessForbidden` if no rule allows it.
 pub(crate) fn preflight(rules: &[CorsRule], headers: &HeaderMap) -> S3Result<Response<Body>> {
     let text = |name: HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
     let missing = |what: &str| {
@@ -80,7 +80,7 @@ fn matches(rule: &CorsRule, asked: &Asked<'_>) -> bool {
             .all(|name| rule.headers.iter().any(|pattern| is_like(&pattern.to_ascii_lowercase(), name)))
 }
 
-/// Whether a text is as a pattern says, in which one `*` may stand for anything.
+/// Returns whether a text matches a pattern, in which one `*` may stand for any text.
 fn is_like(pattern: &str, text: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == text,

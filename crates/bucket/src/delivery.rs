@@ -1,8 +1,8 @@
-//! From the outbox to the webhook: every event at least once, those of one object in their order.
+//! Delivery of events from the outbox to the webhook: every event at least once, those of one object in order.
 //!
-//! Events of several objects travel at once; an event leaves the outbox after the listener said 200. When it does not, all
-//! wait a little and try again, for as long as it takes. What a kill leaves in the outbox is delivered at the next start:
-//! some of it for the second time.
+//! Events of several objects are sent at the same time. An event leaves the outbox after the listener has answered
+//! 200. After any other answer all events wait a little and are tried again, without limit. Events that a kill leaves
+//! in the outbox are delivered after the next start, some for the second time.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -24,29 +24,29 @@ use crate::records::{Event, decode};
 use crate::storage::{Kind, Storage, Table, View};
 use crate::{Error, Result};
 
-/// Events on their way at once.
+/// The number of events that are sent at the same time.
 const IN_FLIGHT: usize = 32;
 
-/// Events in memory. The others wait in the outbox.
+/// The number of events in memory. The others wait in the outbox.
 const WINDOW: usize = 1024;
 
-/// The pause after a failure; doubled with each that follows, up to the longest.
+/// The pause after a failure. It doubles with each further failure, up to the longest.
 const FIRST_PAUSE: Duration = Duration::from_millis(20);
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 
-/// Longer than a listener takes to write an event down.
+/// The time limit of a delivery: longer than a listener takes to store an event.
 const DELIVERY_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// See the module.
+/// A worker that delivers events, see the module.
 pub(crate) struct Delivery {
     storage: Storage,
     region: String,
     courier: Courier,
-    /// Read from the outbox, in order.
+    /// The events read from the outbox, in order.
     waiting: VecDeque<Letter>,
     /// The row that was read last.
     read: Vec<u8>,
-    /// Objects whose event is on its way.
+    /// The objects with an event on its way.
     busy: BTreeSet<(String, String)>,
 }
 
@@ -73,12 +73,12 @@ impl Delivery {
     /// [`Error::Webhook`].
     pub(crate) fn new(storage: Storage, region: &str, webhook: &Webhook) -> Result<Self> {
         let wrong = |reason: &str| Error::Webhook { url: webhook.url.clone(), reason: reason.to_owned() };
-        let uri: Uri = webhook.url.parse().map_err(|_| wrong("it is no URL"))?;
+        let uri: Uri = webhook.url.parse().map_err(|_| wrong("it is not a URL"))?;
         if uri.scheme_str() != Some("http") || uri.host().is_none() {
             return Err(wrong("it does not begin with http:// and a host"));
         }
         let mut authorization = HeaderValue::from_str(&format!("Bearer {}", webhook.token))
-            .map_err(|_| wrong("its token cannot stand in a header"))?;
+            .map_err(|_| wrong("its token has a character that is not allowed in a header"))?;
         authorization.set_sensitive(true);
         let mut connector = HttpConnector::new();
         connector.set_nodelay(true);
@@ -88,7 +88,7 @@ impl Delivery {
         Ok(Self { storage, region: region.to_owned(), courier, waiting, read, busy })
     }
 
-    /// Delivers, until dropped.
+    /// Delivers events until it is dropped.
     pub(crate) async fn run(mut self) {
         let mut on_the_way: JoinSet<(Letter, bool)> = JoinSet::new();
         let mut pause = FIRST_PAUSE;
@@ -108,7 +108,7 @@ impl Delivery {
                     let mut delivered = Vec::new();
                     let mut next = Some(carried);
                     while let Some(carried) = next {
-                        // A courier does not panic, and is not cancelled.
+                        // A courier does not panic and is not cancelled.
                         if let Ok((letter, arrived)) = carried {
                             self.busy.remove(&letter.object());
                             if arrived {
@@ -132,7 +132,7 @@ impl Delivery {
         }
     }
 
-    /// Reads rows until the window is full. What cannot be read now is read after the next change.
+    /// Reads rows until the window is full. If a read fails, it is repeated after the next change.
     async fn read_on(&mut self) {
         if self.waiting.len() > WINDOW / 2 {
             return;
@@ -147,13 +147,13 @@ impl Delivery {
         }
     }
 
-    /// The first event whose object has none on its way.
+    /// Removes and returns the first event whose object has no other on its way.
     fn next(&mut self) -> Option<Letter> {
         let at = self.waiting.iter().position(|letter| !self.busy.contains(&letter.object()))?;
         self.waiting.remove(at)
     }
 
-    /// Removes what was delivered, when there is something else to write.
+    /// Removes delivered events from the outbox, together with the next other write.
     fn forget(&self, rows: Vec<Vec<u8>>) {
         if rows.is_empty() {
             return;
@@ -163,7 +163,7 @@ impl Delivery {
             let forgotten = storage.change(Kind::Lazy, move |batch| {
                 rows.iter().try_for_each(|row| batch.remove(Table::Outbox, row).map(drop))
             });
-            // An event that stays is delivered once more at the next start.
+            // If this fails, the event stays and is delivered once more after the next start.
             let _ = forgotten.await;
         });
     }
@@ -181,7 +181,7 @@ fn letters(storage: &Storage, after: &[u8], room: usize) -> Option<Vec<Letter>> 
     letters.ok()
 }
 
-/// Carries an event to the listener; says whether it arrived.
+/// Sends an event to the listener. Returns whether it was delivered.
 async fn carry(courier: Courier, letter: Letter, region: String) -> (Letter, bool) {
     let sequencer = letter.row.as_slice().try_into().map_or(0, u64::from_be_bytes);
     let body = message(&letter.event, sequencer, &region).to_string();

@@ -1,82 +1,82 @@
-//! Why the store cannot be started. What goes wrong in a request is answered there.
+//! The errors that keep the store from starting. Errors of requests are reported in their responses.
 
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Why the store cannot be started.
+/// The reason why the store cannot be started.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Another process has the folder.
+    /// Another process uses the folder.
     #[error("{} is in use by another process", .0.display())]
     DataInUse(PathBuf),
-    /// The folder holds something else, which stays as it is.
+    /// The folder holds something else. It is left unchanged.
     #[error("{} holds {what}, not a bucket's data: choose another folder or move that away", path.display())]
     NotOurs {
-        /// The folder.
+        /// The path of the folder.
         path: PathBuf,
-        /// What was found there.
+        /// A description of its content.
         what: String,
     },
-    /// The folder was written by a later version.
+    /// A later version has written the folder.
     #[error("{} was written by a later version (format {found}; this one reads {known})", path.display())]
     Newer {
-        /// The folder.
+        /// The path of the folder.
         path: PathBuf,
-        /// Its format.
+        /// The format of the folder.
         found: u32,
-        /// The newest that is known here.
+        /// The newest format that this version can read.
         known: u32,
     },
     /// A file or folder could not be used.
-    #[error("{}", path.display())]
+    #[error("cannot access {}", path.display())]
     File {
-        /// Which.
+        /// The path of the file or folder.
         path: PathBuf,
-        /// Why.
+        /// The error of the system.
         source: io::Error,
     },
-    /// A file is damaged, or missing beside others. Nothing was changed.
+    /// A file is damaged, or missing while others are there. Nothing was changed.
     #[error(
         "{} is damaged{}: {what}. Nothing was changed. `rayfold-bucket check --data {}` lists what is damaged, and with \
          `--repair` sets it aside and keeps the rest",
         file.display(), at(*offset), folder.display()
     )]
     Damaged {
-        /// The folder of the store.
+        /// The path of the store's folder.
         folder: PathBuf,
-        /// The damaged file.
+        /// The path of the damaged file.
         file: PathBuf,
-        /// The first damaged byte, where one is known.
+        /// The position of the first damaged byte, if it is known.
         offset: Option<u64>,
-        /// What is wrong with it.
+        /// A description of the damage.
         what: String,
     },
-    /// The address could not be had.
+    /// The server cannot listen on the address.
     #[error("cannot listen on {address}")]
     Listen {
-        /// Where.
+        /// The address that was requested.
         address: String,
-        /// Why.
+        /// The error of the system.
         source: io::Error,
     },
-    /// The webhook's address is of no use.
+    /// The URL of the webhook is invalid.
     #[error("events cannot be sent to {url}: {reason}")]
     Webhook {
-        /// As it was given.
+        /// The URL as it was given.
         url: String,
-        /// What is wrong with it.
+        /// The problem with it.
         reason: String,
     },
-    /// A part of the program failed while starting.
+    /// A part of the program failed during the start.
     #[error("the store did not start: {0}")]
     Start(String),
     /// The database could not be read or written.
     #[error("the database in {}", path.display())]
     Storage {
-        /// The folder.
+        /// The path of the folder.
         path: PathBuf,
-        /// Why.
+        /// The error of the database.
         source: Box<redb::Error>,
     },
 }
@@ -88,15 +88,15 @@ impl Error {
     }
 }
 
-/// " at byte N".
+/// Returns " at byte N", or nothing without a position.
 fn at(offset: Option<u64>) -> String {
     offset.map_or_else(String::new, |offset| format!(" at byte {offset}"))
 }
 
-/// Writes a line about damage that was noticed while the store runs to standard error.
+/// Reports damage that was noticed while the store runs, as a line on standard error.
 pub(crate) fn report(damage: &dyn std::fmt::Display) {
     let _ = writeln!(io::stderr().lock(), "rayfold-bucket: {damage}");
 }
 
-/// The crate's results.
+/// The result of the crate's functions.
 pub type Result<T, E = Error> = std::result::Result<T, E>;

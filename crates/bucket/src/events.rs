@@ -1,4 +1,4 @@
-//! Events as S3 writes them, version 2.1 of the record.
+//! Event messages in S3's format, version 2.1 of the record.
 //! <https://docs.aws.amazon.com/AmazonS3/latest/userguide/notification-content-structure.html>
 
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
@@ -7,11 +7,11 @@ use serde_json::{Value, json};
 
 use crate::records::Event;
 
-/// What stands in an event's key as it is; a blank is a plus.
+/// The characters that are not percent-encoded in an event's key. A space becomes a plus.
 const KEPT: AsciiSet =
     NON_ALPHANUMERIC.remove(b'-').remove(b'_').remove(b'.').remove(b'*').remove(b'/').remove(b' ');
 
-/// The message of an event. `sequencer` grows with the order of changes.
+/// Formats the message of an event. `sequencer` grows with the order of changes.
 pub(crate) fn message(event: &Event, sequencer: u64, region: &str) -> Value {
     let mut object = json!({
         "key": utf8_percent_encode(&event.key, &KEPT).to_string().replace(' ', "+"),

@@ -1,20 +1,21 @@
-//! Unfinished uploads go a week after they were begun, as the lifecycle rule of the bucket on AWS says.
+//! Expiry of unfinished uploads a week after they were begun, like the lifecycle rule of the bucket on AWS.
 
 use std::time::Duration;
 
 use crate::records::{self, Moment, abandon, all, decode};
 use crate::storage::{Kind, Storage, Table, Unavailable};
 
-/// How long an upload may take.
+/// The time after which an unfinished upload expires.
 const LIFETIME: Duration = Duration::from_secs(7 * 24 * 60 * 60);
 
-/// How often it is looked for uploads that are over.
+/// The time between two searches for expired uploads.
 pub(crate) const INTERVAL: Duration = Duration::from_secs(60 * 60);
 
-/// Removes the unfinished uploads that were begun a week or longer before `now`, with their parts; gives how many.
+/// Removes the unfinished uploads that were begun a week or longer before `now`, with their
+/// parts. Returns their number.
 ///
 /// # Errors
-/// [`Unavailable`].
+/// Returns [`Unavailable`] if the storage cannot be written.
 pub(crate) async fn expire_uploads(storage: &Storage, now: Moment) -> Result<u64, Unavailable> {
     let lifetime = u64::try_from(LIFETIME.as_millis()).unwrap_or(u64::MAX);
     let expire = storage.change(Kind::Shrinks, move |batch| {
@@ -79,7 +80,7 @@ mod tests {
         };
         let week = 7 * 24 * 60 * 60 * 1000;
         assert_eq!(expire_uploads(&storage, Moment(begun.0 + week - 1)).await.unwrap(), 0);
-        // A clock that was set back.
+        // The clock was set back.
         assert_eq!(expire_uploads(&storage, Moment(0)).await.unwrap(), 0);
         assert_eq!(left(), [2, 2, 2]);
         assert_eq!(expire_uploads(&storage, Moment(begun.0 + week)).await.unwrap(), 1);

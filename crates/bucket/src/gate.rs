@@ -1,12 +1,12 @@
-//! Refuses requests that ask for more than the store does, before anything else looks at them.
+//! The gate, which refuses requests for unsupported features before any other code sees them.
 //!
-//! S3 grows by new sub-resources and headers. A server that passes over those that it does not know takes the request for
-//! another one: `PUT key?annotation` for a put of the key. So the table of [`operations`] lists what is known, and every
-//! other method, parameter of the query, header that begins with `x-amz-`, field of a form and element of an XML body is
-//! answered with `NotImplemented`. [`Gate::operation`] is also what the access check compares `s3s`' own routing with, so
-//! that no other operation runs than the one that was found here.
+//! S3 grows by new sub-resources and headers. A server that ignores unknown ones mistakes the request for another:
+//! `PUT key?annotation` for a put of the key. So the table of [`operations`] lists everything supported. Any other
+//! method, query parameter, header that begins with `x-amz-`, form field or element of an XML body is answered with
+//! `NotImplemented`. The access check also compares [`Gate::operation`] with the routing of `s3s`, so that no other
+//! operation runs than the one found here.
 //!
-//! Knows no storage and no identities: what it refuses is the same for every caller.
+//! Knows no storage and no identities: it refuses the same requests for every caller.
 
 mod body;
 mod form;
@@ -26,22 +26,24 @@ use operations::{OPERATIONS, On, Operation, Payload};
 
 pub(crate) use values::{amz_date, checksum_header};
 
-/// What the gate found of a request.
+/// The result of the gate for a request.
 #[derive(Clone)]
 pub(crate) struct Gate {
-    /// None for a request that is refused.
+    /// The operation, or `None` if the request is refused.
     operation: Option<&'static Operation>,
     verdict: Verdict,
 }
 
 impl Gate {
-    /// Checks a request. Its parameters that stand for headers become headers; its body is checked while it is read.
+    /// Checks a request. Converts the query parameters that stand for headers into headers. The body is checked
+    /// while it is read.
     ///
-    /// What is wrong with a presigned URL is told once its signature was checked, by [`Gate::check_route`]: whoever changed
-    /// it is told of that.
+    /// Errors in a presigned URL are reported by [`Gate::check_route`] after its signature was checked. So a URL that
+    /// was altered gets the error about its signature.
     ///
     /// # Errors
-    /// `NotImplemented` for what is not in the table, and S3's code for a known header with a value that cannot be.
+    /// `NotImplemented` for anything that is not in the table, and S3's code for a known header
+    /// with an invalid value.
     pub(crate) fn admit(request: &mut Request<Body>) -> S3Result<Self> {
         let query = queries::parse(request.uri())?;
         let verdict = Verdict::default();
@@ -55,17 +57,17 @@ impl Gate {
         }
     }
 
-    /// The name in S3's API.
+    /// Returns the operation's name in S3's API.
     pub(crate) fn operation(&self) -> &'static str {
         self.operation.map_or("", |operation| operation.name)
     }
 
-    /// Why the body was refused, when it was.
+    /// Returns the reason why the body was refused, if it was.
     pub(crate) fn refusal(&self) -> Option<S3Error> {
         self.operation.and_then(|_| self.verdict.take())
     }
 
-    /// Refuses a request that was not admitted, or that is routed to another operation than the one that was.
+    /// Refuses a request that was not admitted, or that is routed to another operation than the admitted one.
     pub(crate) fn check_route(&self, routed: &str) -> S3Result<()> {
         match self.operation {
             Some(operation) if operation.name == routed => Ok(()),
@@ -75,7 +77,7 @@ impl Gate {
     }
 }
 
-/// Finds the operation, and checks all that is asked of it.
+/// Finds the operation, and checks the whole request against it.
 fn judge(
     request: &mut Request<Body>,
     query: &[(String, String)],
@@ -94,7 +96,7 @@ fn judge(
     Ok(operation)
 }
 
-/// What the request is about. Names are not checked here.
+/// Returns the kind of resource that the request is about. Does not check names.
 fn target(headers: &HeaderMap, path: &str) -> On {
     let decoded = percent_encoding::percent_decode_str(path).decode_utf8_lossy();
     let rest = decoded.strip_prefix('/').unwrap_or(&decoded);
@@ -108,7 +110,7 @@ fn target(headers: &HeaderMap, path: &str) -> On {
     }
 }
 
-/// Chooses the operation that the most parameters name.
+/// Returns the operation that matches the most parameters.
 fn find(
     method: &Method,
     on: On,
@@ -133,7 +135,7 @@ fn find(
         .ok_or_else(|| not_implemented(&format!("{method} of {}", on.name())))
 }
 
-/// Whether `s3s` takes it for a form of a browser, whatever else it says.
+/// Returns whether `s3s` treats the request as a browser's form, whatever else it contains.
 fn is_form(method: &Method, headers: &HeaderMap) -> bool {
     let kind = headers.get(CONTENT_TYPE).and_then(|kind| kind.to_str().ok()).unwrap_or_default();
     let kind = kind.split(';').next().unwrap_or_default().trim();

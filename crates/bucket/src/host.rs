@@ -1,5 +1,5 @@
-//! Which bucket a host name says: `bucket.localhost:9000` and `bucket.s3.localhost:9000` are buckets, any other host is
-//! the store itself, and the bucket is the first part of the path.
+//! The bucket in a host name: `bucket.localhost:9000` and `bucket.s3.localhost:9000` name a bucket. For any other
+//! host, the bucket is the first part of the path.
 
 use std::net::{IpAddr, SocketAddr};
 
@@ -8,10 +8,10 @@ use hyper::header::HOST;
 use s3s::S3Result;
 use s3s::host::{S3Host, VirtualHost};
 
-/// What comes after the bucket in a host name, the longer one first.
+/// The endings of host names that contain a bucket, the longer one first.
 const BASES: [&str; 2] = ["s3.localhost", "localhost"];
 
-/// See the module.
+/// The parser of host names, see the module.
 pub(crate) struct Hosts;
 
 impl S3Host for Hosts {
@@ -29,7 +29,7 @@ impl S3Host for Hosts {
     }
 }
 
-/// The bucket that a host name or else a path says, whether there is one or not.
+/// Returns the bucket named by the host or else by the path, whether it exists or not.
 pub(crate) fn bucket_of(headers: &HeaderMap, path: &str) -> Option<String> {
     if let Some(bucket) = in_host(headers) {
         return Some(bucket);
@@ -39,7 +39,7 @@ pub(crate) fn bucket_of(headers: &HeaderMap, path: &str) -> Option<String> {
     (!name.is_empty()).then(|| name.to_owned())
 }
 
-/// The bucket that a host name says.
+/// Returns the bucket named by the host.
 pub(crate) fn in_host(headers: &HeaderMap) -> Option<String> {
     let host = headers.get(HOST)?.to_str().ok()?;
     let is_address = host.parse::<SocketAddr>().is_ok() || host.parse::<IpAddr>().is_ok();

@@ -1,10 +1,10 @@
 //! An S3-compatible object store in a folder, which runs in the process that starts it.
 //!
-//! [`Server::start`] opens the folder and answers S3's protocol on an address; whoever starts it says who may do
-//! everything ([`Options::root`]) and where events go ([`Options::webhook`]). What was acknowledged is on the disk;
-//! the event of a change is written with the change.
+//! [`Server::start`] opens the folder and serves S3's protocol on an address. The caller provides the owner's key
+//! ([`Options::root`]) and the receiver of events ([`Options::webhook`]). Every acknowledged change is on disk, and
+//! its event is written in the same commit.
 //!
-//! Knows nothing of what the objects are for: neither keys nor bodies mean anything here.
+//! The store does not interpret keys or bodies.
 //!
 //! ```no_run
 //! use rayfold_bucket::{Credentials, Options, Server};
@@ -25,12 +25,12 @@
 mod answer;
 mod check;
 mod checksum;
+mod connection_service;
 mod cors;
 mod delivery;
 mod error;
 mod events;
 mod expiry;
-mod front;
 mod gate;
 mod host;
 mod identity;

@@ -1,20 +1,20 @@
-//! The limits that `s3s` holds, which are other ones while it takes in a browser's form.
+//! The limits that `s3s` enforces. They differ while it receives a browser's form.
 
 use std::sync::Arc;
 
 use s3s::config::{S3Config, S3ConfigProvider};
 
-/// Of a form's file, which `s3s` keeps in memory.
+/// The largest file of a form in bytes, because `s3s` keeps it in memory.
 const LARGEST_FORM_FILE: u64 = 256 * 1024 * 1024;
 
-/// How long before it is used a form may be signed: a week, as a URL. Its policy says when it expires.
+/// The longest time between signing and using a form: a week, as for a URL. The form's policy says when it expires.
 const OLDEST_FORM_SECONDS: u32 = 604_800;
 
 tokio::task_local! {
     static IS_FORM: ();
 }
 
-/// See the module.
+/// A provider of the limits, see the module.
 pub(crate) struct Limits {
     plain: Arc<S3Config>,
     form: Arc<S3Config>,
@@ -36,7 +36,7 @@ impl S3ConfigProvider for Limits {
     }
 }
 
-/// Runs what answers a form.
+/// Runs the answer to a form under the limits of forms.
 pub(crate) async fn of_form<F: Future>(answer: F) -> F::Output {
     IS_FORM.scope((), answer).await
 }

@@ -1,44 +1,44 @@
-//! What whoever starts the store decides.
+//! The options of the store.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-/// The queue that a bucket's notifications name to reach [`Options::webhook`].
+/// The ARN of the queue that a bucket's notification must name to reach [`Options::webhook`].
 pub const QUEUE_ARN: &str = "arn:aws:sqs:us-east-1:000000000000:webhook";
 
-/// The account that all buckets and objects belong to.
+/// The account that owns all buckets and objects.
 pub(crate) const OWNER: &str = "000000000000";
 
 /// An access key and its secret.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Credentials {
-    /// The access key's id.
+    /// The id of the access key.
     pub access_key: String,
-    /// The secret.
+    /// The secret of the access key.
     pub secret_key: String,
 }
 
-/// Where events go.
+/// The receiver of events.
 #[derive(Clone)]
 pub struct Webhook {
-    /// Of the listener, `http://…`. An event is delivered when it answers 200.
+    /// The URL of the listener, `http://…`. An event is delivered when it answers 200.
     pub url: String,
-    /// Sent as `Authorization: Bearer <token>`, so that the listener knows the store.
+    /// The token that is sent as `Authorization: Bearer <token>`, so that the listener can authenticate the store.
     pub token: String,
 }
 
-/// How to run the store.
+/// The options with which the store runs.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The folder, made when missing. One process at a time uses it.
+    /// The folder of the store, which is created if missing. Only one process may use it at a time.
     pub data: PathBuf,
-    /// Where to listen; port 0 stands for any free one.
+    /// The address to listen on; port 0 selects any free one.
     pub address: SocketAddr,
-    /// Who may do everything.
+    /// The owner's key, which may do everything.
     pub root: Credentials,
-    /// What the buckets' location is.
+    /// The region of all buckets.
     pub region: String,
-    /// Where events go. Without it they wait in the folder for the next start.
+    /// The receiver of events. Without it they wait in the folder for the next start.
     pub webhook: Option<Webhook>,
 }
 

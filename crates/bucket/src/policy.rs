@@ -1,10 +1,11 @@
-//! What a session may do: an IAM policy document, evaluated as IAM does.
+//! The rights of a session: an IAM policy document, evaluated as IAM does.
 //!
-//! An explicit deny beats every allow; what no statement allows is denied. The document is read strictly: what is not
-//! understood here (`NotAction`, `Principal`, another operator, another condition key, a policy variable, an unknown
-//! field) is refused by name when the policy is loaded, because a condition that is overlooked would allow too much.
+//! An explicit deny overrides every allow, and an action that no statement allows is denied. The document is parsed
+//! strictly. Loading it fails with the name of anything unsupported (`NotAction`, `Principal`, another operator or
+//! condition key, a policy variable, an unknown field), because ignoring a condition would allow too much.
 //!
-//! Pure: knows no requests, no keys and no clock. [`needed`] says which actions an operation of S3 asks for.
+//! The module is pure: it knows no requests, keys or clock. [`needed`] returns the actions that an
+//! operation of S3 needs.
 //!
 //! ```
 //! use rayfold_bucket::policy::{Access, Policy, Verdict};
@@ -62,7 +63,7 @@ mod tests {
         assert_eq!(policy.verdict(&access("s3:GetObject", "arn:aws:s3:::b/k")), Verdict::NotAllowed);
     }
 
-    /// The functions' documents: what Terraform gives them on AWS is what they are tried under here.
+    /// The policies of the functions: those that Terraform deploys on AWS are the ones tested here.
     #[test]
     fn the_documents_of_the_functions_are_read() {
         for (name, template) in [

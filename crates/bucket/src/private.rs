@@ -1,21 +1,21 @@
-//! Folders that other users of the machine do not look into.
+//! Folders that other users of the machine cannot read.
 
 use std::fs::{self, DirBuilder, Permissions};
 use std::io;
 use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
 use std::path::Path;
 
-/// What a group and others may do.
+/// The permission bits of group and others.
 const OTHERS: u32 = 0o077;
 
-/// Of a file that nobody else reads.
+/// The mode of a file that only its owner can read.
 pub(crate) const FILE: u32 = 0o600;
 
-/// Makes a folder, and those above it, when missing. A new one is its owner's alone; those above it are as usual, and one
-/// that is there stays as it is.
+/// Creates a folder and its parents if they are missing. A new folder is accessible to its owner only. New parents
+/// have the usual mode, and an existing folder keeps its own.
 ///
 /// # Errors
-/// The system's.
+/// Returns the error of the system.
 pub fn make(folder: &Path) -> io::Result<()> {
     if let Some(above) = folder.parent() {
         fs::create_dir_all(above)?;
@@ -26,7 +26,7 @@ pub fn make(folder: &Path) -> io::Result<()> {
     }
 }
 
-/// Closes a folder to all but its owner. One of another owner's is that one's business, and stays as it is.
+/// Removes the access of all but the owner from a folder. A folder of another owner is left unchanged.
 pub fn close(folder: &Path) {
     let Ok(found) = folder.metadata() else { return };
     let mode = found.permissions().mode();

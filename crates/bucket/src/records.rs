@@ -1,6 +1,6 @@
-//! What the rows mean: buckets, objects, uploads, parts and waiting events, as JSON under ordered keys.
+//! The records in the rows: buckets, objects, uploads, parts and waiting events, as JSON under ordered keys.
 //!
-//! JSON, because a row that a later version writes with a field more is still read. Knows no protocol.
+//! JSON, because a row to which a later version adds a field can still be read. Knows no protocol.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, SystemTime};
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::checksum::Checksum;
 use crate::storage::{Batch, BodyId, Row, Table, View};
 
-/// Milliseconds since 1970.
+/// A time in milliseconds since 1970.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(transparent)]
 pub(crate) struct Moment(pub(crate) u64);
@@ -27,30 +27,30 @@ impl Moment {
         SystemTime::UNIX_EPOCH + Duration::from_millis(self.0)
     }
 
-    /// What HTTP's dates can say.
+    /// Returns the time in the precision of HTTP dates.
     pub(crate) fn whole_seconds(self) -> SystemTime {
         SystemTime::UNIX_EPOCH + Duration::from_secs(self.0 / 1000)
     }
 }
 
-/// A bucket.
+/// The record of a bucket.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Bucket {
     pub(crate) created: Moment,
-    /// Which changes are told.
+    /// The rules that select the changes with events.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) notifications: Vec<Notification>,
-    /// Which pages of other sites may ask for what.
+    /// The CORS rules.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) cors: Vec<CorsRule>,
 }
 
-/// A rule of which pages of other sites may ask for what, and see of the answer.
+/// A CORS rule: the requests that pages of some origins may send, and the headers that they see.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct CorsRule {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) id: Option<String>,
-    /// `*` in it, at most once, stands for anything; in `headers` as well.
+    /// The allowed origins. One `*` may stand for any text, here and in `headers`.
     pub(crate) origins: Vec<String>,
     pub(crate) methods: Vec<String>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -61,18 +61,18 @@ pub(crate) struct CorsRule {
     pub(crate) max_age_seconds: Option<i32>,
 }
 
-/// A rule of which changes are told.
+/// A rule that selects the changes with events.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Notification {
     pub(crate) id: String,
     pub(crate) queue: String,
-    /// S3's names of events, `*` at the end standing for any.
+    /// S3's names of events. A `*` at the end stands for any text.
     pub(crate) events: Vec<String>,
     pub(crate) prefix: String,
     pub(crate) suffix: String,
 }
 
-/// What an object's headers say of its content.
+/// The headers of an object that describe its content.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Headers {
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -87,40 +87,40 @@ pub(crate) struct Headers {
     pub(crate) content_language: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) expires: Option<String>,
-    /// The user's.
+    /// The metadata set by the user.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub(crate) metadata: BTreeMap<String, String>,
 }
 
-/// Where a body is.
+/// The location of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Body {
-    /// In a row.
+    /// The body is stored in a row.
     Row(BodyId),
-    /// In a file.
+    /// The body is stored in a file.
     File(BodyId),
-    /// In the parts that it was uploaded in.
+    /// The body consists of the parts in which it was uploaded.
     Parts(BodyId),
 }
 
-/// An object.
+/// The record of an object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Object {
     pub(crate) size: u64,
-    /// Without quotes.
+    /// The entity tag without quotes.
     pub(crate) etag: String,
     pub(crate) modified: Moment,
     pub(crate) headers: Headers,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) checksum: Option<Checksum>,
     pub(crate) body: Body,
-    /// The upload in parts that it came from, so that a completion whose answer was lost can be asked for again.
+    /// The upload in parts that made the object, so that a completion whose response was lost can be repeated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) upload: Option<String>,
 }
 
-/// One of the parts that an object was uploaded in.
+/// One of the parts in which an object was uploaded.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LayoutPart {
     pub(crate) number: u16,
@@ -136,19 +136,19 @@ pub(crate) struct Layout {
     pub(crate) parts: Vec<LayoutPart>,
 }
 
-/// An unfinished upload.
+/// The record of an unfinished upload.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Upload {
     pub(crate) initiated: Moment,
     pub(crate) headers: Headers,
-    /// Of each part, and of the whole.
+    /// The algorithm for each part and for the whole object.
     pub(crate) algorithm: crate::checksum::Algorithm,
     pub(crate) kind: crate::checksum::Kind,
-    /// The client named the algorithm.
+    /// Whether the client named the algorithm.
     pub(crate) asked: bool,
 }
 
-/// An uploaded part.
+/// The record of an uploaded part.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Part {
     pub(crate) size: u64,
@@ -158,20 +158,20 @@ pub(crate) struct Part {
     pub(crate) checksum: Checksum,
 }
 
-/// A change that is still to be told.
+/// A change whose event is not delivered yet.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Event {
     pub(crate) bucket: String,
     pub(crate) key: String,
-    /// `ObjectCreated:Put`.
+    /// The name of the event, such as `ObjectCreated:Put`.
     pub(crate) name: String,
     pub(crate) time: Moment,
-    /// The rule's.
+    /// The id of the rule that selected the event.
     pub(crate) configuration: String,
-    /// Of what was created.
+    /// The size of the object that was created.
     pub(crate) size: Option<u64>,
     pub(crate) etag: Option<String>,
-    /// Who did it.
+    /// The access key that made the change.
     pub(crate) principal: String,
     pub(crate) request: String,
     pub(crate) source: String,
@@ -179,51 +179,51 @@ pub(crate) struct Event {
 
 /// The keys of rows.
 pub(crate) mod key {
-    /// Of an object; with an empty key, of where a bucket's objects begin.
+    /// Returns the key of an object's row. With an empty `key`, returns the start of a bucket's objects.
     pub(crate) fn object(bucket: &str, key: &[u8]) -> Vec<u8> {
         [bucket.as_bytes(), b"\0", key].concat()
     }
 
-    /// Of an upload. The id has no zero byte, so that uploads are in the order of key and id.
+    /// Returns the key of an upload's row. The id has no zero byte, so uploads are ordered by key and id.
     pub(crate) fn upload(bucket: &str, key: &str, id: &str) -> Vec<u8> {
         [bucket.as_bytes(), b"\0", key.as_bytes(), b"\0", id.as_bytes()].concat()
     }
 
-    /// Of a part.
+    /// Returns the key of a part's row.
     pub(crate) fn part(upload: &str, number: u16) -> Vec<u8> {
         [upload.as_bytes(), b"\0", &number.to_be_bytes()].concat()
     }
 
-    /// The object's key in an object's row's key.
+    /// Extracts the object's key from the key of its row.
     pub(crate) fn of_object<'a>(row: &'a [u8], bucket: &str) -> &'a [u8] {
         row.get(bucket.len() + 1..).unwrap_or_default()
     }
 
-    /// Key and id in an upload's row's key.
+    /// Extracts key and id from the key of an upload's row.
     pub(crate) fn of_upload<'a>(row: &'a [u8], bucket: &str) -> (&'a [u8], &'a [u8]) {
         let rest = of_object(row, bucket);
         let end = rest.iter().rposition(|byte| *byte == 0).unwrap_or(rest.len());
         (&rest[..end], rest.get(end + 1..).unwrap_or_default())
     }
 
-    /// The number in a part's row's key.
+    /// Extracts the part number from the key of its row.
     pub(crate) fn of_part(row: &[u8]) -> u16 {
         row.last_chunk().map_or(0, |bytes| u16::from_be_bytes(*bytes))
     }
 }
 
-/// A row's value.
+/// Encodes the value of a row.
 pub(crate) fn encode<T: Serialize>(record: &T) -> Result<Vec<u8>, StorageError> {
     serde_json::to_vec(record).map_err(|error| StorageError::Corrupted(error.to_string()))
 }
 
-/// What a row's value means.
+/// Decodes the value of a row.
 pub(crate) fn decode<T: DeserializeOwned>(value: &[u8]) -> Result<T, StorageError> {
     serde_json::from_slice(value)
         .map_err(|error| StorageError::Corrupted(format!("a row is damaged: {error}")))
 }
 
-/// The record at a key.
+/// Returns the record at a key.
 pub(crate) fn find<T: DeserializeOwned>(
     view: &impl View,
     table: Table,
@@ -232,7 +232,7 @@ pub(crate) fn find<T: DeserializeOwned>(
     view.get(table, key)?.map(|value| decode(&value)).transpose()
 }
 
-/// Sets the record at a key.
+/// Writes the record at a key.
 pub(crate) fn set<T: Serialize>(
     batch: &mut Batch<'_>,
     table: Table,
@@ -242,12 +242,12 @@ pub(crate) fn set<T: Serialize>(
     batch.put(table, key, &encode(record)?)
 }
 
-/// The rows that begin with a prefix, all at once: of what is bounded.
+/// Returns all rows whose keys begin with a prefix, in memory. Their number must be bounded.
 pub(crate) fn all(view: &impl View, table: Table, prefix: &[u8]) -> Result<Vec<Row>, StorageError> {
     view.beginning_with(table, prefix)?.collect()
 }
 
-/// Removes a body that its record no longer refers to, wherever it is.
+/// Removes a body that its record no longer refers to, in row, file or parts.
 pub(crate) fn release(batch: &mut Batch<'_>, body: Body) -> Result<(), StorageError> {
     match body {
         Body::Row(id) => drop(batch.remove(Table::Bodies, &id.key())?),
@@ -266,7 +266,7 @@ pub(crate) fn release(batch: &mut Batch<'_>, body: Body) -> Result<(), StorageEr
     Ok(())
 }
 
-/// Removes an unfinished upload, given its row's key, with its parts.
+/// Removes an unfinished upload with its parts, given the key of its row.
 pub(crate) fn abandon(batch: &mut Batch<'_>, upload: &[u8]) -> Result<(), StorageError> {
     let id = upload.rsplit(|byte| *byte == 0).next().unwrap_or_default();
     for (part, value) in all(batch, Table::Parts, &[id, b"\0"].concat())? {

@@ -1,5 +1,5 @@
-//! Answers as S3 writes them, where `s3s` does not: control characters in XML as references, a message in every error, the
-//! entity tag of GetObjectAttributes without quotes.
+//! Corrections of responses in which `s3s` differs from S3: control characters in XML as references, a message in
+//! every error, and the entity tag of GetObjectAttributes without quotes.
 
 use bytes::Bytes;
 use http_body_util::BodyExt;
@@ -7,7 +7,7 @@ use hyper::Response;
 use hyper::header::{CONTENT_LENGTH, CONTENT_TYPE};
 use s3s::{Body, HttpError};
 
-/// Rewrites an answer of an operation, if it is XML that the store wrote and no object's body.
+/// Rewrites the response of an operation if it is XML written by the store. The body of an object is not changed.
 pub(crate) async fn written(operation: &str, response: Response<Body>) -> Result<Response<Body>, HttpError> {
     let is_xml = response.headers().get(CONTENT_TYPE).is_some_and(|kind| kind == "application/xml");
     let is_object = matches!(operation, "GetObject" | "HeadObject") && response.status().is_success();
@@ -30,8 +30,8 @@ pub(crate) async fn written(operation: &str, response: Response<Body>) -> Result
     Ok(Response::from_parts(parts, Body::from(Bytes::from(text))))
 }
 
-/// Control characters as references: a parser reads a bare carriage return as a line feed, and trims white space. `s3s` puts
-/// none between elements.
+/// Replaces control characters by references: a parser reads a bare carriage return as a line feed, and trims white
+/// space. `s3s` writes none between elements.
 fn with_references(text: &str) -> String {
     let (declaration, rest) = match text.find("?>") {
         Some(end) if text.starts_with("<?xml") => text.split_at(end + 2),
@@ -50,7 +50,7 @@ fn with_references(text: &str) -> String {
     written
 }
 
-/// An error with a message.
+/// Adds a message to an error that has none.
 fn with_message(text: String) -> String {
     let Some((before, rest)) = text.split_once("<Code>") else { return text };
     let Some((code, after)) = rest.split_once("</Code>") else { return text };
@@ -62,7 +62,7 @@ fn with_message(text: String) -> String {
     format!("{before}<Code>{code}</Code><Message>{}</Message>{after}", message(code))
 }
 
-/// What S3 says with a code.
+/// Returns S3's message for an error code.
 fn message(code: &str) -> &'static str {
     match code {
         "AccessDenied" => "Access Denied",
@@ -108,15 +108,15 @@ mod tests {
     #[test]
     fn every_error_has_a_message() {
         let bare = "<Error><Code>InvalidURI</Code></Error>".to_owned();
-        let told =
+        let with_text =
             "<Error><Code>InvalidURI</Code><Message>Couldn't parse the specified URI.</Message></Error>";
-        assert_eq!(with_message(bare), told);
-        assert_eq!(with_message(told.to_owned()), told);
+        assert_eq!(with_message(bare), with_text);
+        assert_eq!(with_message(with_text.to_owned()), with_text);
         let empty = "<Error><Code>Odd</Code><Message></Message></Error>".to_owned();
         assert!(with_message(empty).contains("<Message>The request could not be served"));
     }
 
-    /// An object that is XML is the user's.
+    /// An object that is XML belongs to the user, and is not rewritten.
     #[tokio::test]
     async fn bodies_of_objects_stay() {
         let body = "<a>\r\n</a>";

@@ -1,4 +1,4 @@
-//! The listener: connections in, requests to the service, an end in order.
+//! The listener: accepts connections, passes requests to the service, and shuts down in order.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -12,9 +12,9 @@ use tokio::sync::oneshot;
 use tokio::task::{JoinHandle, JoinSet};
 use tokio::time::timeout;
 
+use crate::connection_service::{ConnectionService, Rules};
 use crate::delivery::Delivery;
 use crate::expiry::{INTERVAL, expire_uploads};
-use crate::front::{Front, Rules};
 use crate::host::Hosts;
 use crate::identity::{Access, AssumeRole, Identities, Sessions};
 use crate::limits::Limits;
@@ -24,13 +24,14 @@ use crate::service::Service;
 use crate::storage::{Storage, Writing};
 use crate::{Error, Result};
 
-/// How long requests that are under way at the end may take.
+/// The time that running requests get at the end.
 const GRACE: Duration = Duration::from_secs(5);
 
-/// How long after a failed `accept` (no more file descriptors, for one) the next one waits.
+/// The pause after a failed `accept`, for example for lack of file descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(20);
 
-/// A running store. Dropping it closes the listener and every connection; [`Server::stop`] lets requests end first.
+/// A running store. Dropping it closes the listener and every connection. [`Server::stop`] lets
+/// running requests end first.
 pub struct Server {
     address: SocketAddr,
     ending: Option<oneshot::Sender<()>>,
@@ -41,7 +42,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Opens the folder and answers requests, on the current tokio runtime.
+    /// Opens the folder and serves requests on the current tokio runtime.
     ///
     /// # Errors
     /// [`Error::DataInUse`], [`Error::NotOurs`], [`Error::Newer`], [`Error::Listen`], [`Error::Webhook`],
@@ -57,7 +58,7 @@ impl Server {
         let delivery = delivery.map(|webhook| Delivery::new(storage.clone(), &options.region, webhook));
         let delivering = delivery.transpose()?.map(|delivery| tokio::spawn(delivery.run()));
         let collected = storage.clone();
-        // Files that a killed run left take room, and stand in nobody's way.
+        // Files that a killed run left behind use disk space, but block no request.
         tokio::task::spawn_blocking(move || drop(collected.collect_orphans()));
         let expiring = tokio::spawn(expire(storage.clone()));
         let sessions = Sessions::open(storage.clone(), SystemTime::now());
@@ -76,12 +77,12 @@ impl Server {
         Ok(Self { address, ending: Some(ending), accepting, delivering, expiring, writing: Some(writing) })
     }
 
-    /// Where it listens.
+    /// Returns the address on which the server listens.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Takes no more requests, waits for those under way (up to 5 s), and closes the folder.
+    /// Accepts no more requests, waits for the running ones (up to 5 s), and closes the folder.
     pub async fn stop(mut self) {
         if let Some(ending) = self.ending.take() {
             let _ = ending.send(());
@@ -113,10 +114,10 @@ impl Drop for Server {
     }
 }
 
-/// Removes unfinished uploads whose time is over, until it is aborted.
+/// Removes expired uploads until it is aborted.
 async fn expire(storage: Storage) {
     loop {
-        // What cannot be removed now is removed an hour later.
+        // If the removal fails, it is repeated an hour later.
         let _ = expire_uploads(&storage, Moment::now()).await;
         tokio::time::sleep(INTERVAL).await;
     }
@@ -136,12 +137,13 @@ async fn accept(listener: TcpListener, (service, rules): (S3Service, Rules), mut
             continue;
         };
         let _ = stream.set_nodelay(true);
-        let front = Front { service: service.clone(), rules: rules.clone(), peer: peer.ip() };
+        let connection_service =
+            ConnectionService { service: service.clone(), rules: rules.clone(), peer: peer.ip() };
         let connection = hyper::server::conn::http1::Builder::new()
             .timer(TokioTimer::new())
-            .serve_connection(TokioIo::new(stream), front);
+            .serve_connection(TokioIo::new(stream), connection_service);
         let connection = graceful.watch(connection);
-        // A client that goes away in the middle is that client's end.
+        // A client that disconnects early ends only its own connection.
         connections.spawn(async move { drop(connection.await) });
     }
     drop(listener);

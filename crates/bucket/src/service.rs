@@ -1,9 +1,10 @@
-//! S3's operations, by the storage.
+//! S3's operations on the storage.
 //!
-//! One module a family: `buckets`, `reads`, `writes`, `copies`, `deletes`, `lists`, `versions`, `uploads` (in parts),
-//! `notifications`, `cross_origin` (rules for other sites' pages). Conditions are `conditions`'; a body on its way in is
-//! `ingest`'s, out `outgest`'s. What a request may ask for beyond its operation is judged before, by `gate`.
+//! There is a module per family: `buckets`, `reads`, `writes`, `copies`, `deletes`, `lists`, `versions`, `uploads`
+//! (in parts), `notifications`, `cross_origin` (CORS rules). `conditions` evaluates conditions, `ingest` receives a
+//! body, and `body_stream` sends one. `gate` has checked before that the request asks for nothing unsupported.
 
+mod body_stream;
 mod buckets;
 mod conditions;
 mod copies;
@@ -13,7 +14,6 @@ mod ingest;
 mod lists;
 mod notifications;
 mod objects;
-mod outgest;
 mod reads;
 mod uploads;
 mod uploads_listed;
@@ -27,19 +27,19 @@ use s3s::dto::*;
 use s3s::{S3, S3Error, S3Request, S3Response, S3Result};
 
 use crate::answer::{Answer, no_such_bucket, no_such_key, unavailable, unreadable};
-use crate::front::Origin;
-use crate::identity::discreetly;
+use crate::connection_service::Origin;
+use crate::identity::hide_missing_key;
 use crate::records::{self, key};
 use crate::storage::{Batch, Kind, Snapshot, Storage, Table};
 
-/// See the module.
+/// The operations of S3, see the module.
 #[derive(Clone)]
 pub(crate) struct Service {
     storage: Storage,
     region: Arc<str>,
 }
 
-/// Who asks, for events.
+/// The caller of an operation, as recorded in events.
 #[derive(Clone, Debug)]
 pub(crate) struct Caller {
     principal: String,
@@ -47,7 +47,7 @@ pub(crate) struct Caller {
 }
 
 impl Caller {
-    /// What an operation is given besides its input.
+    /// Extracts the caller from a request.
     fn of<T>(request: &S3Request<T>) -> Self {
         let principal = request.credentials.as_ref().map(|c| c.access_key.clone()).unwrap_or_default();
         let origin = request.extensions.get::<Origin>().cloned().unwrap_or_default();
@@ -55,21 +55,21 @@ impl Caller {
     }
 }
 
-/// Why a change was not made.
-pub(crate) enum Stop {
-    /// By the request: nothing was changed.
+/// The reason why a change was not made.
+pub(crate) enum ChangeError {
+    /// The request was refused. Nothing was changed.
     Refused(Box<S3Error>),
-    /// By the disk.
+    /// The storage failed.
     Storage(StorageError),
 }
 
-impl From<S3Error> for Stop {
+impl From<S3Error> for ChangeError {
     fn from(error: S3Error) -> Self {
         Self::Refused(Box::new(error))
     }
 }
 
-impl From<StorageError> for Stop {
+impl From<StorageError> for ChangeError {
     fn from(error: StorageError) -> Self {
         Self::Storage(error)
     }
@@ -84,28 +84,28 @@ impl Service {
         self.storage.snapshot().map_err(|reason| unavailable(&reason))
     }
 
-    /// Runs a change. It must not stop by a refusal after its first write.
+    /// Runs a change. The change must not refuse after its first write.
     async fn change<T, F>(&self, kind: Kind, function: F) -> Answer<T>
     where
         T: Send + 'static,
-        F: FnOnce(&mut Batch<'_>) -> Result<T, Stop> + Send + 'static,
+        F: FnOnce(&mut Batch<'_>) -> Result<T, ChangeError> + Send + 'static,
     {
         let settled = self.storage.change(kind, |batch| match function(batch) {
             Ok(value) => Ok(Ok(value)),
-            Err(Stop::Refused(error)) => Ok(Err(*error)),
-            Err(Stop::Storage(error)) => Err(error),
+            Err(ChangeError::Refused(error)) => Ok(Err(*error)),
+            Err(ChangeError::Storage(error)) => Err(error),
         });
         settled.await.map_err(|reason| unavailable(&reason))?
     }
 
-    /// The bucket, or `NoSuchBucket`.
+    /// Returns the bucket, or `NoSuchBucket`.
     fn bucket(&self, snapshot: &Snapshot, name: &str) -> Answer<records::Bucket> {
         records::find(snapshot, Table::Buckets, name.as_bytes())
             .map_err(unreadable)?
             .ok_or_else(no_such_bucket)
     }
 
-    /// The object, or `NoSuchBucket` or `NoSuchKey`.
+    /// Returns the object, or `NoSuchBucket` or `NoSuchKey`.
     fn object(&self, snapshot: &Snapshot, bucket: &str, key: &str) -> Answer<records::Object> {
         self.bucket(snapshot, bucket)?;
         let row = key::object(bucket, key.as_bytes());
@@ -113,39 +113,39 @@ impl Service {
     }
 }
 
-/// Each operation is its family's function of the same name.
+/// Each operation calls its handler in the module of its family.
 #[async_trait::async_trait]
 impl S3 for Service {
     async fn list_buckets(
         &self,
         req: S3Request<ListBucketsInput>,
     ) -> S3Result<S3Response<ListBucketsOutput>> {
-        self.buckets_listed(&req.input).map(S3Response::new)
+        self.handle_list_buckets(&req.input).map(S3Response::new)
     }
 
     async fn create_bucket(
         &self,
         req: S3Request<CreateBucketInput>,
     ) -> S3Result<S3Response<CreateBucketOutput>> {
-        self.bucket_created(req.input).await.map(S3Response::new)
+        self.handle_create_bucket(req.input).await.map(S3Response::new)
     }
 
     async fn head_bucket(&self, req: S3Request<HeadBucketInput>) -> S3Result<S3Response<HeadBucketOutput>> {
-        self.bucket_found(&req.input).map(S3Response::new)
+        self.handle_head_bucket(&req.input).map(S3Response::new)
     }
 
     async fn delete_bucket(
         &self,
         req: S3Request<DeleteBucketInput>,
     ) -> S3Result<S3Response<DeleteBucketOutput>> {
-        self.bucket_deleted(req.input).await.map(S3Response::new)
+        self.handle_delete_bucket(req.input).await.map(S3Response::new)
     }
 
     async fn get_bucket_location(
         &self,
         req: S3Request<GetBucketLocationInput>,
     ) -> S3Result<S3Response<GetBucketLocationOutput>> {
-        self.bucket_location(&req.input).map(S3Response::new)
+        self.handle_get_bucket_location(&req.input).map(S3Response::new)
     }
 
     async fn get_bucket_versioning(
@@ -175,14 +175,14 @@ impl S3 for Service {
         &self,
         req: S3Request<GetBucketCorsInput>,
     ) -> S3Result<S3Response<GetBucketCorsOutput>> {
-        self.cors_told(&req.input.bucket).map(S3Response::new)
+        self.handle_get_bucket_cors(&req.input.bucket).map(S3Response::new)
     }
 
     async fn put_bucket_cors(
         &self,
         req: S3Request<PutBucketCorsInput>,
     ) -> S3Result<S3Response<PutBucketCorsOutput>> {
-        self.cors_set(req.input.bucket, req.input.cors_configuration.cors_rules).await?;
+        self.handle_put_bucket_cors(req.input.bucket, req.input.cors_configuration.cors_rules).await?;
         Ok(S3Response::new(PutBucketCorsOutput {}))
     }
 
@@ -190,7 +190,7 @@ impl S3 for Service {
         &self,
         req: S3Request<DeleteBucketCorsInput>,
     ) -> S3Result<S3Response<DeleteBucketCorsOutput>> {
-        self.cors_removed(req.input.bucket).await?;
+        self.handle_delete_bucket_cors(req.input.bucket).await?;
         Ok(S3Response::new(DeleteBucketCorsOutput {}))
     }
 
@@ -253,52 +253,52 @@ impl S3 for Service {
         &self,
         req: S3Request<PutBucketNotificationConfigurationInput>,
     ) -> S3Result<S3Response<PutBucketNotificationConfigurationOutput>> {
-        self.notifications_set(req.input).await.map(S3Response::new)
+        self.handle_put_bucket_notification(req.input).await.map(S3Response::new)
     }
 
     async fn get_bucket_notification_configuration(
         &self,
         req: S3Request<GetBucketNotificationConfigurationInput>,
     ) -> S3Result<S3Response<GetBucketNotificationConfigurationOutput>> {
-        self.notifications_told(&req.input).map(S3Response::new)
+        self.handle_get_bucket_notification(&req.input).map(S3Response::new)
     }
 
     async fn list_objects(
         &self,
         req: S3Request<ListObjectsInput>,
     ) -> S3Result<S3Response<ListObjectsOutput>> {
-        self.objects_listed(req.input).await.map(S3Response::new)
+        self.handle_list_objects(req.input).await.map(S3Response::new)
     }
 
     async fn list_objects_v2(
         &self,
         req: S3Request<ListObjectsV2Input>,
     ) -> S3Result<S3Response<ListObjectsV2Output>> {
-        self.objects_listed_v2(req.input).await.map(S3Response::new)
+        self.handle_list_objects_v2(req.input).await.map(S3Response::new)
     }
 
     async fn list_object_versions(
         &self,
         req: S3Request<ListObjectVersionsInput>,
     ) -> S3Result<S3Response<ListObjectVersionsOutput>> {
-        self.versions_listed(req.input).await.map(S3Response::new)
+        self.handle_list_object_versions(req.input).await.map(S3Response::new)
     }
 
     async fn get_object(&self, req: S3Request<GetObjectInput>) -> S3Result<S3Response<GetObjectOutput>> {
-        let told = discreetly(&req.extensions);
-        self.object_read(req).await.map_err(told)
+        let hide = hide_missing_key(&req.extensions);
+        self.handle_get_object(req).await.map_err(hide)
     }
 
     async fn head_object(&self, req: S3Request<HeadObjectInput>) -> S3Result<S3Response<HeadObjectOutput>> {
-        self.object_looked_at(&req).map_err(discreetly(&req.extensions))
+        self.handle_head_object(&req).map_err(hide_missing_key(&req.extensions))
     }
 
     async fn get_object_attributes(
         &self,
         req: S3Request<GetObjectAttributesInput>,
     ) -> S3Result<S3Response<GetObjectAttributesOutput>> {
-        let attributes = self.object_attributes(&req.input).map(S3Response::new);
-        attributes.map_err(discreetly(&req.extensions))
+        let attributes = self.handle_get_object_attributes(&req.input).map(S3Response::new);
+        attributes.map_err(hide_missing_key(&req.extensions))
     }
 
     async fn get_object_acl(
@@ -319,69 +319,69 @@ impl S3 for Service {
     }
 
     async fn put_object(&self, req: S3Request<PutObjectInput>) -> S3Result<S3Response<PutObjectOutput>> {
-        self.object_put(req).await.map(S3Response::new)
+        self.handle_put_object(req).await.map(S3Response::new)
     }
 
     async fn copy_object(&self, req: S3Request<CopyObjectInput>) -> S3Result<S3Response<CopyObjectOutput>> {
-        let told = discreetly(&req.extensions);
-        self.object_copied(req).await.map(S3Response::new).map_err(told)
+        let hide = hide_missing_key(&req.extensions);
+        self.handle_copy_object(req).await.map(S3Response::new).map_err(hide)
     }
 
     async fn delete_object(
         &self,
         req: S3Request<DeleteObjectInput>,
     ) -> S3Result<S3Response<DeleteObjectOutput>> {
-        self.object_deleted(req).await.map(S3Response::new)
+        self.handle_delete_object(req).await.map(S3Response::new)
     }
 
     async fn delete_objects(
         &self,
         req: S3Request<DeleteObjectsInput>,
     ) -> S3Result<S3Response<DeleteObjectsOutput>> {
-        self.objects_deleted(req).await.map(S3Response::new)
+        self.handle_delete_objects(req).await.map(S3Response::new)
     }
 
     async fn create_multipart_upload(
         &self,
         req: S3Request<CreateMultipartUploadInput>,
     ) -> S3Result<S3Response<CreateMultipartUploadOutput>> {
-        self.upload_created(req).await.map(S3Response::new)
+        self.handle_create_multipart_upload(req).await.map(S3Response::new)
     }
 
     async fn upload_part(&self, req: S3Request<UploadPartInput>) -> S3Result<S3Response<UploadPartOutput>> {
-        self.part_uploaded(req).await.map(S3Response::new)
+        self.handle_upload_part(req).await.map(S3Response::new)
     }
 
     async fn upload_part_copy(
         &self,
         req: S3Request<UploadPartCopyInput>,
     ) -> S3Result<S3Response<UploadPartCopyOutput>> {
-        let told = discreetly(&req.extensions);
-        self.part_copied(req).await.map(S3Response::new).map_err(told)
+        let hide = hide_missing_key(&req.extensions);
+        self.handle_upload_part_copy(req).await.map(S3Response::new).map_err(hide)
     }
 
     async fn complete_multipart_upload(
         &self,
         req: S3Request<CompleteMultipartUploadInput>,
     ) -> S3Result<S3Response<CompleteMultipartUploadOutput>> {
-        self.upload_completed(req).await.map(S3Response::new)
+        self.handle_complete_multipart_upload(req).await.map(S3Response::new)
     }
 
     async fn abort_multipart_upload(
         &self,
         req: S3Request<AbortMultipartUploadInput>,
     ) -> S3Result<S3Response<AbortMultipartUploadOutput>> {
-        self.upload_aborted(req.input).await.map(S3Response::new)
+        self.handle_abort_multipart_upload(req.input).await.map(S3Response::new)
     }
 
     async fn list_parts(&self, req: S3Request<ListPartsInput>) -> S3Result<S3Response<ListPartsOutput>> {
-        self.parts_listed(&req.input).map(S3Response::new)
+        self.handle_list_parts(&req.input).map(S3Response::new)
     }
 
     async fn list_multipart_uploads(
         &self,
         req: S3Request<ListMultipartUploadsInput>,
     ) -> S3Result<S3Response<ListMultipartUploadsOutput>> {
-        self.uploads_listed(&req.input).map(S3Response::new)
+        self.handle_list_multipart_uploads(&req.input).map(S3Response::new)
     }
 }

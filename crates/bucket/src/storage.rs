@@ -1,7 +1,7 @@
-//! The folder's content: rows in one transactional database, large bodies as files beside it.
+//! The content of the folder: rows in one transactional database, and large bodies as files beside it.
 //!
-//! Reads see one moment ([`Storage::snapshot`]). Changes are functions ([`Storage::change`]) that run one after the other;
-//! what they give is handed on when the change is on the disk. Knows no protocol and no record.
+//! A read sees a snapshot ([`Storage::snapshot`]). Changes are functions ([`Storage::change`]) that run one after the
+//! other. A result is returned once the change is on disk. Knows no protocol and no record.
 //!
 //! ```text
 //! marker, lock    whose the folder is, and that one process uses it
@@ -48,13 +48,13 @@ use folder::Folder;
 use opening::open;
 use writer::{Change, Current, Message, RESERVE, Writer, read};
 
-/// So long a reader waits until a database in which damage was found is open again.
+/// The time that a reader waits until a database with damage is open again.
 const REOPENING: Duration = Duration::from_secs(2);
 
 /// The row that counts the starts.
 const RUN: &[u8] = b"run";
 
-/// See the module. Clones are the same folder.
+/// The storage of a folder, see the module. Clones share it.
 #[derive(Clone)]
 pub(crate) struct Storage {
     current: Current,
@@ -63,14 +63,14 @@ pub(crate) struct Storage {
     committed: Arc<Notify>,
 }
 
-/// The thread that writes.
+/// The writing thread.
 pub(crate) struct Writing {
     thread: JoinHandle<()>,
     messages: Sender<Message>,
 }
 
 impl Storage {
-    /// Opens the folder, made when missing.
+    /// Opens the folder, which is created if missing.
     ///
     /// # Errors
     /// [`Error::DataInUse`], [`Error::NotOurs`], [`Error::Newer`], [`Error::File`], [`Error::Storage`].
@@ -78,7 +78,7 @@ impl Storage {
         Self::with_reserve(path, RESERVE)
     }
 
-    /// The same, leaving so many bytes of the disk free.
+    /// Opens the folder, and leaves this many bytes of the disk free.
     fn with_reserve(path: &Path, reserve: u64) -> Result<(Self, Writing)> {
         Self::of_folder(Folder::take(path)?, reserve)
     }
@@ -98,7 +98,7 @@ impl Storage {
             bodies: bodies.clone(),
             current: current.clone(),
             journal,
-            // Not known, so it is looked at once.
+            // The number is unknown, so compaction is checked at once.
             removed_bytes: u64::MAX / 2,
             reserve,
             on_commit: Box::new({
@@ -113,14 +113,14 @@ impl Storage {
         Ok((Self { current, bodies, messages, committed }, Writing { thread, messages: ending }))
     }
 
-    /// The rows as they are now.
+    /// Returns the current rows.
     ///
     /// # Errors
-    /// [`Unavailable::Failed`].
+    /// Returns [`Unavailable::Failed`] if the database cannot be read.
     pub(crate) fn snapshot(&self) -> Result<Snapshot, Unavailable> {
         let mut open = read(&self.current).clone()?;
         if open.damage().is_some() {
-            // The handle that read a damaged block answers nothing more. Other blocks can be read through a new one.
+            // The handle that read a damaged block answers nothing more. A new one can read the other blocks.
             let (reopened, wait) = mpsc::channel();
             self.messages.send(Message::Reopen(reopened)).map_err(|_| Unavailable::Ending)?;
             let _ = wait.recv_timeout(REOPENING);
@@ -129,11 +129,12 @@ impl Storage {
         open.kept_snapshot().map_err(|error| Unavailable::Failed(error.to_string().into()))
     }
 
-    /// Runs a function on the tables, alone; on return its changes are on the disk. What it gives may say that it changed
-    /// nothing: a condition that did not hold, for one. Where it fails, everything in its batch is undone.
+    /// Runs a function on the tables, alone. When it returns, its changes are on disk. The function's value may
+    /// say that it changed nothing, for example because a condition failed. If the function fails, everything in
+    /// its batch is undone.
     ///
     /// # Errors
-    /// [`Unavailable`]: nothing was changed, but for a disk that failed in the middle, where that is not known.
+    /// [`Unavailable`]: nothing was changed. After a disk failure during the write, that is not certain.
     pub(crate) async fn change<T, F>(&self, kind: Kind, function: F) -> Result<T, Unavailable>
     where
         T: Send + 'static,
@@ -145,20 +146,20 @@ impl Storage {
         answered.await.unwrap_or(Err(Unavailable::Ending))
     }
 
-    /// Large bodies.
+    /// Returns the store of large bodies.
     pub(crate) fn bodies(&self) -> &Arc<Bodies> {
         &self.bodies
     }
 
-    /// Returns when something was changed since the last call.
+    /// Waits until something has changed since the last call.
     pub(crate) async fn changed(&self) {
         self.committed.notified().await;
     }
 
-    /// Removes the bodies that a killed run left, and that belong to nobody; says how many.
+    /// Removes the bodies of killed runs to which no row refers. Returns their number.
     ///
     /// # Errors
-    /// [`Unavailable`].
+    /// Returns [`Unavailable`] if the storage cannot be read.
     pub(crate) fn collect_orphans(&self) -> Result<u64, Unavailable> {
         let snapshot = self.snapshot()?;
         let collected = self.bodies.collect(|id| {
@@ -169,14 +170,14 @@ impl Storage {
 }
 
 impl Writing {
-    /// Ends the changes; returns when those before are on the disk and the folder is free.
+    /// Ends the changes. Returns when all earlier changes are on disk and the folder is free.
     pub(crate) fn end(self) {
         let _ = self.messages.send(Message::End);
         let _ = self.thread.join();
     }
 }
 
-/// Counts this start, durably: ids of its bodies begin with the number.
+/// Counts this start, durably: the ids of its bodies begin with the number.
 fn next_run(open: &database::Open, journal: &mut journal::Journal) -> Result<u64, redb::Error> {
     let last = open.snapshot()?.get(Table::Settings, RUN)?;
     let run = last.and_then(|bytes| bytes.try_into().ok()).map_or(0, u64::from_be_bytes) + 1;
@@ -214,7 +215,7 @@ mod tests {
 
         let (storage, writing) = Storage::open(folder.path()).unwrap();
         storage.change(Kind::Grows, |batch| set(batch, "killed", "2")).await.unwrap();
-        // A copy of the folder is what a kill leaves: the thread has not caught up.
+        // A copy of the folder equals what a kill leaves: the thread has not caught up.
         let copy = tempfile::tempdir().unwrap();
         for name in ["rayfold-bucket", "database", "database.sums", "journal"] {
             std::fs::copy(folder.path().join(name), copy.path().join(name)).unwrap();
@@ -226,7 +227,7 @@ mod tests {
         writing.end();
     }
 
-    /// Bytes of the journal's entries.
+    /// Returns the size of the journal's entries in bytes.
     fn journal(folder: &Path) -> u64 {
         std::fs::metadata(folder.join("journal")).unwrap().len() - 80
     }
@@ -241,14 +242,14 @@ mod tests {
             assert!(start.elapsed() < Duration::from_secs(20), "it never catches up");
             tokio::time::sleep(Duration::from_millis(20)).await;
         }
-        // It may be later, on a busy machine, but not sooner.
+        // On a busy machine it may be later, but not sooner.
         assert!(start.elapsed() > Duration::from_millis(500), "it catches up while there may be more to do");
         storage.change(Kind::Grows, |batch| set(batch, "b", "2")).await.unwrap();
         writing.end();
         assert_eq!(journal(folder.path()), 0);
     }
 
-    /// While there is always something to do, it must not grow without end.
+    /// Under constant load the journal must not grow without limit.
     #[tokio::test]
     async fn a_journal_that_is_long_is_cleared_under_load() {
         let folder = tempfile::tempdir().unwrap();
@@ -343,9 +344,9 @@ mod tests {
         for round in 0..3 {
             let key = format!("kept-{round}");
             storage.change(Kind::Grows, move |batch| set(batch, &key, "1")).await.unwrap();
-            // As after a failed write: nothing goes through this handle any more.
+            // As after a failed write: nothing is written through this handle any more.
             read(&storage.current).as_ref().unwrap().kill();
-            // What reaches the journal may be acknowledged or not; what is acknowledged must be there.
+            // A change that reaches the journal may or may not be acknowledged. An acknowledged one must be there.
             let key = format!("doubtful-{round}");
             let big = "x".repeat(100_000);
             let answer = storage
@@ -386,7 +387,7 @@ mod tests {
         for damage in [true, false] {
             let mut bytes = entries.clone();
             if damage {
-                // In the first of two entries.
+                // The bit is in the first of two entries.
                 bytes[30] ^= 1;
             }
             std::fs::write(path("journal"), bytes).unwrap();

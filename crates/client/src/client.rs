@@ -1,4 +1,4 @@
-//! Who uses a bucket, and what every use needs of it. The uses are one module each.
+//! The client: a bucket's store and a clock. Each operation on it is a module of its own.
 
 use rayfold_pipeline::keys::{Animation, Uploaded};
 use rayfold_pipeline::store::{ListRequest, Listing, Store};
@@ -6,10 +6,10 @@ use rayfold_pipeline::{Clock, found};
 
 use crate::error::{Error, Result};
 
-/// Requests of one kind that are under way at once.
+/// The largest number of requests of one kind at the same time.
 pub(crate) const SIDE_BY_SIDE: usize = 32;
 
-/// Someone who uses a bucket.
+/// A client of a bucket.
 #[derive(Debug)]
 pub struct Client<'a, S, C> {
     pub(crate) store: &'a S,
@@ -25,7 +25,7 @@ impl<S, C> Clone for Client<'_, S, C> {
 impl<S, C> Copy for Client<'_, S, C> {}
 
 impl<'a, S: Store, C: Clock> Client<'a, S, C> {
-    /// Of this bucket, waiting on this clock.
+    /// Makes a client of this bucket, which waits on this clock.
     pub fn new(store: &'a S, clock: &'a C) -> Self {
         Client { store, clock }
     }
@@ -35,10 +35,12 @@ impl<'a, S: Store, C: Clock> Client<'a, S, C> {
         Ok(Listing::read(request, None, |request| self.store.list(request)).await?)
     }
 
+    /// Checks that the animation exists.
+    ///
     /// # Errors
-    /// [`Error::NoAnimation`] when nothing shows that there is such an animation, or ever was.
+    /// [`Error::NoAnimation`] if nothing shows that the animation exists or ever existed.
     pub async fn must_exist(&self, animation: &Animation) -> Result<()> {
-        // A GET, whose refusal says more than that of a HEAD.
+        // A GET, because its refusal says more than that of a HEAD.
         let has_manifest = found(self.store.get_range(&animation.manifest(), 0..1).await)?.is_some();
         if !has_manifest {
             let page = self.list(ListRequest::level(animation.scripts())).await?;

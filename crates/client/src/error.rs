@@ -1,65 +1,65 @@
-//! What can go wrong between a user and a bucket.
+//! The errors of the client.
 
 use std::io;
 use std::path::PathBuf;
 
 use rayfold_pipeline::keys::Animation;
 
-/// The client's errors. Each names the object's key, the file or the animation.
+/// An error of the client. Each names the object's key, the file or the animation.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The store's, and those of keys.
+    /// An error of the store or of a key.
     #[error(transparent)]
     Store(#[from] rayfold_pipeline::Error),
-    /// Nothing in the bucket shows that there is such an animation.
+    /// Nothing in the bucket shows that the animation exists.
     #[error("there is no animation {0}")]
     NoAnimation(Animation),
     /// A file to submit cannot be read.
     #[error("cannot read {}", path.display())]
     Read {
-        /// The file.
+        /// The path of the file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
-    /// A file is not what it was when the submission was made.
+    /// A file has changed since the submission was made.
     #[error("{key} has changed while it was being submitted")]
     FileChanged {
-        /// Where it was to go.
+        /// The key under which it was to be uploaded.
         key: String,
     },
-    /// The bucket's folder holds scripts that a submission lacks and was not told to delete; nothing was changed.
+    /// The bucket's folder holds scripts that the submission lacks and may not delete. Nothing was changed.
     #[error("in the bucket, but not in the submission: {}", keys.join(", "))]
     WouldDelete {
-        /// Their keys.
+        /// The keys of these scripts.
         keys: Vec<String>,
     },
     /// The scripts in the bucket are no longer those that were submitted.
-    #[error("somebody else has changed {key} meanwhile")]
+    #[error("{key} is no longer what was submitted: someone has replaced it")]
     ChangedMeanwhile {
-        /// One of those that differ.
+        /// The key of one that differs.
         key: String,
     },
-    /// An object was replaced each time that it was being read.
-    #[error("{key} is replaced faster than it can be read")]
+    /// An object was replaced during every attempt to read it.
+    #[error("{key} was replaced during every attempt to read it")]
     Restless {
-        /// The object's key.
+        /// The key of the object.
         key: String,
     },
-    /// A manifest's frame that is not there.
-    #[error("{key} is gone: look at the manifest again")]
+    /// A frame of the manifest does not exist any more.
+    #[error("{key} does not exist any more: read the manifest again")]
     FrameGone {
-        /// The frame's key.
+        /// The key of the frame.
         key: String,
     },
-    /// What the caller does with the bytes failed.
+    /// The caller failed to process the bytes.
     #[error(transparent)]
     Output(io::Error),
-    /// The animation's settings cannot say so many frames.
+    /// The animation's settings cannot hold this number of frames.
     #[error("animation.json cannot be written")]
     Settings(#[source] rayfold_pipeline::Cause),
 }
 
-/// What the client's functions return.
+/// The result of the client's functions.
 pub type Result<T, E = Error> = std::result::Result<T, E>;

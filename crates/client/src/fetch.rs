@@ -1,4 +1,4 @@
-//! What the bucket has of an animation: its GIF, piece by piece, and its frames.
+//! Downloads of an animation: its GIF, piece by piece, and its frames.
 
 use std::io;
 
@@ -14,60 +14,60 @@ use rayfold_pipeline::store::{ObjectInfo, Store};
 use crate::client::{Client, SIDE_BY_SIDE};
 use crate::error::{Error, Result};
 
-/// Bytes of a GIF that are asked for in one request.
+/// The size of the range of a GIF that one request asks for, in bytes.
 const PIECE: u64 = 8 << 20;
 
-/// Pieces that are under way at once.
+/// The number of pieces that are requested at the same time.
 const PIECES: usize = 4;
 
-/// How often a GIF that is replaced while it is being read is begun anew.
+/// The number of times that a GIF is read if it is replaced during each read.
 const ATTEMPTS: u32 = 5;
 
-/// Where a file goes.
+/// The destination of a download.
 pub trait Output {
-    /// Begins the file, which will have `size` bytes. What was written before is void.
+    /// Begins the file, which will have `size` bytes. Discards everything written before.
     ///
     /// # Errors
-    /// The system's.
+    /// Returns the error of the system.
     fn begin(&mut self, size: u64) -> io::Result<()>;
 
-    /// Takes the next bytes.
+    /// Writes the next bytes.
     ///
     /// # Errors
-    /// The system's.
+    /// Returns the error of the system.
     fn write(&mut self, piece: &[u8]) -> io::Result<()>;
 }
 
-/// A frame that was fetched.
+/// A frame that was downloaded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FetchedFrame<'a> {
-    /// Its place in the animation, from 1.
+    /// The number of the frame in the animation, from 1.
     pub number: u64,
-    /// Its key.
+    /// The key of the frame.
     pub key: &'a str,
-    /// The file.
+    /// The content of the PNG file.
     pub png: Bytes,
 }
 
-/// A frame that is drawn.
+/// The key of a frame that is drawn.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FrameKey {
-    /// Its place in the animation, from 1.
+    /// The number of the frame in the animation, from 1.
     pub number: u64,
-    /// Its key.
+    /// The key of the frame.
     pub key: String,
 }
 
-/// An animation's frames in their order.
+/// The frames of an animation, in their order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frames<'a> {
-    /// Those that are drawn.
+    /// The frames that are drawn.
     pub drawn: Vec<FrameKey>,
-    /// Those that are not, or not yet.
+    /// The frames that failed or are pending.
     pub missing: Vec<&'a Frame>,
 }
 
-/// Which of an animation's frames are drawn.
+/// Divides the frames of a manifest into drawn and missing ones.
 pub fn frames(manifest: &Manifest) -> Frames<'_> {
     let mut frames = Frames { drawn: Vec::new(), missing: Vec::new() };
     for (frame, number) in manifest.frames.iter().zip(1..) {
@@ -80,10 +80,11 @@ pub fn frames(manifest: &Manifest) -> Frames<'_> {
 }
 
 impl<S: Store, C: Clock> Client<'_, S, C> {
-    /// Reads the GIF as it is now.
+    /// Downloads the current GIF.
     ///
     /// # Errors
-    /// When there is none, the output fails, or it is replaced all the time ([`Error::Restless`]).
+    /// An error of the store or of the output, or [`Error::Restless`] if the GIF is
+    /// replaced during each attempt.
     pub async fn fetch_gif(&self, animation: &Animation, output: &mut impl Output) -> Result<ObjectInfo> {
         let key = animation.gif();
         for _ in 0..ATTEMPTS {
@@ -96,7 +97,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         Err(Error::Restless { key })
     }
 
-    /// `false` when the object is replaced on the way.
+    /// Copies the object to the output. Returns `false` if the object is replaced meanwhile.
     async fn copy(&self, key: &str, info: &ObjectInfo, output: &mut impl Output) -> Result<bool> {
         let pieces = (0..info.size.div_ceil(PIECE)).map(|n| n * PIECE..((n + 1) * PIECE).min(info.size));
         let pieces: Vec<_> = pieces.map(|range| self.store.get_range(key, range)).collect();
@@ -112,10 +113,10 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         Ok(true)
     }
 
-    /// Reads frames, many at once, and gives each to `take` as it comes.
+    /// Downloads frames, several at once, and passes each to `take` on arrival.
     ///
     /// # Errors
-    /// Those of the store and of `take`, and [`Error::FrameGone`].
+    /// The errors of the store and of `take`, and [`Error::FrameGone`].
     pub async fn fetch_frames(
         &self,
         frames: &[FrameKey],
@@ -182,12 +183,12 @@ mod tests {
         let world = World::new();
         let size = PIECES * PIECE as usize + 1;
         world.store.put("animations/film.gif", gif(size, 1).into(), PutOptions::always()).await.unwrap();
-        // Once, before the last piece is read.
+        // Replaced once, before the last piece is read.
         world.replace_before("get animations/film.gif", PIECES as u32, gif(9, 2), 1);
         let mut out = Memory::default();
         world.client().fetch_gif(&world.film(), &mut out).await.unwrap();
         assert_eq!((out.begun, out.bytes), (2, [gif(9, 2), vec![0]].concat()));
-        // Always.
+        // Replaced at every attempt.
         world.replace_before("get animations/film.gif", 0, gif(9, 3), u8::MAX);
         let error = world.client().fetch_gif(&world.film(), &mut Memory::default()).await.unwrap_err();
         assert!(matches!(error, Error::Restless { key } if key == "animations/film.gif"));

@@ -1,7 +1,8 @@
-//! A file as it should be in the bucket, and whether it is there already.
+//! A file as it should be in the bucket, and the check whether it is there already.
 //!
-//! That is told by its size and its MD5, which is an object's entity tag; where it is not (encrypted with a key of
-//! one's own, uploaded in parts) the digest tells that is left in the object's metadata.
+//! The check compares the size and the MD5, which usually is the object's entity tag. It is not if the
+//! object is encrypted with a customer-managed key or was uploaded in parts; then the digest in the
+//! object's metadata is compared.
 
 use std::path::PathBuf;
 
@@ -11,7 +12,7 @@ use rayfold_pipeline::store::PutOptions;
 
 use crate::error::{Error, Result};
 
-/// The name of the metadata that holds a script's digest.
+/// The metadata key of a script's digest.
 pub(crate) const DIGEST: &str = "rayfold-md5";
 
 /// A file as it should be in the bucket.
@@ -22,45 +23,45 @@ pub struct File {
     digest: String,
 }
 
-/// Where its bytes are.
+/// The source of a file's bytes.
 #[derive(Debug, Clone)]
 pub enum Content {
-    /// On the disk, to be read again when it is sent.
+    /// A file on disk, which is read again when it is sent.
     Path(PathBuf),
-    /// Here.
+    /// Bytes in memory.
     Bytes(Bytes),
 }
 
 impl File {
-    /// Reads it once, for its size and digest.
+    /// Reads the content once, for its size and digest.
     ///
     /// # Errors
-    /// [`Error::Read`].
+    /// [`Error::Read`] if the file cannot be read.
     pub fn new(content: Content) -> Result<Self> {
         let bytes = content.read()?;
         Ok(Self { size: bytes.len() as u64, digest: digest(&bytes), content })
     }
 
-    /// A file of this text.
+    /// Makes a file with this text.
     pub fn of_text(text: impl Into<String>) -> Self {
         let bytes = Bytes::from(text.into());
         Self { size: bytes.len() as u64, digest: digest(&bytes), content: Content::Bytes(bytes) }
     }
 
-    /// Its size in bytes.
+    /// Returns the size in bytes.
     pub fn size(&self) -> u64 {
         self.size
     }
 
-    /// Its MD5 as hexadecimal digits.
+    /// Returns the MD5 as hexadecimal digits.
     pub(crate) fn digest(&self) -> &str {
         &self.digest
     }
 
-    /// Its bytes, for the object `key`.
+    /// Returns the bytes, for the object `key`.
     ///
     /// # Errors
-    /// [`Error::Read`], and [`Error::FileChanged`] when it is no longer what it was.
+    /// [`Error::Read`], and [`Error::FileChanged`] if the file has changed since it was digested.
     pub(crate) fn read(&self, key: &str) -> Result<Bytes> {
         let bytes = self.content.read()?;
         if digest(&bytes) != self.digest {
@@ -69,7 +70,7 @@ impl File {
         Ok(bytes)
     }
 
-    /// How to put it.
+    /// Returns the options with which the file is put.
     pub(crate) fn options(&self, key: &str) -> PutOptions {
         let is_json = key.ends_with(".json");
         let media_type = if is_json { "application/json" } else { "text/plain; charset=utf-8" };
@@ -99,7 +100,7 @@ mod tests {
 
     #[test]
     fn the_digest_is_what_s3_calls_an_entity_tag() {
-        // RFC 1321, A.5
+        // The test vector is from RFC 1321, A.5.
         assert_eq!(digest(b"message digest"), "f96b697d7cb7938d525a2f31aaf161d0");
     }
 

@@ -1,10 +1,10 @@
-//! Animations in a bucket from outside: scripts in, progress, frames and GIFs out.
+//! A client for animations in a bucket: uploads scripts, reports progress, downloads frames and GIFs.
 //!
-//! A command line and a web page are two faces of this crate. What it knows it reads off the bucket, as the functions
-//! do, and it remembers nothing: whatever is interrupted is picked up from what the bucket shows. It knows no terminal,
-//! no flags and no S3: the bucket is a [`Store`](rayfold_pipeline::store::Store), time
-//! a [`Clock`](rayfold_pipeline::Clock), and progress comes as values ([`Sending`],
-//! [`Waiting`], [`Removing`]) to a closure that the caller brings. What an animation costs on AWS [`cost`] says.
+//! The command line and the web page are both built on this crate. Like the functions, the client reads all state
+//! from the bucket and keeps none, so an interrupted operation resumes from the bucket's contents. It knows no
+//! terminal, no flags and no S3: the bucket is a [`Store`](rayfold_pipeline::store::Store) and time a
+//! [`Clock`](rayfold_pipeline::Clock). It reports progress as values ([`Sending`], [`Waiting`], [`RemoveProgress`])
+//! to a closure of the caller. [`cost`] estimates what an animation costs on AWS.
 //!
 //! ```
 //! use rayfold_client::{Client, File, Submission, Submitted};
@@ -37,7 +37,7 @@ pub use client::Client;
 pub use error::{Error, Result};
 pub use fetch::{FetchedFrame, FrameKey, Frames, Output, frames};
 pub use file::{Content, File};
-pub use remove::{Contents, Removing};
+pub use remove::{Contents, RemoveProgress};
 pub use status::{Misplaced, Obstacle, Overview, frame_name, obstacles};
 pub use submit::{Preview, Sending, Submission, Submitted, settings_with_frames};
 pub use watch::{Ended, Waiting, Watch};
@@ -64,7 +64,7 @@ mod tests {
         }
     }
 
-    /// A web page's server moves futures between threads.
+    /// A web server moves futures between threads.
     #[test]
     fn what_the_client_does_can_move_between_threads() {
         let world = World::new();

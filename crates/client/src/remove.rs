@@ -1,4 +1,4 @@
-//! An animation out of the bucket, with all that was made of it.
+//! Removal of an animation from the bucket, with everything that was made of it.
 
 use std::time::Duration;
 
@@ -11,36 +11,36 @@ use crate::client::Client;
 use crate::error::{Error, Result};
 use crate::watch::Watch;
 
-/// How long the functions have to notice that the scripts are gone. They write an empty manifest then, which would come
-/// back if it were removed before.
+/// The time that the functions get to notice that the scripts are gone. They then write an empty manifest, which
+/// would reappear if the manifest were removed before.
 const NOTICE: Duration = Duration::from_secs(15);
 
-/// How far a removal is.
+/// The progress of a removal.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Removing {
-    /// So many objects are gone.
+pub enum RemoveProgress {
+    /// This many objects are deleted.
     Deleted(u64),
-    /// The functions must notice that there are no scripts any more.
+    /// The client waits until the functions notice that the scripts are gone.
     WaitingForFunctions,
 }
 
-/// What the bucket holds of an animation, by key.
+/// The objects of an animation in the bucket, by key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Contents {
-    /// The folder's scripts and settings, also those that are misnamed, and what systems have left beside them.
+    /// The scripts and settings in the folder. Includes misnamed ones, and files that operating systems leave there.
     pub scripts: Vec<String>,
-    /// What was made of them: frames, the GIF, the manifest.
+    /// The objects made of them: frames, the GIF, the manifest.
     pub made: Vec<String>,
 }
 
 impl<S: Store, C: Clock> Client<'_, S, C> {
-    /// What [`remove`](Self::remove) would remove.
+    /// Returns the objects that [`remove`](Self::remove) would delete.
     ///
     /// # Errors
-    /// [`Error::NoAnimation`], and those of the store.
+    /// [`Error::NoAnimation`], and the errors of the store.
     pub async fn contents(&self, animation: &Animation) -> Result<Contents> {
         let scripts = self.uploaded_of(animation).await?;
-        // Listed before anything goes: whoever may not see all of an animation removes nothing of it.
+        // Listed before anything is deleted: a caller who may not list all of an animation deletes nothing of it.
         let made = self.made_of(animation).await?;
         if scripts.is_empty() && made.is_empty() {
             return Err(Error::NoAnimation(animation.clone()));
@@ -48,33 +48,33 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         Ok(Contents { scripts, made })
     }
 
-    /// Removes an animation; says how many objects there were.
+    /// Removes an animation. Returns the number of objects deleted.
     ///
     /// # Errors
-    /// [`Error::NoAnimation`], and those of the store.
-    pub async fn remove(&self, animation: &Animation, mut told: impl FnMut(Removing)) -> Result<u64> {
+    /// [`Error::NoAnimation`], and the errors of the store.
+    pub async fn remove(&self, animation: &Animation, mut report: impl FnMut(RemoveProgress)) -> Result<u64> {
         let Contents { scripts, .. } = self.contents(animation).await?;
-        self.delete(&scripts, |done| told(Removing::Deleted(done))).await?;
+        self.delete(&scripts, |done| report(RemoveProgress::Deleted(done))).await?;
         let mut removed = scripts.len() as u64;
         let mut watch = Watch::new(*self, animation.clone());
-        watch.look().await?;
+        watch.poll().await?;
         while !scripts.is_empty() && is_pending(&watch) && watch.elapsed() < NOTICE {
-            told(Removing::WaitingForFunctions);
+            report(RemoveProgress::WaitingForFunctions);
             watch.pause().await;
-            watch.look_patiently().await?;
+            watch.poll_with_retry().await?;
         }
-        // Whatever was under way may have left something since.
+        // Functions that were still running may have written more since.
         loop {
             let rest = self.made_of(animation).await?;
             if rest.is_empty() {
                 return Ok(removed);
             }
-            self.delete(&rest, |done| told(Removing::Deleted(removed + done))).await?;
+            self.delete(&rest, |done| report(RemoveProgress::Deleted(removed + done))).await?;
             removed += rest.len() as u64;
         }
     }
 
-    /// The scripts and settings, also those that are misnamed, and what systems have left beside them.
+    /// Returns the scripts and settings, including misnamed ones and files that operating systems leave there.
     async fn uploaded_of(&self, animation: &Animation) -> Result<Vec<String>> {
         let listed = self.list(ListRequest::all(animation.scripts())).await?.objects;
         let all = listed.iter().filter_map(|object| Uploaded::of(&object.key, object.size).animation());
@@ -84,7 +84,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         Ok(ours.map(|object| object.key).collect())
     }
 
-    /// Everything but the scripts.
+    /// Returns everything but the scripts.
     async fn made_of(&self, animation: &Animation) -> Result<Vec<String>> {
         let prefixes = [
             animation.retries(),
@@ -98,7 +98,8 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         self.keys_of(animation, &prefixes).await
     }
 
-    /// Keys below the prefixes that belong to this animation, and not to one whose name starts with it.
+    /// Returns the keys under the prefixes that belong to this animation, and not to one whose name starts
+    /// with the same letters.
     async fn keys_of(&self, animation: &Animation, prefixes: &[String]) -> Result<Vec<String>> {
         let mut keys = Vec::new();
         for prefix in prefixes {
@@ -138,17 +139,20 @@ mod tests {
         };
         let others: Vec<String> = of_others(world.keys("").await).collect();
         let before = world.keys("").await.len();
-        let mut told = Vec::new();
+        let mut reports = Vec::new();
         // The functions notice while the client waits for them.
-        let removing = client.remove(&film, |removing| told.push(removing));
+        let removing = client.remove(&film, |removing| reports.push(removing));
         let (removed, ()) =
             futures_util::future::join(removing, world.deletions(&["scripts/film/1.txt"])).await;
         assert_eq!(world.keys("").await, others);
-        let (first, last) = (told.first().cloned(), told.last().cloned());
-        assert_eq!(first, Some(Removing::Deleted(1)));
+        let (first, last) = (reports.first().cloned(), reports.last().cloned());
+        assert_eq!(first, Some(RemoveProgress::Deleted(1)));
         let removed = removed.unwrap();
-        assert_eq!(last, Some(Removing::Deleted(removed)));
-        assert!(removed as usize >= before - others.len() && told.contains(&Removing::WaitingForFunctions));
+        assert_eq!(last, Some(RemoveProgress::Deleted(removed)));
+        assert!(
+            removed as usize >= before - others.len()
+                && reports.contains(&RemoveProgress::WaitingForFunctions)
+        );
         assert!(matches!(client.remove(&film, |_| {}).await, Err(Error::NoAnimation(name)) if name == film));
     }
 
@@ -180,7 +184,7 @@ mod tests {
         left.extend(["scripts/film/two/1.txt", "scripts/films/1.txt"].map(String::from));
         left.sort();
         assert_eq!(world.keys("scripts/").await, left);
-        // Of an animation of which nothing but a marker is there, too.
+        // An animation that consists of a folder marker only can be removed, too.
         world.put("scripts/marked/", "").await;
         let marked = Animation::new("marked").unwrap();
         assert_eq!(world.client().remove(&marked, |_| {}).await.unwrap(), 1);

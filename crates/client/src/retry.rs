@@ -1,4 +1,4 @@
-//! Drawing frames again.
+//! Rendering frames of an animation again.
 
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::retry::{Retried, Scope, retry};
@@ -9,10 +9,10 @@ use crate::client::Client;
 use crate::error::Result;
 
 impl<S: Store, C: Clock> Client<'_, S, C> {
-    /// Draws frames of an animation again, for a renderer of this pixel version.
+    /// Has frames of an animation rendered again, by a renderer of this pixel version.
     ///
     /// # Errors
-    /// [`NoAnimation`](crate::Error::NoAnimation), and those of the store.
+    /// [`NoAnimation`](crate::Error::NoAnimation), and the errors of the store.
     pub async fn retry(
         &self,
         animation: &Animation,

@@ -1,4 +1,4 @@
-//! Where the animations of a bucket stand.
+//! The state of the animations of a bucket.
 
 use std::collections::BTreeSet;
 
@@ -13,37 +13,37 @@ use crate::client::{Client, SIDE_BY_SIDE};
 use crate::error::{Error, Result};
 use crate::watch::Watch;
 
-/// How many slashes before `scripts/` are looked behind.
-const MOST_SLASHES: usize = 4;
+/// The number of leading slashes before `scripts/` up to which misplaced objects are searched.
+const MAX_SLASHES: usize = 4;
 
-/// What a bucket holds.
+/// The contents of a bucket.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Overview {
-    /// The animations by name: those that have a manifest, and folders of scripts that have none yet.
+    /// The animations by name: those with a manifest, and folders of scripts without one.
     pub animations: Vec<Animation>,
-    /// What is meant as a part of an animation and belongs to none.
+    /// Objects that look like a part of an animation and belong to none.
     pub misplaced: Vec<Misplaced>,
 }
 
-/// An object of which nothing is drawn because of its place.
+/// An object that is not rendered because of its place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Misplaced {
-    /// Its key.
+    /// The key of the object.
     pub key: String,
-    /// What would be right.
+    /// The problem, with the right place.
     pub problem: &'static str,
 }
 
-/// Something that keeps an animation from being done.
+/// A reason why an animation is not done.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obstacle<'a> {
-    /// What is faulty, for people: a script, `animation.json`, the GIF.
+    /// The faulty object for messages: a script, `animation.json`, the GIF.
     pub what: String,
-    /// Why, once that is known.
+    /// The reason, once it is known.
     pub reason: Option<&'a Reason>,
 }
 
-/// Everything that a manifest says keeps its animation from being done, besides the keys that it rejects.
+/// Returns everything in a manifest that keeps its animation from being done, except rejected keys.
 pub fn obstacles(manifest: &Manifest) -> Vec<Obstacle<'_>> {
     let head = &manifest.head;
     let settings = head.settings.fault.as_ref();
@@ -64,7 +64,7 @@ pub fn obstacles(manifest: &Manifest) -> Vec<Obstacle<'_>> {
     settings.into_iter().chain(excess).chain(frames).chain(refusal).collect()
 }
 
-/// The script of a frame, and which of its frames it is, for people.
+/// Returns a frame's name for messages: its script, and its number within the script.
 pub fn frame_name(frame: &Frame) -> String {
     match frame.part {
         None => format!("{}.txt", frame.script),
@@ -73,10 +73,10 @@ pub fn frame_name(frame: &Frame) -> String {
 }
 
 impl<'a, S: Store, C: Clock> Client<'a, S, C> {
-    /// The animations of the bucket, and what belongs to none of them.
+    /// Lists the animations of the bucket, and the objects that belong to none.
     ///
     /// # Errors
-    /// Those of the store.
+    /// The errors of the store.
     pub async fn overview(&self) -> Result<Overview> {
         let manifests = self.list(ListRequest::all(MANIFESTS)).await?.objects;
         let of_manifests = manifests.iter().filter_map(|object| match object.key.parse() {
@@ -96,17 +96,17 @@ impl<'a, S: Store, C: Clock> Client<'a, S, C> {
         Ok(Overview { animations: animations.into_iter().collect(), misplaced })
     }
 
-    /// Objects below folders that are called almost like that of the scripts.
+    /// Lists objects in folders whose names are almost that of the scripts.
     async fn beside_scripts(&self) -> Result<Vec<Listed>> {
         let mut found = Vec::new();
         let mut levels = vec![String::new()];
         while let Some(level) = levels.pop() {
-            // Some may list no more of a bucket than its scripts and manifests.
+            // Some callers may list nothing in a bucket but its scripts and manifests.
             let Some(listed) = self.list_if_allowed(ListRequest::level(level)).await? else { continue };
             found.extend(listed.objects.into_iter().filter(|object| object.key.contains('\\')));
             for folder in listed.prefixes.into_iter().filter(|folder| folder != SCRIPTS) {
                 let name = folder.trim_matches('/');
-                if name.is_empty() && folder.len() < MOST_SLASHES {
+                if name.is_empty() && folder.len() < MAX_SLASHES {
                     levels.push(folder);
                 } else if name.eq_ignore_ascii_case(SCRIPTS.trim_matches('/')) {
                     let below = self.list_if_allowed(ListRequest::all(folder)).await?;
@@ -125,23 +125,23 @@ impl<'a, S: Store, C: Clock> Client<'a, S, C> {
         }
     }
 
-    /// The animations of the bucket by name.
+    /// Lists the animations of the bucket by name.
     ///
     /// # Errors
-    /// Those of the store.
+    /// The errors of the store.
     pub async fn animations(&self) -> Result<Vec<Animation>> {
         Ok(self.overview().await?.animations)
     }
 
-    /// A first look at each of these animations, in their order, and whether it is behind their scripts.
+    /// Polls each of these animations once, in their order, and compares it with its scripts.
     ///
     /// # Errors
-    /// Those of the store.
+    /// The errors of the store.
     pub async fn look(&self, animations: &[Animation]) -> Result<Vec<Watch<'a, S, C>>> {
         let looks = animations.iter().map(|animation| {
             let mut watch = Watch::new(*self, animation.clone());
             async move {
-                watch.look().await?;
+                watch.poll().await?;
                 watch.compare().await?;
                 Ok::<_, Error>(watch)
             }
@@ -173,7 +173,7 @@ mod tests {
         assert_eq!(seen, [(true, true), (true, true), (false, false)]);
     }
 
-    /// Each manifest that was set aside was one animation more: four times `film`.
+    /// Each manifest that was set aside counted as another animation: four times `film`.
     #[tokio::test]
     async fn an_animation_whose_manifests_were_set_aside_is_named_once() {
         let world = World::new();
@@ -188,7 +188,7 @@ mod tests {
         assert_eq!(world.client().animations().await.unwrap(), [world.film()]);
     }
 
-    /// A folder's marker was an animation, for ever new.
+    /// The marker of a folder counted as an animation that never ends.
     #[tokio::test]
     async fn what_systems_leave_makes_no_animation_and_what_is_misplaced_is_named() {
         let world = World::new();
@@ -231,7 +231,7 @@ mod tests {
         }
     }
 
-    /// "Done, GIF current" stood there while the functions could not read what had been uploaded.
+    /// The status was "Done, GIF current" while the functions could not read the uploaded files.
     #[tokio::test]
     async fn what_the_functions_have_not_seen_is_not_done() {
         let world = World::new();
@@ -257,7 +257,7 @@ mod tests {
         }
     }
 
-    /// "Done, GIF current" stood there beside half of a GIF whose metadata had been copied.
+    /// The status was "Done, GIF current" for half a GIF whose metadata had been copied.
     #[tokio::test]
     async fn a_gif_that_was_cut_off_is_not_current() {
         let world = World::new();

@@ -1,7 +1,7 @@
-//! Making an animation's folder of the bucket equal to a local one, with as little as possible uploaded.
+//! Submission: makes an animation's folder in the bucket equal to a local one, with as few uploads as possible.
 //!
-//! What goes first matters: with scripts deleted, then the new number of frames, then new scripts, the animation is
-//! never complete before it is what it should be.
+//! The order matters: scripts are deleted first, then the new number of frames is put, then the new scripts. So the
+//! animation is never complete before it is as wanted.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,86 +16,86 @@ use crate::client::{Client, SIDE_BY_SIDE};
 use crate::error::{Error, Result};
 use crate::file::{DIGEST, File};
 
-/// Memory that files under way may take.
+/// The memory that files in transit may take, in bytes.
 const UNDER_WAY: u64 = 256 << 20;
 
-/// What an animation's folder of the bucket should hold.
+/// The wanted content of an animation's folder in the bucket.
 #[derive(Debug)]
 pub struct Submission {
     animation: Animation,
-    /// By key.
+    /// The files by key.
     files: BTreeMap<String, File>,
     deletable: Deletable,
 }
 
-/// Which scripts that are not part of a submission it may delete from the bucket's folder.
+/// The scripts that a submission may delete from the bucket's folder if it does not contain them.
 #[derive(Debug, Clone, Default)]
 enum Deletable {
     #[default]
     None,
-    /// Those of these keys.
+    /// The scripts with these keys.
     These(BTreeSet<String>),
     All,
 }
 
-/// What a submission would do, and has not done.
+/// The changes that a submission would make.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Preview {
-    /// The keys of scripts, and of the settings, that would be uploaded.
+    /// The keys of the scripts and settings that would be uploaded.
     pub upload: Vec<String>,
-    /// The keys of scripts that would be deleted.
+    /// The keys of the scripts that would be deleted.
     pub delete: Vec<String>,
-    /// Files, with the settings, that are there already.
+    /// The number of files, settings included, that are there already.
     pub unchanged: u64,
 }
 
-/// How far a submission is.
+/// The progress of a submission.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Sending {
     /// Scripts that are no longer wanted have been deleted.
     Deleted {
-        /// How many.
+        /// The number of deleted scripts.
         scripts: u64,
     },
     /// Scripts are being uploaded.
     Uploading {
-        /// So many are there.
+        /// The number of uploaded files.
         done: u64,
-        /// Of so many.
+        /// The number of files to upload.
         total: u64,
     },
-    /// Everything is as it should be.
+    /// The folder is as wanted.
     Finished {
-        /// Scripts that were uploaded.
+        /// The number of files that were uploaded.
         uploaded: u64,
-        /// Files, with the settings, that were there already.
+        /// The number of files, settings included, that were there already.
         unchanged: u64,
     },
 }
 
-/// What a submission has come to.
+/// The result of a submission.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Submitted {
-    /// The version of each file by key.
+    /// The version of each file, by key.
     pub versions: BTreeMap<String, ETag>,
 }
 
-/// The bucket's folder compared with the wanted one.
+/// The differences between the bucket's folder and the wanted one.
 #[derive(Debug, Default, PartialEq)]
 struct Difference {
-    /// Keys to put, in order.
+    /// The keys to put, in order.
     changed: Vec<String>,
-    /// Keys to delete.
+    /// The keys to delete.
     surplus: Vec<String>,
-    /// The versions of what is as it should be.
+    /// The versions of the objects that need no change.
     same: BTreeMap<String, ETag>,
 }
 
-/// Settings that say how many frames there are, so that the functions need not wait for a quiet period to know that the
-/// upload has ended.
+/// Makes settings that state the number of frames, so that the functions need not wait for a quiet period to know
+/// that the upload has ended.
 ///
 /// # Errors
-/// [`Error::Settings`] for no frames.
+/// [`Error::Settings`] if the number is 0.
 pub fn settings_with_frames(settings: &AnimationSettings, frames: u64) -> Result<File> {
     let counted = AnimationSettings::new(Some(frames), settings.fps(), settings.loops());
     let counted = counted.map_err(|source| Error::Settings(source.into()))?;
@@ -104,10 +104,10 @@ pub fn settings_with_frames(settings: &AnimationSettings, frames: u64) -> Result
 }
 
 impl Submission {
-    /// These scripts, and this `animation.json`.
+    /// Makes a submission of these scripts and this `animation.json`.
     ///
     /// # Errors
-    /// The pipeline's [`Key`](rayfold_pipeline::Error::Key) for a name that it refuses.
+    /// The pipeline's [`Key`](rayfold_pipeline::Error::Key) if it refuses a name.
     pub fn new(
         animation: Animation,
         scripts: impl IntoIterator<Item = (ScriptName, File)>,
@@ -122,41 +122,45 @@ impl Submission {
         Ok(Self { animation, files, deletable: Deletable::None })
     }
 
-    /// Lets it delete the scripts of these keys if they are not part of it.
+    /// Allows it to delete the scripts with these keys if it does not contain them.
     pub fn deleting(mut self, keys: impl IntoIterator<Item = String>) -> Self {
         self.deletable = Deletable::These(keys.into_iter().collect());
         self
     }
 
-    /// Lets it delete every script of the folder that is not part of it.
+    /// Allows it to delete every script in the folder that it does not contain.
     pub fn deleting_all_others(mut self) -> Self {
         self.deletable = Deletable::All;
         self
     }
 
-    /// The animation.
+    /// Returns the animation that is submitted.
     pub fn animation(&self) -> &Animation {
         &self.animation
     }
 }
 
 impl<S: Store, C: Clock> Client<'_, S, C> {
-    /// What [`submit`](Self::submit) would do.
+    /// Returns the changes that [`submit`](Self::submit) would make.
     ///
     /// # Errors
-    /// Those of the store.
+    /// The errors of the store.
     pub async fn preview(&self, submission: &Submission) -> Result<Preview> {
         let Difference { changed, surplus, same } =
             self.compare(&submission.animation, &submission.files).await?;
         Ok(Preview { upload: changed, delete: surplus, unchanged: same.len() as u64 })
     }
 
-    /// Makes the bucket's folder as wanted.
+    /// Makes the bucket's folder as wanted, and reports the progress to `report`.
     ///
     /// # Errors
-    /// [`Error::WouldDelete`] before anything is changed, those of the store, and when a file can no longer be read or is
-    /// no longer what it was.
-    pub async fn submit(&self, submission: &Submission, mut told: impl FnMut(Sending)) -> Result<Submitted> {
+    /// [`Error::WouldDelete`] before anything is changed; the errors of the store; [`Error::Read`] or
+    /// [`Error::FileChanged`] if a file can no longer be read or has changed.
+    pub async fn submit(
+        &self,
+        submission: &Submission,
+        mut report: impl FnMut(Sending),
+    ) -> Result<Submitted> {
         let Submission { animation, files, deletable } = submission;
         let Difference { mut changed, surplus, same: mut versions } = self.compare(animation, files).await?;
         let may_go = |key: &String| match deletable {
@@ -170,7 +174,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         }
         if !surplus.is_empty() {
             self.delete(&surplus, |_| {}).await?;
-            told(Sending::Deleted { scripts: surplus.len() as u64 });
+            report(Sending::Deleted { scripts: surplus.len() as u64 });
         }
         let unchanged = versions.len() as u64;
         let settings = animation.settings();
@@ -180,15 +184,15 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         }
         let total = changed.len() as u64;
         if total > 0 {
-            told(Sending::Uploading { done: 0, total });
+            report(Sending::Uploading { done: 0, total });
             versions
-                .extend(self.send(&changed, files, |done| told(Sending::Uploading { done, total })).await?);
+                .extend(self.send(&changed, files, |done| report(Sending::Uploading { done, total })).await?);
         }
-        told(Sending::Finished { uploaded: total, unchanged });
+        report(Sending::Finished { uploaded: total, unchanged });
         Ok(Submitted { versions })
     }
 
-    /// Compares what lies right below the animation's scripts with what should.
+    /// Compares the objects directly in the animation's folder with the wanted ones.
     async fn compare(&self, animation: &Animation, files: &BTreeMap<String, File>) -> Result<Difference> {
         let listing = self.list(ListRequest::level(animation.scripts())).await?;
         let there: BTreeMap<String, Listed> =
@@ -211,7 +215,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         Ok(difference)
     }
 
-    /// The object's version, if it holds the file.
+    /// Returns the object's version if it holds the file.
     async fn version_if_same(&self, key: &str, file: &File, there: Option<&Listed>) -> Result<Option<ETag>> {
         let Some(there) = there.filter(|there| there.size == file.size()) else { return Ok(None) };
         if there.etag.as_str() == file.digest() {
@@ -222,12 +226,12 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         Ok(is_same.then_some(info.etag))
     }
 
-    /// Puts files, many at once, and tells after each how many are there. Returns their versions.
+    /// Puts files, several at once, and reports the number put after each. Returns their versions.
     async fn send(
         &self,
         keys: &[String],
         files: &BTreeMap<String, File>,
-        mut told: impl FnMut(u64),
+        mut report: impl FnMut(u64),
     ) -> Result<BTreeMap<String, ETag>> {
         let files = keys.iter().filter_map(|key| Some((key, files.get(key)?)));
         let largest = files.clone().map(|(_, file)| file.size()).max().unwrap_or(1).max(1);
@@ -242,19 +246,19 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         let mut versions = BTreeMap::new();
         while let Some((key, version)) = puts.try_next().await? {
             versions.insert(key, version);
-            told(versions.len() as u64);
+            report(versions.len() as u64);
         }
         Ok(versions)
     }
 
-    /// Deletes, many at once, and tells after each how many are gone.
-    pub(crate) async fn delete(&self, keys: &[String], mut told: impl FnMut(u64)) -> Result<()> {
+    /// Deletes objects, several at once, and reports the number deleted after each.
+    pub(crate) async fn delete(&self, keys: &[String], mut report: impl FnMut(u64)) -> Result<()> {
         let deletions: Vec<_> = keys.iter().map(|key| self.store.delete(key)).collect();
         let mut deletions = stream::iter(deletions).buffer_unordered(SIDE_BY_SIDE);
         let mut gone = 0;
         while let Some(()) = deletions.try_next().await? {
             gone += 1;
-            told(gone);
+            report(gone);
         }
         Ok(())
     }
@@ -273,10 +277,10 @@ mod tests {
     }
 
     async fn submit(world: &World, scripts: &[(&str, &str)], settings: &str) -> (Submitted, Vec<Sending>) {
-        let mut told = Vec::new();
+        let mut reports = Vec::new();
         let submission = submission(scripts, settings).deleting_all_others();
-        let submitted = world.client().submit(&submission, |sending| told.push(sending)).await.unwrap();
-        (submitted, told)
+        let submitted = world.client().submit(&submission, |sending| reports.push(sending)).await.unwrap();
+        (submitted, reports)
     }
 
     #[tokio::test]
@@ -285,23 +289,23 @@ mod tests {
         world.put("scripts/film/old.txt", "old").await;
         world.put("scripts/film/notes.md", "not ours").await;
         world.put("scripts/film/2/1.txt", "another animation's").await;
-        let (submitted, told) = submit(&world, &[("1", "a"), ("2", "b")], "{}").await;
-        assert_eq!(told.first(), Some(&Sending::Deleted { scripts: 1 }));
-        assert_eq!(told.last(), Some(&Sending::Finished { uploaded: 2, unchanged: 0 }));
-        assert!(told.contains(&Sending::Uploading { done: 2, total: 2 }));
+        let (submitted, reports) = submit(&world, &[("1", "a"), ("2", "b")], "{}").await;
+        assert_eq!(reports.first(), Some(&Sending::Deleted { scripts: 1 }));
+        assert_eq!(reports.last(), Some(&Sending::Finished { uploaded: 2, unchanged: 0 }));
+        assert!(reports.contains(&Sending::Uploading { done: 2, total: 2 }));
         let kept = ["scripts/film/2/1.txt", "scripts/film/notes.md"];
         let mut keys: Vec<&str> = submitted.versions.keys().map(String::as_str).chain(kept).collect();
         keys.sort_unstable();
         assert_eq!(world.keys("scripts/").await, keys);
 
         world.requests.clear();
-        let (again, told) = submit(&world, &[("1", "a"), ("2", "b")], "{}").await;
-        assert_eq!(told, [Sending::Finished { uploaded: 0, unchanged: 3 }]);
+        let (again, reports) = submit(&world, &[("1", "a"), ("2", "b")], "{}").await;
+        assert_eq!(reports, [Sending::Finished { uploaded: 0, unchanged: 3 }]);
         assert_eq!(again, submitted);
         assert!(!world.requests.seen().iter().any(|request| request.starts_with("put")));
 
-        let (changed, told) = submit(&world, &[("1", "A"), ("2", "b")], "{}").await;
-        assert_eq!(told.last(), Some(&Sending::Finished { uploaded: 1, unchanged: 2 }));
+        let (changed, reports) = submit(&world, &[("1", "A"), ("2", "b")], "{}").await;
+        assert_eq!(reports.last(), Some(&Sending::Finished { uploaded: 1, unchanged: 2 }));
         assert_ne!(changed.versions["scripts/film/1.txt"], submitted.versions["scripts/film/1.txt"]);
     }
 
@@ -320,7 +324,7 @@ mod tests {
 
         let refused = world.client().submit(&wanted(), |_| {}).await;
         assert!(matches!(refused, Err(Error::WouldDelete { keys }) if keys == others));
-        // Whoever has agreed to one has not agreed to the other.
+        // Permission to delete one script is no permission to delete another.
         let half = wanted().deleting([others[0].clone()]);
         let refused = world.client().submit(&half, |_| {}).await;
         assert!(matches!(refused, Err(Error::WouldDelete { keys }) if keys == others[1..]));
@@ -345,14 +349,14 @@ mod tests {
         assert_eq!(seen, expected);
     }
 
-    /// With encryption by one's own key, or parts, the entity tag is not the MD5; the memory store's never is.
+    /// With customer-managed encryption or parts, the entity tag is not the MD5. The memory store's never is.
     #[tokio::test]
     async fn an_object_of_other_tags_and_no_digest_is_sent_again() {
         let world = World::new();
         let key = "scripts/film/1.txt";
         world.store.put(key, "a".into(), PutOptions::always()).await.unwrap();
-        let (_, told) = submit(&world, &[("1", "a")], "{}").await;
-        assert_eq!(told.last(), Some(&Sending::Finished { uploaded: 1, unchanged: 0 }));
+        let (_, reports) = submit(&world, &[("1", "a")], "{}").await;
+        assert_eq!(reports.last(), Some(&Sending::Finished { uploaded: 1, unchanged: 0 }));
         assert!(world.store.head(key).await.unwrap().metadata.contains_key(DIGEST));
     }
 

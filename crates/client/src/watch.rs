@@ -1,4 +1,4 @@
-//! Looking at an animation again and again until it is what was asked for.
+//! A watch: polls an animation until it is done.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -13,16 +13,16 @@ use crate::client::Client;
 use crate::error::{Error, Result};
 use crate::submit::Submitted;
 
-/// How long nothing may happen before whoever waits is told that this is unusual.
+/// After this long without progress, [`Waiting::Quiet`] is reported.
 const UNUSUAL: Duration = Duration::from_secs(20);
 
-/// How long an upload that has just begun may take to show.
+/// The time that an upload which has just begun may take to become visible.
 const GRACE: Duration = Duration::from_secs(5);
 
-/// How long a store may be busy or out of reach.
+/// The time for which a store may be busy or unreachable.
 const PATIENCE: Duration = Duration::from_secs(3600);
 
-/// An animation as its manifest and its GIF show it.
+/// The state of an animation as its manifest and its GIF show it.
 #[derive(Debug)]
 pub struct Watch<'a, S, C> {
     client: Client<'a, S, C>,
@@ -36,31 +36,31 @@ pub struct Watch<'a, S, C> {
     started: Timestamp,
 }
 
-/// How far the frames are that someone waits for.
+/// The progress of the frames of a submission.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Waiting {
-    /// The functions work on what was submitted.
+    /// The functions render the submitted frames.
     Frames {
-        /// So many frames are drawn or cannot be.
+        /// The number of frames that are drawn or failed.
         done: u64,
-        /// Of so many.
+        /// The number of frames of the animation.
         total: u64,
     },
-    /// Nothing has happened for so long.
+    /// Nothing has happened for this long.
     Quiet(Duration),
 }
 
-/// What a submission has become.
+/// The outcome of a submission.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ended {
-    /// A GIF.
+    /// The GIF is complete.
     Gif(ObjectInfo),
-    /// No GIF, as the manifest says.
+    /// There is no GIF; the manifest has the reasons.
     Failed(Box<Manifest>),
 }
 
 impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
-    /// Nothing is known before the first look.
+    /// Makes a watch. It knows nothing before the first poll.
     pub fn new(client: Client<'a, S, C>, animation: Animation) -> Self {
         let started = client.clock.now();
         Self {
@@ -76,39 +76,39 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
         }
     }
 
-    /// The animation.
+    /// Returns the animation that is watched.
     pub fn animation(&self) -> &Animation {
         &self.animation
     }
 
-    /// The manifest as last seen.
+    /// Returns the manifest as of the last poll that read it.
     pub fn manifest(&self) -> Option<&Manifest> {
         self.manifest.as_ref()
     }
 
-    /// There is a manifest, but what was last seen of it cannot be read.
+    /// Returns whether there is a manifest that could not be read.
     pub fn is_unreadable(&self) -> bool {
         self.is_unreadable
     }
 
-    /// The GIF as last seen.
+    /// Returns the GIF as of the last poll that read it.
     pub fn gif(&self) -> Option<&ObjectInfo> {
         self.gif.as_ref()
     }
 
-    /// How long ago the GIF was written.
+    /// Returns the age of the GIF.
     pub fn gif_age(&self) -> Option<Duration> {
         Some(self.client.clock.now().since(self.gif.as_ref()?.modified))
     }
 
-    /// Looks. The manifest, which may be large, is read only when it has changed, the GIF's version at first, and again
-    /// once all frames are drawn. Says whether anything changed.
+    /// Polls once, and returns whether anything changed. Reads the manifest, which may be large, only if its entity
+    /// tag has changed. Reads the version of the GIF on the first call, and again once all frames are drawn.
     ///
     /// # Errors
-    /// Those of the store.
-    pub async fn look(&mut self) -> Result<bool> {
+    /// The errors of the store.
+    pub async fn poll(&mut self) -> Result<bool> {
         let (store, key) = (self.client.store, self.animation.manifest());
-        // At first a whole GET, whose refusal says more than that of a HEAD.
+        // The first request is a whole GET, because its refusal says more than that of a HEAD.
         let is_known = match &self.version {
             Some(_) => found(store.head(&key).await)?.map(|info| info.etag) == self.version,
             None => false,
@@ -118,7 +118,7 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
             let object = found(store.get(&key).await)?;
             let version = object.as_ref().map(|object| object.info.etag.clone());
             changed = version != self.version;
-            // One that cannot be read is made anew by the functions; until then nothing is known.
+            // The functions rebuild an unreadable manifest. Until then nothing is known.
             self.manifest =
                 object.as_ref().and_then(|object| Manifest::decode(&self.animation, &object.body).ok());
             self.is_unreadable = object.is_some() && self.manifest.is_none();
@@ -134,11 +134,11 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
         Ok(changed)
     }
 
-    /// Looks whether the manifest is about the scripts that there are: until the functions have seen an upload it is about
-    /// older ones, and so is the GIF.
+    /// Compares the manifest with the current scripts. Until the functions have seen an upload, the manifest and the
+    /// GIF are about older scripts.
     ///
     /// # Errors
-    /// Those of the store.
+    /// The errors of the store.
     pub async fn compare(&mut self) -> Result<()> {
         let Some(manifest) = &self.manifest else { return Ok(()) };
         let versions = self.client.versions(&self.animation).await?;
@@ -146,30 +146,30 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
         Ok(())
     }
 
-    /// The functions have not seen the newest scripts, as the last comparison found.
+    /// Returns whether the last comparison found scripts that the functions have not seen.
     pub fn is_behind(&self) -> bool {
         self.is_behind
     }
 
-    /// The same, but a store that is busy or out of reach for a moment is no reason to give up.
+    /// Polls once, but does not fail if the store is busy or unreachable for a moment.
     ///
     /// # Errors
-    /// When the store refuses.
-    pub async fn look_patiently(&mut self) -> Result<bool> {
-        match self.look().await {
+    /// The permanent errors of the store.
+    pub async fn poll_with_retry(&mut self) -> Result<bool> {
+        match self.poll().await {
             Err(Error::Store(error)) if error.is_retryable() && self.elapsed() < PATIENCE => Ok(false),
             answer => answer,
         }
     }
 
-    /// The same, but waits a moment for an upload that has just begun when nothing is there.
+    /// Polls with retries. If there is nothing, waits a moment for an upload that has just begun.
     ///
     /// # Errors
-    /// [`Error::NoAnimation`] when there is still nothing then, and when the store refuses.
+    /// [`Error::NoAnimation`] if there is still nothing then, and the permanent errors of the store.
     pub async fn look_for(&mut self) -> Result<bool> {
         let begun = self.client.clock.now();
         loop {
-            let changed = self.look_patiently().await?;
+            let changed = self.poll_with_retry().await?;
             if self.version.is_some() {
                 return Ok(changed);
             }
@@ -183,13 +183,13 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
         }
     }
 
-    /// The GIF shows what the manifest says, and the manifest is about the newest scripts.
+    /// Returns whether the GIF shows what the manifest says, and the manifest is about the newest scripts.
     pub fn is_current(&self) -> bool {
         let manifest = self.manifest.as_ref();
         !self.is_behind && manifest.is_some_and(|manifest| is_current(&manifest.head, self.gif.as_ref()))
     }
 
-    /// Nothing more will happen unless somebody changes something.
+    /// Returns whether nothing more will happen unless a script or an object is changed.
     pub fn is_settled(&self) -> bool {
         match self.manifest.as_ref().map(|manifest| manifest.head.status) {
             _ if self.is_behind => false,
@@ -200,20 +200,20 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
         }
     }
 
-    /// Waits before the next look: a moment at first, longer when it takes long anyway.
+    /// Waits before the next poll: a moment at first, longer if it has taken long already.
     pub async fn pause(&self) {
         let pause = (self.elapsed() / 20).clamp(Duration::from_millis(100), Duration::from_secs(2));
         self.client.clock.sleep(pause).await;
     }
 
-    /// Since the first look could be taken.
+    /// Returns the time since the watch was made.
     pub(crate) fn elapsed(&self) -> Duration {
         self.client.clock.now().since(self.started)
     }
 }
 
 impl<S: Store, C: Clock> Client<'_, S, C> {
-    /// The versions of the animation's scripts and settings by key.
+    /// Returns the versions of the animation's scripts and settings, by key.
     async fn versions(&self, animation: &Animation) -> Result<BTreeMap<String, ETag>> {
         let listing = self.list(ListRequest::level(animation.scripts())).await?;
         let is_ours = |key: &str| matches!(key.parse::<Key>(), Ok(Key::Script { .. } | Key::Settings { .. }));
@@ -221,20 +221,22 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         Ok(ours.map(|object| (object.key, object.etag)).collect())
     }
 
-    /// Waits until what was submitted has become a GIF, or the manifest says why it will not.
+    /// Waits until the submission has become a GIF, or the manifest says why it will not. Reports
+    /// the progress to `report`.
     ///
     /// # Errors
-    /// When the store refuses, and [`Error::ChangedMeanwhile`] when somebody else has changed the scripts.
+    /// The permanent errors of the store, and [`Error::ChangedMeanwhile`] if the scripts are
+    /// no longer those submitted.
     pub async fn wait(
         &self,
         animation: &Animation,
         submitted: &Submitted,
-        mut told: impl FnMut(Waiting),
+        mut report: impl FnMut(Waiting),
     ) -> Result<Ended> {
         let mut watch = Watch::new(*self, animation.clone());
         let mut last_change = self.clock.now();
         loop {
-            if watch.look_patiently().await? {
+            if watch.poll_with_retry().await? {
                 last_change = self.clock.now();
             }
             if let Some(manifest) = watch.manifest()
@@ -242,7 +244,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
             {
                 let head = &manifest.head;
                 let total = head.total + head.missing() - head.pending;
-                told(Waiting::Frames { done: head.done + head.failed, total });
+                report(Waiting::Frames { done: head.done + head.failed, total });
                 match (head.status, watch.gif()) {
                     (Status::Done, Some(gif)) if watch.is_current() => return Ok(Ended::Gif(gif.clone())),
                     (Status::Failed | Status::Refused, _) => {
@@ -254,7 +256,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
             if self.clock.now().since(last_change) > UNUSUAL {
                 last_change = self.clock.now();
                 self.must_be_unchanged(animation, &submitted.versions).await?;
-                told(Waiting::Quiet(UNUSUAL));
+                report(Waiting::Quiet(UNUSUAL));
             }
             watch.pause().await;
         }
@@ -278,7 +280,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
     }
 }
 
-/// The manifest is about exactly these versions of exactly these files.
+/// Returns whether the manifest is about exactly these versions of exactly these files.
 fn stands_for(manifest: &Manifest, animation: &Animation, versions: &BTreeMap<String, ETag>) -> bool {
     let mut seen: BTreeMap<String, &ETag> =
         manifest.frames.iter().map(|frame| (animation.script(&frame.script), &frame.version)).collect();
@@ -307,14 +309,14 @@ mod tests {
     async fn waiting_ends_with_the_gif_of_what_was_submitted() {
         let world = World::new();
         let submitted = submitted(&world, &[("1", "frame"), ("2", "frame 2")]).await;
-        let mut told = Vec::new();
+        let mut reports = Vec::new();
         let client = world.client();
         let film = world.film();
-        let ended = client.wait(&film, &submitted, |waiting| told.push(waiting));
+        let ended = client.wait(&film, &submitted, |waiting| reports.push(waiting));
         let (ended, ()) = futures_util::future::join(ended, world.functions()).await;
         let Ended::Gif(gif) = ended.unwrap() else { panic!("no GIF") };
         assert_eq!(gif, world.store.head("animations/film.gif").await.unwrap());
-        assert_eq!(told.last(), Some(&Waiting::Frames { done: 2, total: 2 }));
+        assert_eq!(reports.last(), Some(&Waiting::Frames { done: 2, total: 2 }));
     }
 
     #[tokio::test]
@@ -331,17 +333,17 @@ mod tests {
     async fn silence_is_told_and_others_changes_end_the_waiting() {
         let world = World::new();
         let submitted = submitted(&world, &[("1", "frame"), ("2", "frame")]).await;
-        let told = std::sync::Mutex::new(Vec::new());
+        let reports = std::sync::Mutex::new(Vec::new());
         let (client, film) = (world.client(), world.film());
-        let wait = client.wait(&film, &submitted, |waiting| told.lock().unwrap().push(waiting));
+        let wait = client.wait(&film, &submitted, |waiting| reports.lock().unwrap().push(waiting));
         let meddle = async {
-            while told.lock().unwrap().is_empty() {
+            while reports.lock().unwrap().is_empty() {
                 tokio::task::yield_now().await;
             }
             world.put("scripts/film/3.txt", "frame").await;
         };
         let (ended, ()) = futures_util::future::join(wait, meddle).await;
-        assert_eq!(told.into_inner().unwrap(), [Waiting::Quiet(UNUSUAL)]);
+        assert_eq!(reports.into_inner().unwrap(), [Waiting::Quiet(UNUSUAL)]);
         assert!(
             matches!(ended, Err(Error::ChangedMeanwhile { key }) if key == "scripts/film/3.txt"),
             "the third script is none of ours"
@@ -354,10 +356,10 @@ mod tests {
         world.put("scripts/film/1.txt", "frame").await;
         world.put("manifests/film.json", "garbage").await;
         let mut watch = Watch::new(world.client(), world.film());
-        assert!(watch.look().await.unwrap());
+        assert!(watch.poll().await.unwrap());
         assert!(watch.is_unreadable() && !watch.is_settled() && !watch.is_current());
         world.functions().await;
-        assert!(watch.look().await.unwrap());
+        assert!(watch.poll().await.unwrap());
         assert!(!watch.is_unreadable() && watch.is_current());
     }
 
@@ -368,7 +370,7 @@ mod tests {
         assert!(matches!(watch.look_for().await, Err(Error::NoAnimation(name)) if name == world.film()));
         assert!(watch.elapsed() >= GRACE);
 
-        // What comes within the moment's grace is waited for.
+        // An upload within the grace period is waited for.
         let mut watch = Watch::new(world.client(), world.film());
         let upload = async {
             for _ in 0..10 {
@@ -386,7 +388,7 @@ mod tests {
         world.put("scripts/film/1.txt", "frame").await;
         world.functions().await;
         let gif = world.store.head("animations/film.gif").await.unwrap();
-        // Two frames are wanted, and one is there.
+        // Two frames are wanted, but only one is there.
         world.put("scripts/film/animation.json", r#"{"frames": 2}"#).await;
         world.functions().await;
         let watch = world.client().look(&[world.film()]).await.unwrap().remove(0);
@@ -401,7 +403,7 @@ mod tests {
         world.put("scripts/film/1.txt", "frame").await;
         world.functions().await;
         let mut watch = Watch::new(world.client(), world.film());
-        assert!(watch.look().await.unwrap() && !watch.look().await.unwrap());
+        assert!(watch.poll().await.unwrap() && !watch.poll().await.unwrap());
         let manifest = watch.manifest().unwrap();
         let version = manifest.frames[0].version.clone();
         let key = || "scripts/film/1.txt".to_owned();

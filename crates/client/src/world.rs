@@ -1,5 +1,5 @@
-//! A bucket in memory whose requests are written down, a clock that jumps, and functions that work when they are told
-//! to: the real steps with a renderer of one line.
+//! A test environment: a bucket in memory that records its requests, a clock that jumps, and functions that run on
+//! demand. The functions are the real steps with a renderer of one line.
 
 use std::collections::BTreeSet;
 use std::num::NonZeroU64;
@@ -23,10 +23,10 @@ use rayfold_scene::AnimationSettings;
 
 use crate::client::Client;
 
-/// The pixel version of what is drawn here.
+/// The pixel version of the frames drawn in these tests.
 pub(crate) const PIXELS: u32 = 1;
 
-/// A clock that jumps to wherever someone waits for, and lets others go on meanwhile.
+/// A clock that jumps to the time that a caller waits for. Other tasks run meanwhile.
 #[derive(Debug, Clone)]
 pub(crate) struct JumpingClock(Arc<AtomicU64>);
 
@@ -41,7 +41,7 @@ impl Clock for JumpingClock {
     }
 }
 
-/// What was asked of the store.
+/// The requests made to the store.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Requests(Arc<Mutex<Vec<String>>>);
 
@@ -55,7 +55,7 @@ impl Requests {
     }
 }
 
-/// Replaces an object before a request that is named so.
+/// A replacement of an object before a request with a given name.
 struct Replacement {
     request: &'static str,
     after: u32,
@@ -63,7 +63,7 @@ struct Replacement {
     times: u8,
 }
 
-/// The bucket.
+/// The bucket, which records requests.
 pub(crate) struct WatchedStore {
     inner: MemoryStore<JumpingClock>,
     requests: Requests,
@@ -83,7 +83,8 @@ impl WatchedStore {
 }
 
 impl Replacement {
-    /// What replaces the object now: the body, and how often that will still be done, so that no two are equal.
+    /// Returns the new body if the object is replaced now. The remaining count is appended, so that no
+    /// two bodies are equal.
     fn due(&mut self, request: &str) -> Option<Vec<u8>> {
         if self.request != request || self.times == 0 {
             return None;
@@ -140,7 +141,7 @@ impl Store for WatchedStore {
     }
 }
 
-/// Everything together.
+/// The bucket, the clock, and the functions together.
 pub(crate) struct World {
     pub(crate) store: WatchedStore,
     pub(crate) requests: Requests,
@@ -167,7 +168,7 @@ impl World {
         Client::new(&self.store, &self.clock)
     }
 
-    /// The animation that most tests are about.
+    /// Returns the animation of most tests.
     pub(crate) fn film(&self) -> Animation {
         Animation::new("film").unwrap()
     }
@@ -182,12 +183,12 @@ impl World {
         listing.objects.into_iter().map(|object| object.key).collect()
     }
 
-    /// Replaces an object before a request of this name, the first `after` of them excepted, so many times.
+    /// Replaces an object before each of `times` requests of this name, after the first `after` of them.
     pub(crate) fn replace_before(&self, request: &'static str, after: u32, body: Vec<u8>, times: u8) {
         *self.store.replacement.lock().unwrap() = Some(Replacement { request, after, body, times });
     }
 
-    /// The functions work on all that is new, and on what that leads to.
+    /// Runs the functions on all new objects, and on the objects that they write.
     pub(crate) async fn functions(&self) {
         for prefix in ["scripts/", "parts/", "retries/", "assemblies/"] {
             let listing = Listing::read(ListRequest::all(prefix), None, |r| self.store.inner.list(r)).await;
@@ -199,7 +200,7 @@ impl World {
         }
     }
 
-    /// The functions notice that scripts are gone, once they are.
+    /// Runs the functions for the deletions of these scripts, once they have happened.
     pub(crate) async fn deletions(&self, keys: &[&str]) {
         for key in keys {
             while self.store.inner.head(key).await.is_ok() {
@@ -217,7 +218,7 @@ impl World {
             assemble(&invocation, &Joiner, key).await.unwrap();
         } else {
             match render_frame(&invocation, &OneLine, key).await {
-                // What is no script is nobody's.
+                // An object that is no script belongs to no animation.
                 Err(rayfold_pipeline::Error::Key { .. }) => {}
                 rendered => drop(rendered.unwrap()),
             }
@@ -225,7 +226,7 @@ impl World {
     }
 }
 
-/// `bad` has no frame; all else is one, which tells its name and its text.
+/// A renderer for which `bad` has no frame. Every other script is one, which shows its name and its text.
 struct OneLine;
 
 impl Renderer for OneLine {
@@ -243,7 +244,7 @@ impl Renderer for OneLine {
         })
     }
 
-    /// Nothing here is too big.
+    /// No frame is too big in these tests.
     async fn draw_band(
         &self,
         _: &ScriptName,
@@ -259,7 +260,7 @@ impl Renderer for OneLine {
     }
 }
 
-/// No frame is in pieces.
+/// A joiner that is never used, because no frame is in bands.
 enum Whole {}
 
 impl Joining for Whole {
@@ -272,7 +273,7 @@ impl Joining for Whole {
     }
 }
 
-/// Frames one after the other.
+/// An animator that concatenates the frames.
 struct Joiner;
 
 struct Joined(BytesMut);

@@ -1,4 +1,4 @@
-//! A folder on the disk as an animation.
+//! Reads a folder on disk as an animation.
 
 use std::fmt;
 use std::io;
@@ -6,25 +6,25 @@ use std::path::{Path, PathBuf};
 
 use rayfold_scene::{Name, natural_cmp};
 
-/// What a folder holds of an animation.
+/// The files of an animation in a folder.
 #[derive(Debug, Default)]
 pub struct Folder {
-    /// The scripts, each with its name without `.txt`, in the order of their frames.
+    /// The scripts in the order of their frames, each with its name without `.txt`.
     pub scripts: Vec<(String, PathBuf)>,
-    /// The settings.
+    /// The path of the settings file.
     pub settings: Option<PathBuf>,
-    /// What is not read although it looks as if it were meant to be.
+    /// The files that are not read although they look like a part of the animation.
     pub not_read: Vec<NotRead>,
-    /// Nothing lies in the folder, not even what is ignored.
+    /// The folder is empty, without even an ignored file.
     pub is_empty: bool,
 }
 
 /// A file or folder that is not read because of its name or kind.
 #[derive(Debug, Clone)]
 pub struct NotRead {
-    /// Its path.
+    /// The path of the file or folder.
     pub path: PathBuf,
-    /// What would be right.
+    /// The problem, with what would be right.
     pub problem: &'static str,
 }
 
@@ -35,10 +35,10 @@ impl fmt::Display for NotRead {
 }
 
 impl Folder {
-    /// Lists a folder. Scripts are not opened: what is no regular file is refused when it is read.
+    /// Lists a folder. Scripts are not opened: anything but a regular file is refused when it is read.
     ///
     /// # Errors
-    /// The system's.
+    /// Returns the error of the system.
     pub fn list(path: &Path) -> io::Result<Self> {
         let mut folder = Self { is_empty: true, ..Self::default() };
         for entry in path.read_dir()? {
@@ -48,7 +48,7 @@ impl Folder {
             let file = entry.file_name();
             let file = file.to_string_lossy();
             match Name::of(&file) {
-                // Another animation may lie in it.
+                // The folder may hold another animation.
                 Name::Script(_) if path.is_dir() => {
                     folder.not_read.push(NotRead { path, problem: "expected a script, found a folder" });
                 }

@@ -1,11 +1,11 @@
-//! Opening files for reading: what is no regular file is refused before it is opened, because opening a pipe waits until
-//! another program writes to it.
+//! Opening files for reading. Anything but a regular file is refused before it is opened, because opening a pipe
+//! waits until another program writes to it.
 
 use std::fs::{File, FileType};
 use std::io;
 use std::path::Path;
 
-/// What a path names instead of a regular file.
+/// The error that a path names something else than a regular file. Holds the kind that was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("expected a file, found {0}")]
 pub struct NotAFile(&'static str);
@@ -13,7 +13,7 @@ pub struct NotAFile(&'static str);
 /// Opens a regular file for reading.
 ///
 /// # Errors
-/// The system's, and [`NotAFile`] in an [`io::Error`].
+/// Returns the error of the system, or [`NotAFile`] in an [`io::Error`].
 pub fn open(path: &Path) -> io::Result<File> {
     match kind(path.metadata()?.file_type()) {
         None => File::open(path),
@@ -21,7 +21,7 @@ pub fn open(path: &Path) -> io::Result<File> {
     }
 }
 
-/// Names what is no regular file.
+/// Returns the name of a file type, or `None` for a regular file.
 pub(crate) fn kind(of: FileType) -> Option<&'static str> {
     if of.is_file() {
         return None;

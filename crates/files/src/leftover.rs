@@ -1,7 +1,7 @@
 //! Temporary files: their names, and the removal of those that a killed run left behind.
 //!
-//! A temporary file is locked as long as its run writes it, and the system frees the lock when the run ends, however it
-//! ends. Only files with a name of ours are touched.
+//! A run keeps a lock on its temporary file while it writes. The system releases the lock when the run ends, however
+//! it ends. Only files with a name of this crate's pattern are removed.
 
 use std::collections::HashSet;
 use std::fs::{File, TryLockError};
@@ -14,14 +14,14 @@ const BEFORE: &str = ".rayfold-";
 const AFTER: &str = ".part";
 const DIGITS: usize = 12;
 
-/// How long ago a temporary file was written last before it counts as left behind, if nobody holds its lock. A file is
-/// locked right after it is made, so that any span would do that is longer than that takes.
+/// The time since the last write after which an unlocked temporary file counts as left behind. A file is locked right
+/// after it is made, so any time longer than that would do.
 const AGE: Duration = Duration::from_secs(60 * 60);
 
-/// The same on file systems that have no locks, where a run may still be writing: a frame of days is not known.
+/// The same time on file systems without locks. A run may still be writing there, but no frame takes days.
 const AGE_WITHOUT_LOCKS: Duration = Duration::from_secs(7 * 24 * 60 * 60);
 
-/// A name that no other run takes, too short for any file system to refuse.
+/// Returns a name that no other run uses, short enough for every file system.
 pub(crate) fn temporary_name() -> String {
     let random = RandomState::new().hash_one(std::process::id());
     format!("{BEFORE}{:0DIGITS$x}{AFTER}", random >> (64 - 4 * DIGITS))
@@ -33,7 +33,8 @@ fn is_temporary(name: &str) -> bool {
     random.is_some_and(|random| random.len() == DIGITS && random.bytes().all(is_digit))
 }
 
-/// Removes what killed runs left in a folder; looks once a run. What cannot be removed stays.
+/// Removes the files that killed runs left in a folder. Checks a folder once per run. A file that
+/// cannot be removed stays.
 pub(crate) fn remove_leftovers(folder: &Path) {
     static SEEN: Mutex<Option<HashSet<PathBuf>>> = Mutex::new(None);
     let mut seen = SEEN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -47,7 +48,7 @@ fn remove_older(folder: &Path, now: SystemTime) {
     let Ok(entries) = folder.read_dir() else { return };
     for entry in entries.flatten() {
         let is_ours = entry.file_name().to_str().is_some_and(is_temporary);
-        // Of a link that is called so, the link's own type counts.
+        // For a link with such a name, the type of the link itself counts.
         if is_ours && entry.file_type().is_ok_and(|of| of.is_file()) && is_abandoned(&entry.path(), now) {
             let _ = std::fs::remove_file(entry.path());
         }
@@ -63,7 +64,7 @@ fn is_abandoned(path: &Path, now: SystemTime) -> bool {
     match File::open(path).map(|file| file.try_lock()) {
         Ok(Ok(())) => true,
         Ok(Err(TryLockError::WouldBlock)) => false,
-        // A mode of 0200 hides the file from us, not from its writer.
+        // A mode of 0200 denies this process to read the file, but its writer may still be running.
         Ok(Err(TryLockError::Error(_))) | Err(_) => age >= AGE_WITHOUT_LOCKS,
     }
 }

@@ -1,12 +1,13 @@
-//! The one way in which the project's programs write and read a user's files.
+//! The single way in which the project's programs read and write a user's files.
 //!
-//! A file is written under a short random name in the folder of its place and renamed when it is complete. Whatever ends
-//! the run before that (an error, a full disk, Ctrl-C) leaves what was there before. A run that is killed leaves its
-//! temporary file behind; a later run that writes into the same folder removes it ([`leftover`]).
+//! A file is written under a short random name in its target folder, and renamed when it is complete. If anything
+//! ends the run before that (an error, a full disk, Ctrl-C), the old file stays. A run that is killed leaves its
+//! temporary file behind. A later run that writes into the same folder removes it (`leftover`).
 //!
-//! A folder is read as an animation ([`Folder`]): its scripts, its settings, and the files that are not called as either.
+//! [`Folder`] reads a folder as an animation: its scripts, its settings, and misnamed files.
 //!
-//! This crate knows neither pictures nor signals, and of scenes only the names. A program that ends at once calls [`remove_unfinished`].
+//! This crate knows neither pictures nor signals, and of scenes only the names. A program that exits
+//! without unwinding calls [`remove_unfinished`].
 //!
 //! ```
 //! use std::io::Write;

@@ -1,4 +1,4 @@
-//! Writing: a temporary file that takes its place when it is whole.
+//! Writing: a temporary file that replaces its target when it is complete.
 
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Write};
@@ -8,51 +8,51 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use crate::input::kind;
 use crate::leftover::{remove_leftovers, temporary_name};
 
-/// How many links may lead to one another, as the kernel counts.
-const MOST_LINKS: usize = 40;
+/// The largest number of links in a chain, which is the limit of the Linux kernel.
+const MAX_LINKS: usize = 40;
 
-/// How many random names are tried; a second one is already unlikely.
-const MOST_NAMES: usize = 16;
+/// The largest number of random names that are tried. Even a second try is unlikely.
+const MAX_NAMES: usize = 16;
 
-/// Why a file could not be written.
+/// An error in writing a file.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The folder that the file should lie in is not there.
+    /// The target folder does not exist.
     #[error("cannot write {}: the folder {} does not exist", path.display(), folder.display())]
     NoFolder {
-        /// The file.
+        /// The path of the file.
         path: PathBuf,
-        /// The folder.
+        /// The path of the folder.
         folder: PathBuf,
     },
-    /// What the file should lie in is no folder.
+    /// The parent of the target is no folder.
     #[error("cannot write {}: {} is no folder", path.display(), folder.display())]
     NotAFolder {
-        /// The file.
+        /// The path of the file.
         path: PathBuf,
-        /// What is no folder.
+        /// The path that is no folder.
         folder: PathBuf,
     },
-    /// Its place is taken by what a file must not replace.
+    /// The target exists and must not be replaced by a file.
     #[error("cannot write {}: it is {what}", path.display())]
     Taken {
-        /// The file.
+        /// The path of the file.
         path: PathBuf,
-        /// What stands there.
+        /// The kind of the existing target.
         what: &'static str,
     },
-    /// The system says no.
+    /// The system reports an error.
     #[error("cannot write {}", path.display())]
     Io {
-        /// The file.
+        /// The path of the file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
 }
 
 impl Error {
-    /// The same about another file, for which this one stood.
+    /// Replaces the path by that of another file, for which this one was a stand-in.
     #[must_use]
     pub fn about(mut self, file: PathBuf) -> Self {
         match &mut self {
@@ -64,34 +64,34 @@ impl Error {
         self
     }
 
-    /// Says whether there is such a file already, which [`OutputFile::write_new`] does not replace.
+    /// Returns whether the file exists already and [`OutputFile::write_new`] refused to replace it.
     pub fn is_taken(&self) -> bool {
         matches!(self, Self::Io { source, .. } if source.kind() == io::ErrorKind::AlreadyExists)
     }
 }
 
-/// A file on its way. Dropping it unfinished removes what was written.
+/// A file that is being written. If it is dropped unfinished, the data written is removed.
 #[derive(Debug)]
 pub struct OutputFile {
-    /// As the user named it, for messages.
+    /// The path as the user gave it, for messages.
     path: PathBuf,
     place: PathBuf,
     temporary: Temporary,
     file: File,
 }
 
-/// A temporary file's name, which is gone from the folder when this is dropped.
+/// The name of a temporary file. Dropping it removes the file from the folder.
 #[derive(Debug)]
 struct Temporary(PathBuf);
 
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 impl OutputFile {
-    /// Begins to write `path`. An existing file stays as it is until [`finish`](Self::finish), and its mode and owner are
-    /// kept. A symbolic link is followed, also to a file that is not there yet.
+    /// Begins to write `path`. An existing file stays unchanged until [`finish`](Self::finish), and its mode and
+    /// owner are kept. A symbolic link is followed, also to a file that does not exist yet.
     ///
     /// # Errors
-    /// When the folder is missing or not writable, or `path` is a folder, a device or a read-only file.
+    /// Fails if the folder is missing or not writable, or if `path` is a folder, a device or a read-only file.
     pub fn create(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         let taken = |what| Error::Taken { path: path.to_path_buf(), what };
@@ -120,7 +120,7 @@ impl OutputFile {
             _ => {}
         }
         if let Some(existing) = &existing {
-            // Renaming would replace it all the same.
+            // A rename would replace it nevertheless.
             if existing.permissions().readonly() {
                 return Err(taken("read-only"));
             }
@@ -131,10 +131,10 @@ impl OutputFile {
         Ok(Self { path: path.to_path_buf(), place, temporary, file })
     }
 
-    /// Puts the file in its place. `durable`: only after the disk has it, which takes milliseconds a file.
+    /// Moves the file to its target. `durable`: syncs it to disk first, which takes milliseconds per file.
     ///
     /// # Errors
-    /// When the last bytes cannot be written or the file cannot be renamed.
+    /// Fails if the last bytes cannot be written or the file cannot be renamed.
     pub fn finish(self, durable: bool) -> Result<(), Error> {
         self.settle(durable, |temporary, place| std::fs::rename(temporary, place))
     }
@@ -142,7 +142,7 @@ impl OutputFile {
     fn settle(self, durable: bool, put: impl Fn(&Path, &Path) -> io::Result<()>) -> Result<(), Error> {
         let Self { path, place, temporary, file } = self;
         let synced = if durable { file.sync_all() } else { Ok(()) };
-        // The lock is held until the file has its name. Some systems do not rename open files.
+        // The lock is held until the file has its name. Some systems cannot rename open files.
         let file = if cfg!(unix) { Some(file) } else { None };
         let put = synced.and_then(|()| put(&temporary.0, &place));
         drop(file);
@@ -157,17 +157,17 @@ impl OutputFile {
         Self::with(path.as_ref(), bytes.as_ref())?.finish(durable)
     }
 
-    /// Writes a whole file that is not there yet, and never replaces another.
+    /// Writes a whole file that does not exist yet. Never replaces another file.
     ///
     /// # Errors
-    /// See [`write`](Self::write); [`Error::is_taken`] when there is such a file.
+    /// See [`write`](Self::write). [`Error::is_taken`] holds if the file exists.
     pub fn write_new(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Error> {
         let path = path.as_ref();
         if path.symlink_metadata().is_ok() {
             return Err(Error::Io { path: path.to_path_buf(), source: io::ErrorKind::AlreadyExists.into() });
         }
         Self::with(path, bytes)?.settle(true, |temporary, place| {
-            // Unlike a rename it refuses a name that is taken. Some file systems have no second names.
+            // Unlike a rename, it refuses an existing name. Some file systems have no hard links.
             match std::fs::hard_link(temporary, place) {
                 Err(error) if error.kind() != io::ErrorKind::AlreadyExists && !place.exists() => {
                     std::fs::rename(temporary, place)
@@ -195,14 +195,14 @@ impl Write for OutputFile {
 }
 
 impl Temporary {
-    /// Makes a file in a folder, with the mode and owner that an existing one has, or that any new file gets.
+    /// Creates a file in a folder. It has the mode and owner of `existing` if given, else those of any new file.
     fn create(folder: &Path, existing: Option<&Metadata>) -> io::Result<(Self, File)> {
         let mut options = OpenOptions::new();
         options.write(true).create_new(true);
         #[cfg(unix)]
         if existing.is_some() {
             use std::os::unix::fs::OpenOptionsExt;
-            // Nobody else reads it before it has the mode of the file that it replaces.
+            // No other user may read it before it has the mode of the file that it replaces.
             options.mode(0o600);
         }
         let mut tries = 0;
@@ -211,13 +211,13 @@ impl Temporary {
             tries += 1;
             match options.open(&path) {
                 Ok(file) => break (path, file),
-                Err(error) if error.kind() == io::ErrorKind::AlreadyExists && tries < MOST_NAMES => {}
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists && tries < MAX_NAMES => {}
                 Err(error) => return Err(error),
             }
         };
         unfinished().push(path.clone());
         let temporary = Self(path);
-        // Where there are no locks, leftovers are told by their age alone.
+        // On a file system without locks, only the age identifies leftovers.
         let _ = file.try_lock();
         if let Some(existing) = existing {
             #[cfg(unix)]
@@ -225,7 +225,7 @@ impl Temporary {
                 use std::os::unix::fs::{MetadataExt, fchown};
                 let ours = file.metadata()?;
                 if (ours.uid(), ours.gid()) != (existing.uid(), existing.gid()) {
-                    // Only root may give a file away.
+                    // Only root may change the owner of a file.
                     let _ = fchown(&file, Some(existing.uid()), Some(existing.gid()));
                 }
             }
@@ -237,21 +237,21 @@ impl Temporary {
 
 impl Drop for Temporary {
     fn drop(&mut self) {
-        // After a rename there is no such file, and its name is nobody else's.
+        // After a rename the file does not exist, and no other run uses its name.
         let _ = std::fs::remove_file(&self.0);
         unfinished().retain(|path| *path != self.0);
     }
 }
 
-/// Says now what [`OutputFile::create`] would say later, so that no work is done in vain.
+/// Reports now the error that [`OutputFile::create`] would report later, so that no work is done in vain.
 ///
 /// # Errors
-/// When no file can be written at `path`.
+/// Fails if no file can be written at `path`.
 pub fn probe(path: &Path) -> Result<(), Error> {
     OutputFile::create(path).map(drop)
 }
 
-/// Removes the temporary files of this program, which is about to end without dropping anything.
+/// Removes the temporary files of this program, which is about to exit without dropping anything.
 pub fn remove_unfinished() {
     for path in &*unfinished() {
         let _ = std::fs::remove_file(path);
@@ -262,13 +262,13 @@ fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The path that a symbolic link leads to, whether or not there is such a file.
+/// Returns the path that a symbolic link leads to, whether or not the file exists.
 fn follow_links(path: &Path) -> io::Result<PathBuf> {
     if let Ok(place) = path.canonicalize() {
         return Ok(place);
     }
     let mut place = path.to_path_buf();
-    for _ in 0..MOST_LINKS {
+    for _ in 0..MAX_LINKS {
         match place.read_link() {
             Ok(target) => place = folder_of(&place).join(target),
             Err(_) => return Ok(place),

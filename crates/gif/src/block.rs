@@ -1,4 +1,4 @@
-//! One frame as the format stores it.
+//! One frame in the form in which the file stores it.
 
 use crate::lzw::{self, Part};
 
@@ -7,7 +7,7 @@ use crate::lzw::{self, Part};
 pub(crate) struct Area {
     pub(crate) left: usize,
     pub(crate) top: usize,
-    /// The first column and row that are no longer in it.
+    /// The first column to the right of the rectangle. `bottom` is the first row below it.
     pub(crate) right: usize,
     pub(crate) bottom: usize,
 }
@@ -25,7 +25,7 @@ impl Area {
         (self.left..self.right).contains(&x) && (self.top..self.bottom).contains(&y)
     }
 
-    /// The smallest area that holds it and a pixel.
+    /// Returns the smallest area that holds this one and a pixel.
     pub(crate) fn with(&self, x: usize, y: usize) -> Self {
         Self {
             left: self.left.min(x),
@@ -35,7 +35,7 @@ impl Area {
         }
     }
 
-    /// The smallest area that holds all wanted items, which are given row by row; `None` if there are none.
+    /// Returns the smallest area that holds all wanted items, which are given row by row; `None` if there are none.
     pub(crate) fn around<T>(items: &[T], width: usize, wanted: impl Fn(&T) -> bool) -> Option<Self> {
         let mut around: Option<Self> = None;
         for (y, row) in items.chunks_exact(width).enumerate() {
@@ -50,11 +50,11 @@ impl Area {
     }
 }
 
-/// The part of a frame that is drawn over what is already seen.
+/// The part of a frame that is drawn over the canvas.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Block {
     pub(crate) area: Area,
-    /// Red, green, blue for each index; at most 256 of them.
+    /// Red, green and blue of each index; at most 256 entries.
     pub(crate) palette: Vec<u8>,
     /// The index that leaves a pixel as it is.
     pub(crate) transparent: Option<u8>,
@@ -64,7 +64,8 @@ pub(crate) struct Block {
 }
 
 impl Block {
-    /// Draws nothing, for the time given. The format has no empty block, so this is one transparent pixel.
+    /// Makes a block that draws nothing for the time given. The format has no empty block, so this
+    /// is one transparent pixel.
     pub(crate) fn nothing(delay_cs: u16) -> Self {
         let mut writer = lzw::Writer::new(bits(1));
         writer.put(0);
@@ -72,7 +73,7 @@ impl Block {
         Self::new(area, &[], Some(0), delay_cs, &[writer.finish(true)])
     }
 
-    /// From image data in parts.
+    /// Makes a block from image data in parts.
     pub(crate) fn new(
         area: Area,
         colours: &[[u8; 3]],
@@ -80,7 +81,7 @@ impl Block {
         delay_cs: u16,
         parts: &[Part],
     ) -> Self {
-        // The transparent index has an entry, too, which is never shown.
+        // The transparent index needs an entry in the palette, too. That entry is never shown.
         let filler = transparent.map(|_| [0; 3]);
         let palette = colours.iter().chain(&filler).flatten().copied().collect::<Vec<_>>();
         let data = lzw::join(bits(palette.len() / 3), parts);
@@ -88,7 +89,7 @@ impl Block {
     }
 }
 
-/// Bits of an index into so many colours. LZW wants at least 2.
+/// Returns the bits of an index into a palette of this many colours. LZW needs at least 2.
 pub(crate) fn bits(colours: usize) -> u8 {
     (2..8).find(|&bits| colours <= 1 << bits).unwrap_or(8)
 }

@@ -1,27 +1,27 @@
-//! The space in which errors are measured.
+//! The colour space in which errors are measured.
 //!
-//! A picture is judged by its levels (PSNR) and by the eye (CIE Lab). A palette that is best in one of them loses in the
-//! other. So a colour is a point with six coordinates, the sRGB levels and `LAB_WEIGHT` times CIE
-//! L\*a\*b\* (D65, CIE 15:2004), and the squared distance is the sum of both errors. The chroma is compressed half way
+//! A picture is judged by its levels (PSNR) and by the eye (CIE Lab), and a palette that is best in one of them is
+//! worse in the other. So a colour is a point with six coordinates: the sRGB levels, and `LAB_WEIGHT` times CIE
+//! L\*a\*b\* (D65, CIE 15:2004). The squared distance is the sum of both errors. The chroma is compressed half way
 //! from the CIE 1976 difference to that of CIE 2000, in which saturated colours differ less.
 //!
-//! Only +, -, x, / and square roots are used, which IEEE 754 defines to the bit: the same frames give the same bytes on
-//! every machine, whatever its mathematical library.
+//! Only +, -, x, / and square roots are used. IEEE 754 defines them to the bit, so the same frames give the same
+//! bytes on every machine, whatever its mathematical library.
 
 use std::sync::LazyLock;
 
-/// Coordinates of a [`Point`].
+/// The number of coordinates of a [`Point`].
 pub(crate) const DIMENSIONS: usize = 6;
-/// How much a unit of L\*a\*b\* counts against a level of sRGB.
+/// The weight of a unit of L\*a\*b\* relative to a level of sRGB.
 pub(crate) const LAB_WEIGHT: f32 = 3.0;
 
-/// How much less differences of chroma count for each unit of chroma (CIE 142-2001, `S_C`).
+/// The fall of the weight of a chroma difference per unit of chroma (CIE 142-2001, `S_C`).
 const CHROMA_FALLOFF: f32 = 0.045;
 
-/// A colour where distance is error.
+/// A colour in the space in which the squared distance is the error.
 pub(crate) type Point = [f32; DIMENSIONS];
 
-/// Squared distance.
+/// Returns the squared distance of two points.
 pub(crate) fn error(a: &Point, b: &Point) -> f32 {
     let mut sum = 0.0;
     for k in 0..DIMENSIONS {
@@ -31,12 +31,12 @@ pub(crate) fn error(a: &Point, b: &Point) -> f32 {
     sum
 }
 
-/// L\*a\*b\* of a colour whose sRGB levels (0 to 255) may be fractions.
+/// Returns L\*a\*b\* of a colour. Its sRGB levels (0 to 255) may be fractions.
 fn lab(rgb: [f32; 3]) -> [f32; 3] {
     let tables = &*TABLES;
     let linear = |k: usize| interpolate(&tables.linear, rgb[k]);
     let (r, g, b) = (linear(0), linear(1), linear(2));
-    // IEC 61966-2-1, rows divided by the white point D65.
+    // The matrix of IEC 61966-2-1, its rows divided by the white point D65.
     let f = |x: f32, y: f32, z: f32| interpolate(&tables.lightness, (x * r + y * g + z * b) * STEPS as f32);
     let fx = f(0.412_456_4 / 0.950_47, 0.357_576_1 / 0.950_47, 0.180_437_5 / 0.950_47);
     let fy = f(0.212_672_9, 0.715_152_2, 0.072_175);
@@ -44,7 +44,7 @@ fn lab(rgb: [f32; 3]) -> [f32; 3] {
     [116.0 * fy - 16.0, 500.0 * (fx - fy), 200.0 * (fy - fz)]
 }
 
-/// The point of a colour whose sRGB levels (0 to 255) may be fractions.
+/// Returns the point of a colour. Its sRGB levels (0 to 255) may be fractions.
 pub(crate) fn point(rgb: [f32; 3]) -> Point {
     let [l, a, b] = lab(rgb);
     // The slope of c * closer is 1 / sqrt(1 + CHROMA_FALLOFF c), between 1 (CIE 1976) and its square (CIE 2000).
@@ -54,12 +54,12 @@ pub(crate) fn point(rgb: [f32; 3]) -> Point {
     [rgb[0], rgb[1], rgb[2], LAB_WEIGHT * l, weight * a, weight * b]
 }
 
-/// The point of a colour of whole levels.
+/// Returns the point of a colour with whole levels.
 pub(crate) fn point_of(rgb: [u8; 3]) -> Point {
     point([f32::from(rgb[0]), f32::from(rgb[1]), f32::from(rgb[2])])
 }
 
-/// Approximates [`error`] for colours of whole levels that are near each other, in a fraction of the time.
+/// An approximation of [`error`] for colours of whole levels that are close together. Takes a fraction of the time.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LocalMetric(&'static [[f32; 6]; 4096]);
 
@@ -68,7 +68,7 @@ impl LocalMetric {
         Self(&METRIC)
     }
 
-    /// Works out the tables now, and not when the first one is made.
+    /// Computes the tables now rather than on first use.
     pub(crate) fn prepare() {
         LazyLock::force(&METRIC);
     }
@@ -77,17 +77,17 @@ impl LocalMetric {
         self.around(a).error(levels(a), levels(b))
     }
 
-    /// The metric near one colour.
+    /// Returns the metric near one colour.
     pub(crate) fn around(self, [r, g, b]: [u8; 3]) -> QuadraticForm {
         QuadraticForm(&self.0[usize::from(r >> 4) << 8 | usize::from(g >> 4) << 4 | usize::from(b >> 4)])
     }
 }
 
-/// A quadratic form of differences of levels.
+/// A quadratic form in the differences of levels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct QuadraticForm(&'static [f32; 6]);
 
-// Written out: mapped arrays are several times slower here.
+// Written out, because mapped arrays are several times slower here.
 impl QuadraticForm {
     pub(crate) fn error(self, a: [f32; 3], b: [f32; 3]) -> f32 {
         let (r, g, b) = (a[0] - b[0], a[1] - b[1], a[2] - b[2]);
@@ -96,37 +96,38 @@ impl QuadraticForm {
     }
 }
 
-/// The levels of a colour as numbers.
+/// Converts the levels of a colour to `f32`.
 pub(crate) fn levels(rgb: [u8; 3]) -> [f32; 3] {
     [f32::from(rgb[0]), f32::from(rgb[1]), f32::from(rgb[2])]
 }
 
-/// Squared difference of levels, weighted by how bright the channels are: 6 where all levels are off by one.
+/// Returns the squared difference of levels, weighted by the brightness of the channels: 6 if all
+/// levels differ by one.
 pub(crate) fn level_error(a: [u8; 3], b: [u8; 3]) -> u32 {
     let (r, g, b) = (a[0].abs_diff(b[0]), a[1].abs_diff(b[1]), a[2].abs_diff(b[2]));
     let square = |d: u8| u32::from(d) * u32::from(d);
     2 * square(r) + 3 * square(g) + square(b)
 }
 
-/// Squared distance of levels: a part of [`error`].
+/// Returns the squared distance of levels, which is a part of [`error`].
 pub(crate) fn levels_apart(a: [u8; 3], b: [u8; 3]) -> u32 {
     let square = |k: usize| u32::from(a[k].abs_diff(b[k])) * u32::from(a[k].abs_diff(b[k]));
     square(0) + square(1) + square(2)
 }
 
-/// The largest difference of a level.
+/// Returns the largest difference of a level.
 pub(crate) fn levels_off(a: [u8; 3], b: [u8; 3]) -> u8 {
     a[0].abs_diff(b[0]).max(a[1].abs_diff(b[1])).max(a[2].abs_diff(b[2]))
 }
 
-/// The index of the colour that is off least, and by how much.
+/// Returns the index of the colour with the smallest [`levels_off`], and that difference.
 pub(crate) fn closest(colours: &[[u8; 3]], rgb: [u8; 3]) -> (u8, u8) {
     let off = colours.iter().map(|&colour| levels_off(colour, rgb));
     (0..=u8::MAX).zip(off).fold((0, u8::MAX), |best, now| if now.1 < best.1 { now } else { best })
 }
 
-/// For each of 16 x 16 x 16 cells of sRGB the quadratic form that [`error`] is there: the coefficients of r², g², b²,
-/// rg, rb and gb.
+/// The quadratic form that approximates [`error`] in each of 16 x 16 x 16 cells of sRGB: the coefficients of r², g²,
+/// b², rg, rb and gb.
 static METRIC: LazyLock<Box<[[f32; 6]; 4096]>> = LazyLock::new(|| {
     let mut metric = Box::new([[0.0; 6]; 4096]);
     for (cell, metric) in metric.iter_mut().enumerate() {
@@ -153,9 +154,9 @@ static METRIC: LazyLock<Box<[[f32; 6]; 4096]>> = LazyLock::new(|| {
 const STEPS: usize = 4096;
 
 struct Tables {
-    /// sRGB level to linear light.
+    /// The linear light of each sRGB level.
     linear: Vec<f32>,
-    /// Linear light in steps of 1 / `STEPS` to the `f` of L\*a\*b\*.
+    /// The `f` of L\*a\*b\* for linear light in steps of 1 / `STEPS`.
     lightness: Vec<f32>,
 }
 
@@ -185,12 +186,12 @@ fn interpolate(table: &[f32], at: f32) -> f32 {
     table[below] * (1.0 - part) + table[below + 1] * part
 }
 
-/// The `n`th root of a number in (0, 1], by Newton's method.
+/// Returns the `n`th root of a number in (0, 1], by Newton's method.
 fn root(x: f64, n: i32) -> f64 {
     let mut y = 1.0;
     loop {
         let power = (1..n).fold(1.0, |product, _| product * y);
-        // Each step comes nearer from above, until the rounding stops it.
+        // Each step approaches the root from above, until rounding stops it.
         let next = y - (y - x / power) / f64::from(n);
         if next >= y {
             return y;

@@ -1,4 +1,4 @@
-//! Frames in, bytes out: checks each frame, gives it its delay, and writes the blocks in order.
+//! The encoder: takes frames, checks them, gives them their delays, and writes the blocks in order.
 
 use std::io::{self, Write};
 use std::num::NonZeroU16;
@@ -11,43 +11,43 @@ use crate::error::{Error, LONGEST_SIDE};
 use crate::quantise::Quantiser;
 use crate::state::{StateReader, StateWriter, damaged};
 use crate::thinning::{Thinning, read_size};
-use crate::timeline::{MOST_FPS, Timeline};
+use crate::timeline::{MAX_FPS, Timeline};
 
-/// How to write the animation.
+/// The settings of an animation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Frames a second: above 0, at least 100 / 65,535. Above 50, frames are dropped, but not the last.
+    /// Frames per second: above 0, at least 100 / 65,535. Above 50, frames are dropped, but never the last.
     pub fps: f64,
-    /// How often the animation is shown.
+    /// The number of times that the animation is shown.
     pub plays: Plays,
-    /// How long the last frame is shown, in hundredths of a second; as long as `fps` says if not given.
+    /// The time that the last frame is shown, in hundredths of a second. Default: as `fps` says.
     pub last_delay_cs: Option<u16>,
-    /// Whether frames of at most 256 colours are exact in slow fades of large pictures, too. There the file may become
-    /// several times larger.
+    /// Keeps frames of at most 256 colours exact also in slow fades of large pictures. There the file may
+    /// become several times larger.
     pub exact: bool,
 }
 
-/// How often an animation is shown.
+/// The number of times that an animation is shown.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Plays {
-    /// For ever.
+    /// It repeats without end.
     #[default]
     Endless,
-    /// Once; then the last frame stays.
+    /// It is shown once, then the last frame stays.
     Once,
-    /// Once, and then so many times again.
+    /// It is shown once, and then repeated this many times.
     Repeated(NonZeroU16),
 }
 
 impl Plays {
-    /// As a GIF counts: repetitions, of which 0 stands for ever.
+    /// Converts a number of repetitions as a GIF stores it: 0 means endless.
     pub fn repeated(times: u16) -> Self {
         NonZeroU16::new(times).map_or(Self::Endless, Self::Repeated)
     }
 }
 
 impl Settings {
-    /// So many frames a second, repeated so many times (0: for ever).
+    /// Makes settings with a frame rate and a number of repetitions (0: endless).
     pub fn new(fps: f64, repetitions: u16) -> Self {
         Self { fps, plays: Plays::repeated(repetitions), last_delay_cs: None, exact: false }
     }
@@ -59,24 +59,24 @@ impl Default for Settings {
     }
 }
 
-/// What was written.
+/// The size and length of a finished animation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Summary {
-    /// Frames in the file.
+    /// The number of frames in the file.
     pub frames: u64,
-    /// Frames left out because they would have been shown for less than two hundredths of a second.
+    /// The number of frames left out because they would be shown for less than two hundredths of a second.
     pub dropped: u64,
     /// Width and height in pixels.
     pub size: (u32, u32),
     /// Time from the first frame to the end of the last, in hundredths of a second.
     pub duration_cs: u64,
-    /// Length of the file.
+    /// The length of the file in bytes.
     pub bytes: u64,
 }
 
-/// Writes an animation frame by frame.
+/// An encoder that writes an animation frame by frame.
 ///
-/// See the [crate's documentation](crate) for what holds and for an example.
+/// See the [crate's documentation](crate) for its guarantees and an example.
 pub struct Encoder<W: Write> {
     settings: Settings,
     thinning: Thinning,
@@ -100,14 +100,14 @@ struct Running<W: Write> {
 }
 
 impl<W: Write> Encoder<W> {
-    /// Nothing is written before the first frame.
+    /// Makes an encoder. Writes nothing before the first frame.
     ///
     /// # Errors
     ///
-    /// [`Error::FrameRate`].
+    /// Returns [`Error::FrameRate`] if the format cannot hold the rate.
     pub fn new(writer: W, settings: Settings) -> Result<Self, Error> {
         let timeline = Timeline::new(settings.fps)?;
-        let thinning = Thinning::new(settings.fps, MOST_FPS);
+        let thinning = Thinning::new(settings.fps, MAX_FPS);
         let stage = Stage::Empty(writer);
         Ok(Self { settings, thinning, timeline, pushed: 0, written: 0, duration_cs: 0, stage })
     }
@@ -116,8 +116,8 @@ impl<W: Write> Encoder<W> {
     ///
     /// # Errors
     ///
-    /// [`Error::Size`], [`Error::UnlikeSize`]: the frame is refused, and the next one may be pushed in its place.
-    /// [`Error::Write`]: the animation is lost; so says every later call.
+    /// [`Error::Size`] and [`Error::UnlikeSize`]: the frame is refused, and another may be pushed in its place.
+    /// [`Error::Write`]: the animation is lost, and every later call returns the same error.
     pub fn push(&mut self, frame: RgbImage) -> Result<(), Error> {
         let number = self.pushed + 1;
         let found = frame.dimensions();
@@ -135,7 +135,7 @@ impl<W: Write> Encoder<W> {
         self.thinning.push(frame).map_or(Ok(()), |frame| self.encode(frame))
     }
 
-    /// Adds a frame that is not dropped.
+    /// Encodes a frame that is not dropped.
     fn encode(&mut self, frame: RgbImage) -> Result<(), Error> {
         let (number, size) = (self.pushed, frame.dimensions());
         let delay_cs = self.timeline.advance();
@@ -156,11 +156,11 @@ impl<W: Write> Encoder<W> {
         Ok(())
     }
 
-    /// Writes what is left and flushes the writer.
+    /// Writes the remaining frames and flushes the writer.
     ///
     /// # Errors
     ///
-    /// [`Error::NoFrames`], [`Error::Write`].
+    /// Returns [`Error::NoFrames`] if no frame was pushed, and [`Error::Write`] if the writer fails.
     pub fn finish(mut self) -> Result<Summary, Error> {
         if let Some(last) = self.thinning.finish() {
             self.encode(last)?;
@@ -185,13 +185,14 @@ impl<W: Write> Encoder<W> {
         Ok(Summary { frames: written, dropped: pushed - written, size, duration_cs, bytes })
     }
 
-    /// Writes down where the animation stands, so that [`resume`](Self::resume) goes on with it, in another process, too.
-    /// What has been written to the writer up to now is to be kept beside it. Bytes, compressed: mostly 2 to 4 for each
-    /// pixel of a frame, at most some 7; above 50 frames a second up to 6 more.
+    /// Returns the state of the animation. [`resume`](Self::resume) continues from it, also in another process.
+    ///
+    /// Keep everything that the writer has received so far. The state is compressed: mostly 2 to 4 bytes per pixel of
+    /// a frame, at most about 7. Above 50 frames per second it takes up to 6 bytes per pixel more.
     ///
     /// # Errors
     ///
-    /// [`Error::Write`]: writing has failed before.
+    /// Returns [`Error::Write`] if writing has failed before.
     pub fn suspend(self) -> Result<Vec<u8>, Error> {
         if matches!(self.stage, Stage::Failed) {
             return Err(self.failed_before());
@@ -216,7 +217,7 @@ impl<W: Write> Encoder<W> {
                 Stage::Empty(_) | Stage::Failed => state.bytes(&[EMPTY])?,
                 Stage::Running(running) => {
                     let Running { size, mut file, quantiser } = *running;
-                    // The file is not at its end.
+                    // The file is not finished, so its trailer must not be written.
                     file.get_mut().inner = None;
                     state.bytes(&[RUNNING])?;
                     for number in [size.0.into(), size.1.into(), file.get_ref().bytes] {
@@ -230,11 +231,12 @@ impl<W: Write> Encoder<W> {
         write(stage).map_err(|source| Error::Write { frame: written + 1, source })
     }
 
-    /// Goes on with an animation that was [suspended](Self::suspend): what it writes follows what was written before.
+    /// Continues an animation that was [suspended](Self::suspend). The bytes that it writes
+    /// follow those written before.
     ///
     /// # Errors
     ///
-    /// [`Error::StateVersion`], [`Error::State`]: encode the animation from its beginning.
+    /// [`Error::StateVersion`] and [`Error::State`]: encode the animation from its beginning.
     pub fn resume(writer: W, state: &[u8]) -> Result<Self, Error> {
         let mut state = StateReader::new(state)?;
         let (fps, plays, has_last_delay, exact) =
@@ -248,11 +250,11 @@ impl<W: Write> Encoder<W> {
         };
         let settings = Settings { fps, plays, last_delay_cs: has_last_delay.then_some(last_delay_cs), exact };
         let (pushed, written, duration_cs, timed) = (state.u64()?, state.u64()?, state.u64()?, state.u64()?);
-        if written > timed || timed > pushed || pushed > MOST_COUNTED || duration_cs > MOST_COUNTED {
+        if written > timed || timed > pushed || pushed > MAX_COUNTED || duration_cs > MAX_COUNTED {
             return Err(damaged("it has frames that there cannot be"));
         }
         let timeline = Timeline::new(fps).map_err(|_| damaged("its frame rate is wrong"))?.after(timed);
-        let thinning = Thinning::new(fps, MOST_FPS).read(&mut state, pushed)?;
+        let thinning = Thinning::new(fps, MAX_FPS).read(&mut state, pushed)?;
         let stage = match state.u8()? {
             EMPTY => Stage::Empty(writer),
             RUNNING => {
@@ -261,11 +263,11 @@ impl<W: Write> Encoder<W> {
                     return Err(damaged("a frame that it holds has another size"));
                 }
                 let bytes = state.u64()?;
-                if bytes > MOST_COUNTED {
+                if bytes > MAX_COUNTED {
                     return Err(damaged("it is longer than there can be"));
                 }
                 let quantiser = Quantiser::read(&mut state, size, exact)?;
-                // The file's beginning is written already.
+                // The beginning of the file is written already.
                 let nowhere = Counting { inner: None, bytes: 0 };
                 let mut file = begin(nowhere, size, plays).map_err(|source| Error::State { source })?;
                 *file.get_mut() = Counting { inner: Some(writer), bytes };
@@ -290,15 +292,16 @@ impl<W: Write> Encoder<W> {
     }
 }
 
-/// What a suspended animation begins with: how often it is shown, and whether there was a frame.
+/// Tags of a suspended animation: the number of times it is shown, then whether it has a frame.
 const ENDLESS: u8 = 0;
 const ONCE: u8 = 1;
 const REPEATED: u8 = 2;
 const EMPTY: u8 = 0;
 const RUNNING: u8 = 1;
 
-/// No animation comes to so many frames, hundredths of a second or bytes: no count of a state that is gone on with overflows.
-const MOST_COUNTED: u64 = 1 << 52;
+/// A limit on the frames, hundredths of a second and bytes in a state. No animation reaches it, and below it no count
+/// overflows after a resume.
+const MAX_COUNTED: u64 = 1 << 52;
 
 fn begin<W: Write>(
     writer: Counting<W>,
@@ -308,7 +311,7 @@ fn begin<W: Write>(
     let mut file = gif::Encoder::new(writer, size.0 as u16, size.1 as u16, &[]).map_err(into_io)?;
     let repeat = match plays {
         Plays::Endless => Some(Repeat::Infinite),
-        // Without a word on repetitions a GIF is shown once.
+        // A GIF without a repeat count is shown once.
         Plays::Once => None,
         Plays::Repeated(times) => Some(Repeat::Finite(times.get())),
     };
@@ -341,7 +344,7 @@ fn into_io(error: gif::EncodingError) -> io::Error {
 }
 
 struct Counting<W> {
-    /// `None` where what the file's encoder writes by itself, at the file's beginning and end, is not wanted.
+    /// `None` if the output of the file's encoder is to be discarded, as at the file's beginning and end.
     inner: Option<W>,
     bytes: u64,
 }

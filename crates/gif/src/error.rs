@@ -1,33 +1,33 @@
-//! What can go wrong.
+//! Errors of the encoder.
 
 use std::io;
 
 /// The largest width and height that the format can hold.
 pub(crate) const LONGEST_SIDE: u32 = 65_535;
 
-/// Why no animation came out. Frames are counted from 1.
+/// An error of the encoder. Frames are counted from 1.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The frame rate is not a number above 0, or so low that the delay has no room in the format.
+    /// The frame rate is not a number above 0, or so low that the format cannot hold the delay.
     #[error("{fps} frames a second: a GIF can hold rates from 0.00153 up")]
     FrameRate {
-        /// The rate asked for.
+        /// The rate that was requested.
         fps: f64,
     },
-    /// A frame differs in size from those before it.
+    /// A frame has another size than the frames before it.
     #[error("frame {frame} is {} x {} pixels, the frames before it are {} x {}", found.0, found.1, expected.0, expected.1)]
     UnlikeSize {
-        /// Which frame.
+        /// The number of the frame.
         frame: u64,
         /// Its width and height.
         found: (u32, u32),
-        /// Width and height of the first frame.
+        /// The width and height of the first frame.
         expected: (u32, u32),
     },
-    /// A frame has no pixels, or more on a side than the format can hold.
+    /// A frame has no pixels, or a side longer than the format can hold.
     #[error("frame {frame} is {} x {} pixels, a GIF can hold 1 to {LONGEST_SIDE} on each side", found.0, found.1)]
     Size {
-        /// Which frame.
+        /// The number of the frame.
         frame: u64,
         /// Its width and height.
         found: (u32, u32),
@@ -40,17 +40,17 @@ pub enum Error {
     Write {
         /// The frame that was being written.
         frame: u64,
-        /// What the writer said.
+        /// The error of the writer.
         source: io::Error,
     },
-    /// [`Encoder::resume`](crate::Encoder::resume) was given the state of another version of the encoder, which might go on
-    /// with other bytes: encode the animation from its beginning.
+    /// [`Encoder::resume`](crate::Encoder::resume) got the state of another version of the encoder, whose bytes may
+    /// differ. Encode the animation from its beginning.
     #[error("the state is of another version of the encoder")]
     StateVersion,
-    /// [`Encoder::resume`](crate::Encoder::resume) was given what is no state, or a damaged one.
+    /// [`Encoder::resume`](crate::Encoder::resume) got bytes that are no state, or a damaged one.
     #[error("the state of the animation cannot be read")]
     State {
-        /// What is wrong with it.
+        /// The reason.
         source: io::Error,
     },
 }

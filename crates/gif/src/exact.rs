@@ -1,15 +1,16 @@
-//! Frames of at most 256 colours, which are drawn without loss.
+//! Lossless drawing of frames of at most 256 colours.
 //!
-//! An exception are large frames that drift: much of the picture [changes](change) slightly from frame to frame. To draw all
-//! of that would cost several times the bytes, so these are drawn like frames of more colours, but no pixel is off by more
-//! than [a few levels](crate::bound::DRIFTING). In small frames it is not worth the error.
+//! Large frames that drift are an exception: much of the picture [changes](change) slightly from frame to
+//! frame. Drawing all of that would cost several times the bytes. So these are drawn like frames of more
+//! colours, and no pixel is off by more than [a few levels](crate::bound::DRIFTING). In small frames the saving
+//! is not worth the error.
 
 use rayon::prelude::*;
 
 use crate::block::{Area, Block};
 use crate::colour;
-use crate::needs::GLARING;
 use crate::stripe::{self, Layout};
+use crate::update_map::MAX_SKIPPED_ERROR;
 
 /// At most 256 colours, numbered in order of appearance.
 #[derive(Debug)]
@@ -20,15 +21,15 @@ pub(crate) struct FewColours {
 }
 
 const SLOTS: usize = 1024;
-/// To see how a frame changes, its pixels are divided into runs of so many, of which one in `ONE_IN` is looked at. A
-/// prime, so that the runs do not lie below each other.
+/// The length of the runs of pixels by which the change of a frame is sampled. One run in `ONE_IN` is compared. The
+/// length is a prime, so that the runs of successive rows do not lie below each other.
 const PROBE: usize = 61;
 const ONE_IN: usize = 4;
-/// Much of a frame changes if one pixel in so many does.
+/// Much of a frame changes if one pixel in this many does.
 const MUCH: usize = 8;
-/// Frames of more pixels may drift.
+/// Only frames of more pixels than this may drift.
 const LARGE: usize = 100_000;
-/// Parts of a frame that are compared in parallel.
+/// The number of parts of a frame that are compared in parallel.
 const PARTS: usize = 2;
 
 impl FewColours {
@@ -36,7 +37,7 @@ impl FewColours {
         Self { colours: Vec::with_capacity(256), slots: Box::new([0; SLOTS]) }
     }
 
-    /// The number of a colour, or the slot to put it in.
+    /// Returns the number of a colour, or the slot where it belongs.
     fn find(&self, rgb: [u8; 3]) -> Result<u8, usize> {
         let key = u32::from_le_bytes([rgb[0], rgb[1], rgb[2], 0]);
         let mut at = (key.wrapping_mul(0x9E37_79B1) >> 22) as usize % SLOTS;
@@ -49,7 +50,7 @@ impl FewColours {
         }
     }
 
-    /// Adds a colour that is not yet there, and says whether there was room for it.
+    /// Adds a colour unless it is there already. Returns whether there was room for it.
     fn add(&mut self, rgb: [u8; 3]) -> bool {
         let Err(at) = self.find(rgb) else { return true };
         if self.colours.len() == 256 {
@@ -61,7 +62,7 @@ impl FewColours {
     }
 }
 
-/// The colours of a frame, if there are at most 256.
+/// Returns the colours of a frame, or `None` if there are more than 256.
 pub(crate) fn few_colours(pixels: &[[u8; 3]]) -> Option<FewColours> {
     let mut colours = FewColours::new();
     let mut last = None;
@@ -76,12 +77,12 @@ pub(crate) fn few_colours(pixels: &[[u8; 3]]) -> Option<FewColours> {
     Some(colours)
 }
 
-/// How much a frame changes from the one before it.
+/// The amount by which a frame differs from the one before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Change {
-    /// Most of it stays.
+    /// Most of the frame stays.
     Little,
-    /// Much changes, but most of that by so little that a viewer may miss it, as in a slow fade of a gradient.
+    /// Much changes, but most of it by so little that a viewer may miss it, as in a slow fade of a gradient.
     Slight,
     /// Much changes by more than that.
     Large,
@@ -96,7 +97,7 @@ fn change(pixels: &[[u8; 3]], before: &[[u8; 3]]) -> Change {
         for (&now, &was) in now.iter().zip(was) {
             if now != was {
                 changed += 1;
-                slightly += usize::from(colour::level_error(now, was) as f32 <= GLARING);
+                slightly += usize::from(colour::level_error(now, was) as f32 <= MAX_SKIPPED_ERROR);
             }
         }
     }
@@ -109,18 +110,19 @@ fn change(pixels: &[[u8; 3]], before: &[[u8; 3]]) -> Change {
     }
 }
 
-/// What a frame is, beside the one before it.
+/// The properties of a frame that decide how it is drawn.
 #[derive(Debug)]
 pub(crate) struct Kind {
-    /// Its colours, if it is to be drawn without loss.
+    /// The colours of the frame if it is drawn without loss.
     pub(crate) few: Option<FewColours>,
-    /// Whether it has at most 256 colours but drifts, and so is drawn like frames of more.
+    /// The frame has at most 256 colours but drifts, so it is drawn like frames of more.
     pub(crate) drifts: bool,
     pub(crate) change: Change,
 }
 
 impl Kind {
-    /// `previous`: the pixels of the frame before it, and whether that one drifts. `exact`: whether none drifts.
+    /// Classifies a frame. `previous`: the pixels of the frame before it, and whether that one drifts.
+    /// `exact`: no frame drifts.
     pub(crate) fn of(pixels: &[[u8; 3]], previous: Option<(&[[u8; 3]], bool)>, exact: bool) -> Self {
         let few = few_colours(pixels);
         let change = match previous {
@@ -136,7 +138,8 @@ impl Kind {
     }
 }
 
-/// Draws the pixels that are not seen right; all of the frame if it is the first, or if no index is left for transparent.
+/// Draws the pixels whose seen colour is wrong. Draws all of the frame if it is the first, or if no index
+/// is left for transparent.
 pub(crate) fn draw(
     pixels: &[[u8; 3]],
     width: usize,
@@ -155,7 +158,7 @@ pub(crate) fn draw(
             *wrong = now != seen;
             if *wrong && last != Some(now) {
                 last = Some(now);
-                // There is always room, as all are colours of the frame.
+                // There is always room, because all are colours of the frame.
                 drawn.add(*now);
             }
         }
@@ -184,7 +187,7 @@ pub(crate) fn draw(
                 if last.0 != now {
                     last = (now, colours.find(now).ok());
                 }
-                // What is seen right may be drawn or left, whichever continues the string.
+                // A pixel that is seen right may be drawn or left: whichever continues the string.
                 let right = transparent.filter(|_| now == seen[x]);
                 let index = last.1;
                 match (right, index) {
@@ -238,7 +241,7 @@ mod tests {
         assert_eq!(kind(Some((0, false)), 640, true), (true, false));
         assert_eq!(kind(Some((640, true)), 640, false), (false, true));
         assert_eq!(kind(Some((640, true)), 640 * 90, false), (true, false));
-        // A frame of many colours never is, whatever came before.
+        // A frame of many colours never drifts, whatever came before.
         let many = (0..300_u32).map(|k| [k as u8, (k / 256) as u8, 0]).collect::<Vec<_>>();
         let kind = Kind::of(&many, Some((&many, true)), false);
         assert!(kind.few.is_none() && !kind.drifts);

@@ -1,27 +1,27 @@
-//! Which colours a frame has, and how often.
+//! Counts of the colours of a frame.
 //!
-//! Colours are counted in a hash table: each by itself while there are at most [`MOST_BINS`], else together with its
-//! neighbours in cells of 2, 4 or 8 levels a channel. A frame with so many colours has a palette whose colours are farther
-//! apart than that.
+//! Colours are counted in a hash table. Each has a bin of its own while there are at most [`MAX_BINS`]. With more,
+//! neighbouring colours share cells of 2, 4 or 8 levels per channel. The palette of a frame with so many colours is
+//! coarser than these cells.
 
 use rayon::prelude::*;
 
-/// The most bins that a histogram grows to.
-pub(crate) const MOST_BINS: usize = 1 << 14;
+/// The largest number of bins of a histogram.
+pub(crate) const MAX_BINS: usize = 1 << 14;
 const EMPTY: u32 = u32::MAX;
 
-/// Counts of colours.
+/// Counts of the colours of pixels.
 #[derive(Debug)]
 pub(crate) struct Histogram {
-    /// How many low bits of a level are ignored.
+    /// The number of low bits of a level that are ignored.
     shift: u32,
-    /// Their number is a power of two, at least twice that of the bins.
+    /// The hash table. Its length is a power of two, at least twice the number of bins.
     slots: Vec<Slot>,
     most_bins: usize,
     bins: Vec<Bin>,
 }
 
-/// Few enough to stay in the cache.
+/// The first length of the hash table: small enough to stay in the cache.
 const FIRST_SLOTS: usize = 1 << 12;
 
 #[derive(Debug, Clone, Copy)]
@@ -32,19 +32,19 @@ struct Slot {
 
 const FREE: Slot = Slot { key: EMPTY, bin: 0 };
 
-/// A colour, or a cell of neighbouring ones.
+/// A colour, or a cell of neighbouring colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Bin {
-    /// The darkest colour of the cell.
+    /// The darkest colour of the cell, which identifies it.
     key: u32,
-    /// Pixels counted.
+    /// The number of pixels counted.
     pub(crate) count: u32,
-    /// The sum, over all pixels, of how much each level is above that of `key`.
+    /// For each channel, the sum over all pixels of the level above that of `key`.
     above: [u64; 3],
 }
 
 impl Bin {
-    /// Mean levels.
+    /// Returns the mean levels of the pixels.
     pub(crate) fn mean(&self) -> [f32; 3] {
         let [_, r, g, b] = self.key.to_be_bytes();
         let mean = |level: u8, above: u64| match above {
@@ -54,13 +54,13 @@ impl Bin {
         [mean(r, self.above[0]), mean(g, self.above[1]), mean(b, self.above[2])]
     }
 
-    /// Its colour, if it is only one.
+    /// Returns the colour of a bin that holds only one.
     pub(crate) fn colour(&self) -> [u8; 3] {
         let [_, r, g, b] = self.key.to_be_bytes();
         [r, g, b]
     }
 
-    /// The same pixels in a cell with another key.
+    /// Returns the pixels as a bin of the cell with another key.
     fn moved(mut self, key: u32) -> Self {
         let (from, to) = (self.key.to_be_bytes(), key.to_be_bytes());
         for k in 0..3 {
@@ -72,7 +72,7 @@ impl Bin {
 }
 
 impl Histogram {
-    /// For at most 2^16 bins, a power of two.
+    /// Makes an empty histogram. `most_bins` is a power of two, at most 2^16.
     pub(crate) fn new(most_bins: usize) -> Self {
         Self { shift: 0, slots: vec![FREE; FIRST_SLOTS], most_bins, bins: Vec::new() }
     }
@@ -84,22 +84,22 @@ impl Histogram {
         self.bins.clear();
     }
 
-    /// The bins in order of first appearance.
+    /// Returns the bins in order of first appearance.
     pub(crate) fn bins(&self) -> &[Bin] {
         &self.bins
     }
 
-    /// How many were counted.
+    /// Returns the number of pixels counted.
     pub(crate) fn pixels(&self) -> u64 {
         self.bins.iter().map(|bin| u64::from(bin.count)).sum()
     }
 
-    /// Whether each bin is one colour.
+    /// Returns whether each bin is a single colour.
     pub(crate) fn is_exact(&self) -> bool {
         self.shift == 0
     }
 
-    /// Counts the colours of pixels with the help of `others`, each of which takes a part of them.
+    /// Counts the colours of pixels. Each of `others` counts a part of them in parallel.
     pub(crate) fn count(&mut self, pixels: &[[u8; 3]], others: &mut [Self]) {
         let part = pixels.len().div_ceil(1 + others.len());
         let histograms = std::iter::once(&mut *self).chain(&mut *others).collect::<Vec<_>>();
@@ -114,7 +114,7 @@ impl Histogram {
         }
     }
 
-    /// Adds what another one counted.
+    /// Adds the counts of another histogram.
     pub(crate) fn absorb(&mut self, other: &Self) {
         while self.shift < other.shift {
             self.coarsen();
@@ -140,7 +140,7 @@ impl Histogram {
         }
     }
 
-    /// The bin that holds a colour that was counted.
+    /// Returns the bin of a colour that was counted.
     #[inline]
     pub(crate) fn find(&self, rgb: [u8; 3]) -> Option<usize> {
         let key = self.cell(key(rgb));
@@ -148,13 +148,13 @@ impl Histogram {
         (slot.key == key).then_some(slot.bin as usize)
     }
 
-    /// The key of the cell of a key.
+    /// Returns the key of the cell that holds a colour.
     fn cell(&self, key: u32) -> u32 {
         let low = 0xFF >> (8 - self.shift);
         key & !(low << 16 | low << 8 | low)
     }
 
-    /// Where a cell's key is, or would be put.
+    /// Returns the slot of a cell's key, or the empty one where it belongs.
     fn slot(&self, key: u32) -> usize {
         let last = self.slots.len() - 1;
         let mut at = (key.wrapping_mul(0x9E37_79B1) >> 15) as usize & last;
@@ -213,7 +213,7 @@ mod tests {
 
     #[test]
     fn few_colours_are_exact() {
-        let mut histogram = Histogram::new(MOST_BINS);
+        let mut histogram = Histogram::new(MAX_BINS);
         for k in 0..100_u8 {
             histogram.add([k, 0, 255 - k], 1 + u32::from(k));
         }
@@ -226,13 +226,13 @@ mod tests {
 
     #[test]
     fn many_colours_share_bins_and_none_is_lost() {
-        let mut histogram = Histogram::new(MOST_BINS);
+        let mut histogram = Histogram::new(MAX_BINS);
         for k in 0..200_000_u32 {
             let [a, b, c, _] = k.wrapping_mul(2_654_435_761).to_le_bytes();
             histogram.add([a, b, c], 1);
         }
         assert!(!histogram.is_exact());
-        assert!(histogram.bins().len() <= MOST_BINS);
+        assert!(histogram.bins().len() <= MAX_BINS);
         assert_eq!(histogram.bins().iter().map(|bin| bin.count).sum::<u32>(), 200_000);
     }
 }

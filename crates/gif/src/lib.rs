@@ -1,24 +1,25 @@
-//! Ordered images to an animated GIF, streaming.
+//! An encoder that turns a sequence of images into an animated GIF, streaming.
 //!
-//! A GIF has 256 colours a frame and hundredths of a second; this crate makes the best of both. It knows nothing of
-//! scenes, files or stores: images come in one by one through [`Encoder::push`], bytes go out to a [`std::io::Write`].
+//! A GIF has 256 colours per frame and delays in hundredths of a second; this crate makes the best of both. It
+//! knows nothing of scenes, files or stores: images come in one by one through [`Encoder::push`], and bytes go
+//! out to a [`std::io::Write`].
 //!
-//! What holds:
+//! Guarantees:
 //!
-//! - Every frame is there, in order, for its time: also one that equals its predecessor. Only above 50 frames a second
-//!   are frames dropped, never the last, and the [`Summary`] says how many.
-//! - Memory does not grow with the number of frames: two of them, what a viewer sees, and a block; above 50 frames a second
+//! - Every frame is in the file, in order and for its time, also one that equals its predecessor. Only above 50
+//!   frames per second are frames dropped, never the last, and [`Summary`] counts them.
+//! - Memory does not grow with the number of frames: two frames, the canvas, and a block; above 50 frames per second
 //!   two more frames. [`Encoder::push`] writes the frame before the one that it takes.
-//! - Between two frames an animation can be [suspended](Encoder::suspend), and gone on with in another process: the bytes are
-//!   the same.
-//! - The bytes depend on frames and settings alone, not on threads or time. Work is spread over the rayon pool that
-//!   [`Encoder::push`] is called in, by fork and join only: a pool of one thread is enough, inside or outside.
-//! - A frame with at most 256 colours is kept exactly. An exception are frames of more than 100,000 pixels where the picture
-//!   drifts: where an eighth of it or more changes from one frame to the next, and three quarters of that by less than three
-//!   levels, as in a slow fade of a gradient. Such a frame, and those after it until much changes clearly, are off by at most
-//!   4 levels; the first is exact. With [`Settings::exact`] all are.
-//! - No pixel of another frame is further off than 1.25 times the worst pixel of that frame encoded alone, counted as the
-//!   largest difference of a level, however many frames come before it.
+//! - Between two frames an animation can be [suspended](Encoder::suspend) and continued in another process. The
+//!   bytes are the same.
+//! - The bytes depend on frames and settings alone, not on threads or time. Work is spread over the rayon pool in
+//!   which [`Encoder::push`] is called, by fork and join only. A pool of one thread is enough, inside or outside.
+//! - A frame with at most 256 colours is kept exactly. An exception are frames of more than 100,000 pixels in which
+//!   the picture drifts: at least an eighth of it changes from one frame to the next, and three quarters of that by
+//!   less than three levels, as in a slow fade of a gradient. Such a frame, and those after it until much changes
+//!   clearly, are off by at most 4 levels; the first is exact. With [`Settings::exact`] all are exact.
+//! - No pixel of another frame is further off than 1.25 times the worst pixel of that frame encoded alone, measured
+//!   as the largest difference of a level, however many frames come before it.
 //!
 //! ```
 //! use image::{Rgb, RgbImage};
@@ -35,7 +36,6 @@
 //! # Ok::<(), rayfold_gif::Error>(())
 //! ```
 
-mod allowance;
 mod block;
 mod bound;
 mod colour;
@@ -45,15 +45,16 @@ mod exact;
 mod histogram;
 mod lzw;
 mod nearest;
-mod needs;
 mod palette;
 mod plan;
 mod quantise;
 mod quantised;
+mod refine_budget;
 mod state;
 mod stripe;
 mod thinning;
 mod timeline;
+mod update_map;
 
 pub use encoder::{Encoder, Plays, Settings, Summary};
 pub use error::Error;

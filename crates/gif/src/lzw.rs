@@ -1,28 +1,29 @@
-//! LZW as the format has it: codes of growing width, at most 4,096 of them.
+//! LZW as GIF uses it: codes of growing width, at most 4,096 of them.
 //!
-//! Image data is written in parts in parallel, each with a code table of its own, and the parts are joined bit by bit. A
-//! code table that is full is cleared at once: frames change too much from top to bottom for an old one to be worth
-//! keeping (measured: files grow by 0 to 2 % when it is kept while it compresses as well as it did).
+//! The parts of the image data are written in parallel, each with its own code table, and joined bit by bit. A full
+//! code table is cleared at once, because frames change too much from top to bottom for an old table to be useful
+//! (measured: files grow by 0 to 2 % if it is kept as long as it compresses as well as before).
 
-/// The most codes that the format allows.
-const MOST_CODES: u16 = 4096;
-/// Slots of the hash table: at most half of them are in use.
+/// The largest number of codes of the format.
+const MAX_CODES: u16 = 4096;
+/// Slots of the hash table, at most half of which are in use.
 const SLOTS: usize = 8192;
-/// An empty slot. No string looks like that: it would continue the last code, and the table is cleared before.
+/// An empty slot. No string has this value: it would continue the last code, and the table is
+/// cleared before that exists.
 const EMPTY: u32 = u32::MAX;
 
-/// The strings of indices since the last clear code, each one index longer than its parent.
+/// The strings of indices since the last clear code. Each is one index longer than its parent.
 #[derive(Debug)]
 struct CodeTable {
-    /// Parent, index and code of each string in 12, 8 and 12 bits, where the hash of the first two puts it.
+    /// Parent, index and code of each string in 12, 8 and 12 bits, at the hash of parent and index.
     slots: Box<[u32; SLOTS]>,
     next: u16,
-    /// For each string a set of the indices that continue it, modulo 32, one bit each.
-    continued: Box<[u32; MOST_CODES as usize]>,
+    /// For each string, the set of the indices that continue it, modulo 32, one bit each.
+    continued: Box<[u32; MAX_CODES as usize]>,
 }
 
 impl CodeTable {
-    /// The code of the string `parent` with `index` after it, or the slot to put it in.
+    /// Returns the code of the string `parent` followed by `index`, or the slot where it belongs.
     fn find(&self, parent: u16, index: u8) -> Result<u16, usize> {
         let key = u32::from(parent) << 8 | u32::from(index);
         let mut at = (key.wrapping_mul(0x9E37_79B1) >> 19) as usize % SLOTS;
@@ -38,46 +39,46 @@ impl CodeTable {
         }
     }
 
-    /// The code of the string `parent` with `index` after it. Mostly there is none, which one bit tells.
+    /// Returns the code of the string `parent` followed by `index`. Mostly there is none, and one bit shows it.
     fn code(&self, parent: u16, index: u8) -> Option<u16> {
         let continued = self.continued[usize::from(parent)] >> (index & 31) & 1 != 0;
         if continued { self.find(parent, index).ok() } else { None }
     }
 }
 
-/// Writes a part of an image's data, index by index.
+/// A writer of a part of an image's data, index by index.
 #[derive(Debug)]
 pub(crate) struct Writer {
     bits: u8,
     table: CodeTable,
-    /// The code of the current string, which is not yet written.
+    /// The code of the current string, which is not written yet.
     string: Option<u16>,
     width: u32,
     codes: Codes,
 }
 
 impl Writer {
-    /// For indices below 2^`bits`, of 2 to 8 bits.
+    /// Makes a writer for indices below 2^`bits`, with 2 to 8 bits.
     pub(crate) fn new(bits: u8) -> Self {
         let table = CodeTable {
             slots: Box::new([EMPTY; SLOTS]),
             next: (1 << bits) + 2,
-            continued: Box::new([0; MOST_CODES as usize]),
+            continued: Box::new([0; MAX_CODES as usize]),
         };
         Self { bits, table, string: None, width: u32::from(bits) + 1, codes: Codes::default() }
     }
 
-    /// Whether any index continues the current string.
+    /// Returns whether some index may continue the current string.
     pub(crate) fn is_known(&self) -> bool {
         self.string.is_none_or(|string| self.table.continued[usize::from(string)] != 0)
     }
 
-    /// Whether this index continues the current string, and so costs no code.
+    /// Returns whether this index continues the current string, so that it costs no code.
     pub(crate) fn continues(&self, index: u8) -> bool {
         self.string.is_none_or(|string| self.table.code(string, index).is_some())
     }
 
-    /// One bit for each of the indices: 0 if it does not continue the current string, 1 if it may.
+    /// Returns one bit per index: 0 if it does not continue the current string, 1 if it may.
     pub(crate) fn may_continue<const N: usize>(&self, indices: &[u8; N]) -> u32 {
         let continued = self.string.map_or(u32::MAX, |string| self.table.continued[usize::from(string)]);
         let mut bits = 0;
@@ -87,7 +88,7 @@ impl Writer {
         bits
     }
 
-    /// Writes the index if it continues the current string, and says whether it did.
+    /// Writes the index if it continues the current string. Returns whether it did.
     pub(crate) fn extend(&mut self, index: u8) -> bool {
         let longer = match self.string {
             Some(string) => self.table.code(string, index),
@@ -113,7 +114,7 @@ impl Writer {
                     u32::from(string) << 20 | u32::from(index) << 12 | u32::from(self.table.next);
                 self.table.continued[usize::from(string)] |= 1 << (index & 31);
                 self.table.next += 1;
-                if self.table.next == MOST_CODES {
+                if self.table.next == MAX_CODES {
                     self.codes.put(1 << self.bits, self.width);
                     self.table.slots.fill(EMPTY);
                     self.table.continued.fill(0);
@@ -127,13 +128,13 @@ impl Writer {
 
     fn end_string(&mut self, string: u16) {
         self.codes.put(string, self.width);
-        // The decoder adds a string one code later than the encoder, so the width grows one code later, too.
+        // The decoder adds a string one code later than the encoder, so the width must grow one code later, too.
         if u32::from(self.table.next) == 1 << self.width {
             self.width += 1;
         }
     }
 
-    /// Ends the part, which is then [joined](join) to others. `last`: whether it is the image's last.
+    /// Ends the part, so that it can be [joined](join) to others. `last`: it is the last part of the image.
     pub(crate) fn finish(mut self, last: bool) -> Part {
         if let Some(string) = self.string {
             self.end_string(string);
@@ -147,7 +148,7 @@ impl Writer {
 #[derive(Debug)]
 pub(crate) struct Part(Codes);
 
-/// The format's image data, not yet divided into sub-blocks: first `bits`, then the codes of all parts.
+/// Joins the parts to the format's image data, without sub-blocks: first `bits`, then the codes of all parts.
 pub(crate) fn join(bits: u8, parts: &[Part]) -> Vec<u8> {
     let bytes = parts.iter().map(|part| part.0.bytes.len() + 9).sum::<usize>();
     let mut all = Codes { bytes: Vec::with_capacity(bytes + 2), ..Codes::default() };
@@ -168,11 +169,11 @@ pub(crate) fn join(bits: u8, parts: &[Part]) -> Vec<u8> {
     all.finish()
 }
 
-/// Codes one after the other, bit by bit, the lowest bit first.
+/// Codes in sequence, bit by bit, the lowest bit first.
 #[derive(Debug, Default)]
 struct Codes {
     bytes: Vec<u8>,
-    /// The last bits, fewer than 32.
+    /// The bits that are not yet bytes: fewer than 32.
     pending: u64,
     held: u32,
 }

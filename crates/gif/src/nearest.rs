@@ -6,7 +6,7 @@ use crate::colour;
 use crate::histogram::Histogram;
 use crate::palette::{Guesses, Palette, Sample};
 
-/// The palette entry nearest to a colour, and its squared distance (see [`colour`](crate::colour)).
+/// The palette entry nearest to a colour, and the squared distance between them (see [`colour`]).
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Nearest {
     pub(crate) index: u8,
@@ -14,12 +14,12 @@ pub(crate) struct Nearest {
 }
 
 impl Nearest {
-    /// An entry that is to be drawn for a bin.
+    /// Makes the entry that is drawn for a bin.
     pub(crate) fn new(index: u8, bin: &Sample, palette: &Palette) -> Self {
         Self { index, error: colour::error(&bin.point, &palette.points[usize::from(index)]) }
     }
 
-    /// For each bin of a histogram.
+    /// Finds the nearest entry of each bin of a histogram.
     pub(crate) fn of_bins(bins: &[Sample], palette: &Palette, guesses: &Guesses) -> Vec<Self> {
         let nearest = bins.par_iter().enumerate().with_min_len(512).map(|(number, bin)| {
             Self::new(palette.nearest(&bin.point, guesses.of(number, bin.rgb)), bin, palette)
@@ -28,7 +28,8 @@ impl Nearest {
     }
 }
 
-/// Mean [level error](colour::level_error) of all pixels counted, drawn with their nearest entries.
+/// Returns the mean [level error](colour::level_error) of all pixels counted, if they are drawn
+/// with their nearest entries.
 pub(crate) fn mean_level_error(histogram: &Histogram, nearest: &[Nearest], palette: &Palette) -> f32 {
     let (mut sum, mut pixels) = (0.0, 0.0);
     for (bin, entry) in histogram.bins().iter().zip(nearest) {
@@ -40,7 +41,7 @@ pub(crate) fn mean_level_error(histogram: &Histogram, nearest: &[Nearest], palet
     sum / f32::max(pixels, 1.0)
 }
 
-/// Mean squared error of all pixels counted, drawn with their nearest entries.
+/// Returns the mean squared error of all pixels counted, if they are drawn with their nearest entries.
 pub(crate) fn mean_error(histogram: &Histogram, nearest: &[Nearest]) -> f32 {
     let bins = histogram.bins().iter().zip(nearest);
     let sum = bins.map(|(bin, entry)| bin.count as f32 * entry.error).sum::<f32>();

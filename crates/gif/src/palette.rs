@@ -1,8 +1,8 @@
-//! The few colours that fit a frame's many colours best.
+//! The palette that fits the many colours of a frame best.
 //!
-//! The colours are divided into clusters: again and again the cluster with the largest error is split at the mean of its
-//! widest coordinate. Then k-means (Lloyd 1982) improves them; a colour compares only centres that are closer to its own
-//! than twice its distance from that, as by the triangle inequality no other can be nearer.
+//! The colours are divided into clusters: the cluster with the largest error is split repeatedly at the mean of its
+//! widest coordinate. Then k-means (Lloyd 1982) improves the clusters. A colour is compared only with centres closer
+//! to its own centre than twice its distance from that: by the triangle inequality, no other can be nearer.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -12,11 +12,11 @@ use rayon::prelude::*;
 use crate::colour::{self, DIMENSIONS, Point};
 use crate::histogram::{Bin, Histogram};
 
-/// Rounds of k-means at most.
+/// The largest number of rounds of k-means.
 const ROUNDS: usize = 5;
-/// The most colours that are clustered one by one; more are counted in coarser bins first.
+/// The largest number of colours that are clustered one by one. More are counted in coarser bins first.
 const SAMPLES: usize = 1 << 13;
-/// How many of a palette colour's nearest others are stored.
+/// The number of nearest other entries that are stored per palette entry.
 pub(crate) const NEIGHBOURS: usize = 16;
 
 /// A weighted colour.
@@ -40,24 +40,24 @@ impl From<&Bin> for Sample {
     }
 }
 
-/// How many of a palette colour's nearest others may be drawn in its place.
+/// The number of nearest other entries that may be drawn in place of a palette entry.
 const ALTERNATIVES: usize = 8;
 
-/// The colours to draw with, and for each its point and its nearest others.
+/// The palette, with the point and the nearest other entries of each colour.
 #[derive(Debug, Clone)]
 pub(crate) struct Palette {
     pub(crate) colours: Vec<[u8; 3]>,
     pub(crate) points: Vec<Point>,
-    /// What may be drawn in the place of each.
+    /// The entries that may be drawn in place of each entry.
     pub(crate) alternatives: Vec<Alternatives>,
     neighbours: Neighbours,
 }
 
-/// A palette colour's nearest others.
+/// The nearest other entries of a palette entry.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Alternatives {
     pub(crate) indices: [u8; ALTERNATIVES],
-    /// Where there are fewer, the rest is far from every colour.
+    /// If there are fewer entries, the rest have levels that are far from every colour.
     pub(crate) levels: [[f32; 3]; ALTERNATIVES],
 }
 
@@ -75,25 +75,25 @@ impl Alternatives {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Neighbour {
     pub(crate) index: u8,
-    /// Squared distance, rounded down a little.
+    /// The squared distance, rounded down a little.
     pub(crate) apart: f32,
 }
 
-/// For each bin of a histogram a palette entry that is near it: where to begin the search for the nearest.
+/// For each bin of a histogram, a palette entry near it, from which the search for the nearest starts.
 #[derive(Debug)]
 pub(crate) struct Guesses {
-    /// The bins that `indices` counts, if they are not those of the histogram itself.
+    /// The bins that `indices` belongs to, if they are not those of the histogram itself.
     coarse: Option<Histogram>,
     indices: Vec<u8>,
 }
 
 impl Guesses {
-    /// One for each bin; without any, the first entry for all.
+    /// Makes guesses of one index per bin. Without indices, the guess is always the first entry.
     pub(crate) fn of_each(indices: Vec<u8>) -> Self {
         Self { coarse: None, indices }
     }
 
-    /// The index of an entry near a bin, given by its number and its mean colour.
+    /// Returns the index of an entry near a bin, which is given by its number and its mean colour.
     pub(crate) fn of(&self, number: usize, mean: [f32; 3]) -> u8 {
         let at = match &self.coarse {
             None => Some(number),
@@ -104,7 +104,7 @@ impl Guesses {
 }
 
 impl Palette {
-    /// Of these colours, at most 256.
+    /// Makes a palette of these colours, at most 256.
     pub(crate) fn new(colours: Vec<[u8; 3]>) -> Self {
         let points = colours.iter().map(|&rgb| colour::point_of(rgb)).collect::<Vec<_>>();
         let neighbours = Neighbours::of(&points);
@@ -113,8 +113,8 @@ impl Palette {
         Self { colours, points, alternatives, neighbours }
     }
 
-    /// The colours of the bins themselves if there are at most `size`, else `size` colours that fit them well. The samples
-    /// are those of the bins.
+    /// Returns the colours of the bins if there are at most `size`, else `size` colours that fit them well. `samples`
+    /// are the samples of the bins.
     pub(crate) fn of_bins(histogram: &Histogram, samples: &[Sample], size: usize) -> (Self, Guesses) {
         let bins = histogram.bins();
         if histogram.is_exact() && bins.len() <= size {
@@ -132,8 +132,8 @@ impl Palette {
         (palette, Guesses { coarse: Some(coarse), indices })
     }
 
-    /// At most `size` colours that fit the samples well, and for each sample the index of one near it. There is at least one
-    /// sample.
+    /// Returns at most `size` colours that fit the samples well, and for each sample the index of one near it. There
+    /// must be at least one sample.
     fn of(samples: &[Sample], size: usize) -> (Self, Vec<u8>) {
         let mut owners = split(samples, size);
         let mut near: Option<Neighbours> = None;
@@ -141,7 +141,7 @@ impl Palette {
             let centres = centres(samples, &mut owners);
             let points = centres.iter().map(|&rgb| colour::point(rgb)).collect::<Vec<_>>();
             let near = match &mut near {
-                // Centres move little: which of them are neighbours hardly changes.
+                // Centres move little, so their neighbours hardly change.
                 Some(near) if near.points == points.len() => {
                     near.measure(&points);
                     near
@@ -171,29 +171,29 @@ impl Palette {
         (Self::new(colours), indices)
     }
 
-    /// The squared distance of a colour from the nearest other one.
+    /// Returns the squared distance of a colour from the nearest other colour.
     pub(crate) fn apart_from_others(&self, index: u8) -> f32 {
         self.neighbours.at(index).first().map_or(f32::INFINITY, |neighbour| neighbour.apart)
     }
 
-    /// The index of the nearest colour. The search begins at `guess`.
+    /// Returns the index of the nearest colour. The search starts at `guess`.
     pub(crate) fn nearest(&self, point: &Point, guess: u8) -> u8 {
         self.neighbours.nearest(&self.points, point, guess)
     }
 }
 
-/// For each point its nearest others, nearest first.
+/// The nearest others of each point, nearest first.
 #[derive(Debug, Clone)]
 struct Neighbours {
     points: usize,
-    /// Of each point.
+    /// The number of neighbours per point.
     each: usize,
     all: Vec<Neighbour>,
 }
 
 impl Neighbours {
     fn of(points: &[Point]) -> Self {
-        // One coordinate after the other, with padding at the end, so that several distances are worked out at once.
+        // One coordinate after the other, with padding at the end, so that several distances are computed at once.
         let mut columns = [[0.0_f32; 256]; DIMENSIONS];
         for (index, point) in points.iter().enumerate() {
             for (column, &at) in columns.iter_mut().zip(point) {
@@ -209,13 +209,13 @@ impl Neighbours {
                     *sum += (at - other) * (at - other);
                 }
             }
-            // The lowest bits are replaced by the index.
+            // The index replaces the lowest bits of the distance.
             let mut keys = [f32::INFINITY; 256];
             for (index, (key, apart)) in (0..).zip(keys.iter_mut().zip(&apart[..points.len()])) {
                 *key = f32::from_bits(apart.to_bits() & !0xFF | index);
             }
             keys[own] = f32::INFINITY;
-            // The least of each block of 16; the least of these is taken out again and again.
+            // The least of each block of 16. The least of these is removed repeatedly.
             let (blocks, _) = keys.as_chunks_mut::<16>();
             let mut leasts = [0.0; 16];
             for (least_of, block) in leasts.iter_mut().zip(&*blocks) {
@@ -240,7 +240,7 @@ impl Neighbours {
         &self.all[usize::from(index) * self.each..][..self.each]
     }
 
-    /// Works out the distances for points that have moved, and sorts the neighbours again.
+    /// Computes the distances for points that have moved, and sorts the neighbours again.
     fn measure(&mut self, points: &[Point]) {
         for (own, near) in points.iter().zip(self.all.chunks_exact_mut(self.each.max(1))) {
             for neighbour in near.iter_mut() {
@@ -279,7 +279,7 @@ impl Neighbours {
     }
 }
 
-/// The least number, four at a time, which `fold` does not do by itself.
+/// Returns the least number. Compares four at a time, which `fold` does not do by itself.
 fn least(numbers: &[f32; 16]) -> f32 {
     let lesser = |a: f32, b: f32| if b < a { b } else { a };
     let mut least = [f32::INFINITY; 4];
@@ -291,7 +291,8 @@ fn least(numbers: &[f32; 16]) -> f32 {
     lesser(lesser(least[0], least[1]), lesser(least[2], least[3]))
 }
 
-/// Mean colours of the clusters. The owners, the cluster of each sample, are renumbered so that no cluster is empty.
+/// Returns the mean colours of the clusters. Renumbers the owners (the cluster of each sample) so that
+/// no cluster is empty.
 fn centres(samples: &[Sample], owners: &mut [u8]) -> Vec<[f32; 3]> {
     let mut sums = [[0.0_f64; 4]; 256];
     for (sample, &owner) in samples.iter().zip(owners.iter()) {
@@ -316,9 +317,9 @@ fn centres(samples: &[Sample], owners: &mut [u8]) -> Vec<[f32; 3]> {
 }
 
 struct Cluster {
-    /// About the sum of the distances from the mean.
+    /// Approximately the sum of the distances from the mean.
     error: f64,
-    /// The coordinate in which the members differ most, and its mean.
+    /// The coordinate in which the members differ most; `mean` is its mean.
     widest: usize,
     mean: f32,
     members: std::ops::Range<usize>,
@@ -341,7 +342,7 @@ impl Cluster {
         let spread = |k: usize| squares[k] - sums[k] * sums[k] / weight;
         let widest = (1..DIMENSIONS).fold(0, |best, k| if spread(k) > spread(best) { k } else { best });
         let squares = if members.len() > 1 { (0..DIMENSIONS).map(spread).sum::<f64>() } else { 0.0 };
-        // Distances, not their squares: to the eye, a few exact colours are worth less than many that are near.
+        // Distances, not their squares: to the eye, a few exact colours are worth less than many close ones.
         let error = (squares.max(0.0) * weight).sqrt();
         Self { error, widest, mean: (sums[widest] / weight) as f32, members }
     }
@@ -364,7 +365,7 @@ impl Ord for Cluster {
     }
 }
 
-/// The cluster, below `size`, of each sample.
+/// Returns the cluster of each sample, below `size`.
 fn split(samples: &[Sample], size: usize) -> Vec<u8> {
     let mut order = (0..samples.len() as u32).collect::<Vec<_>>();
     let mut clusters = BinaryHeap::from([Cluster::new(samples, &order, 0..samples.len())]);
@@ -392,7 +393,7 @@ fn split(samples: &[Sample], size: usize) -> Vec<u8> {
     owners
 }
 
-/// Moves the wanted items to the front and returns how many there are.
+/// Moves the wanted items to the front. Returns their number.
 fn partition<T>(items: &mut [T], wanted: impl Fn(&T) -> bool) -> usize {
     let mut front = 0;
     for k in 0..items.len() {

@@ -1,31 +1,31 @@
-//! How a frame is to be drawn: without loss, or with the palette that serves it best.
+//! The plan of a frame: drawn without loss, or with the palette that suits it best.
 
-use crate::allowance::Loan;
 use crate::block::Area;
 use crate::bound;
 use crate::exact::FewColours;
 use crate::histogram::Histogram;
 use crate::nearest;
-use crate::needs::Needs;
 use crate::palette::Sample;
 use crate::quantised::Quantised;
+use crate::refine_budget::Reservation;
+use crate::update_map::UpdateMap;
 
-/// How a frame is to be drawn.
+/// The way in which a frame is drawn.
 #[derive(Debug)]
 pub(crate) enum Plan {
-    /// Without loss.
+    /// All colours are exact.
     Lossless(FewColours),
-    /// With the colours of a palette.
+    /// The colours are those of a palette.
     Lossy(LossyPlan),
 }
 
-/// What is drawn with which palette.
+/// The pixels that are drawn, and their palette.
 #[derive(Debug)]
 pub(crate) struct LossyPlan {
-    /// `None` if the frame is encoded as if it were alone: the first one, and those that cannot be drawn well enough over
-    /// others.
-    pub(crate) loan: Option<Loan>,
-    /// How far a pixel may be off.
+    /// `None` if the frame is encoded as if it were alone: the first frame, and frames that cannot be drawn
+    /// well enough over others.
+    pub(crate) reservation: Option<Reservation>,
+    /// The largest error of a pixel, in levels (see [`bound`]).
     pub(crate) bound: u8,
     /// The part of the frame that is drawn because it changed.
     pub(crate) changed: f64,
@@ -37,29 +37,31 @@ pub(crate) struct LossyPlan {
 }
 
 impl LossyPlan {
-    /// For a frame of which the needs are known. Fills the histogram with the colours that are drawn; each of `parts` counts
-    /// a part of them. `loan`: given if the frame is drawn over others, so that no pixel is further off than `bound`.
-    /// Where that cannot be, the loan is back in `loan`, and the frame is planned as if it were alone.
+    /// Plans a frame after `updates` is decided. Fills the histogram with the colours that are drawn; each of `parts`
+    /// counts a part of them.
+    ///
+    /// `reservation` is given if the frame is drawn over others with no pixel further off than `bound`. If that is
+    /// impossible, the reservation is left in place, and the frame is planned as if it were alone.
     pub(crate) fn new(
         pixels: &[[u8; 3]],
         width: usize,
-        loan: &mut Option<Loan>,
+        reservation: &mut Option<Reservation>,
         bound: u8,
-        needs: &mut Needs,
+        updates: &mut UpdateMap,
         histogram: &mut Histogram,
         parts: &mut [Histogram],
     ) -> Self {
-        if let Some(lent) = loan.take() {
+        if let Some(reserved) = reservation.take() {
             let changed =
-                needs.count(pixels, lent.least_error, histogram, parts) as f64 / pixels.len() as f64;
-            let area = Area::around(&needs.pixels, width, |need| need.may_draw());
+                updates.count(pixels, reserved.least_error, histogram, parts) as f64 / pixels.len() as f64;
+            let area = Area::around(&updates.pixels, width, |update| update.may_draw());
             let bins = Sample::of_bins(histogram);
             let best = Quantised::new(histogram, &bins, 255).of_fewer_colours(histogram, &bins);
-            if let Some(quantised) = best.within((pixels, &needs.pixels), histogram, &bins, bound) {
+            if let Some(quantised) = best.within((pixels, &updates.pixels), histogram, &bins, bound) {
                 let level_error =
                     nearest::mean_level_error(histogram, &quantised.nearest, &quantised.palette);
                 return Self {
-                    loan: Some(lent),
+                    reservation: Some(reserved),
                     bound,
                     changed,
                     area,
@@ -67,17 +69,17 @@ impl LossyPlan {
                     level_error,
                 };
             }
-            *loan = Some(lent);
+            *reservation = Some(reserved);
         }
-        needs.draw_all(width, pixels.len());
+        updates.draw_all(width, pixels.len());
         histogram.count(pixels, parts);
         let bins = Sample::of_bins(histogram);
-        // A viewer may see the first frame for long, or see nothing else.
+        // A viewer may see the first frame for a long time, or see nothing else.
         let quantised = Quantised::new(histogram, &bins, 256);
         let level_error = nearest::mean_level_error(histogram, &quantised.nearest, &quantised.palette);
         let area = Some(Area::whole(width, pixels.len()));
         Self {
-            loan: None,
+            reservation: None,
             bound: bound::NONE,
             changed: 1.0,
             area,

@@ -1,62 +1,63 @@
-//! Turns frames into blocks, each of which turns what a viewer sees before it into its frame.
+//! The quantiser: turns each frame into the GIF block that updates the canvas from the previous frame to it.
 //!
-//! Two frames are worked on at once: while one is drawn, the next one is prepared. To prepare a frame is to [compare
-//! it](crate::needs) with what will be seen before it, and to [plan](crate::plan) how it is drawn; to draw it is to choose
-//! its indices, in [stripes](crate::stripe).
+//! Two frames are processed at once: while one is drawn, the next one is prepared. Preparing a frame means
+//! [comparing](crate::update_map) it with the canvas before it, and [planning](crate::plan) how to draw it. Drawing
+//! it means choosing its indices, in [stripes](crate::stripe).
 //!
-//! Between two frames a quantiser can be written down. What follows from the rest is not written but worked out anew: the
-//! histogram, the palette, and which of its entries is nearest to each colour.
+//! The state of a quantiser can be saved between two frames. Only what cannot be derived is stored. The histogram,
+//! the palette and the nearest entry of each colour are computed again.
 
 use std::io;
 
 use image::RgbImage;
 
-use crate::allowance::{Allowance, Loan, Redrawn};
 use crate::block::{Area, Block};
 use crate::bound;
 use crate::colour::LocalMetric;
 use crate::error::Error;
 use crate::exact::{self, Change, Kind};
-use crate::histogram::{Histogram, MOST_BINS};
-use crate::needs::{LEFT_ERROR, LEFT_ERROR_IF_EXACT, Need, Needs, Previous};
+use crate::histogram::{Histogram, MAX_BINS};
 use crate::plan::{LossyPlan, Plan};
 use crate::quantised::Quantised;
+use crate::refine_budget::{Redrawn, RefineBudget, Reservation};
 use crate::state::{StateReader, StateWriter, damaged};
 use crate::stripe::{self, Colours, Layout, Row, Stripe};
+use crate::update_map::{EXACT_SKIP_ERROR, PixelUpdate, Previous, SKIP_ERROR, UpdateMap};
 
-/// Parts of a frame whose colours are counted in parallel.
+/// The number of parts of a frame whose colours are counted in parallel.
 const PARTS: usize = 2;
 
-/// If at least this part of a frame is drawn because it changed, it is divided into so many stripes: there the file grows
-/// little by more of them. Several for each thread, as one of them has prepared the next frame and begins later.
+/// If at least this part of a frame is drawn because it changed, it is divided into this many stripes,
+/// because the file grows little by them there. There are several per thread: one thread has prepared the
+/// next frame and starts later.
 const MOST: f64 = 0.5;
 const STRIPES_IF_MOST: usize = 5;
-/// With so many colours a code table is soon full, so that a second stripe makes the file hardly larger.
+/// With this many colours a code table fills soon, so a second stripe hardly enlarges the file.
 const MANY_COLOURS: usize = 4096;
 
-/// Turns frames into blocks, one after the other.
+/// A converter of frames to blocks, one after the other.
 #[derive(Debug)]
 pub(crate) struct Quantiser {
-    /// Whether no frame [drifts](Kind).
+    /// No frame [drifts](Kind).
     exact: bool,
     /// The frame that is drawn next.
     prepared: Option<Prepared>,
-    /// What a viewer sees after the last block.
+    /// The canvas after the last block.
     seen: RgbImage,
-    allowance: Allowance,
-    /// Used for each frame anew.
+    budget: RefineBudget,
+    /// Histograms that are reused for each frame.
     parts: Vec<Histogram>,
-    /// All colours of a frame.
+    /// A histogram of all colours of a frame.
     whole: Histogram,
     spare: Option<Buffers>,
-    /// Mean level error of what the last palette draws.
+    /// The mean level error of the pixels drawn with the last palette.
     drawn_error: f32,
 }
 
-/// What a frame is prepared in.
+/// The buffers in which a frame is prepared.
 #[derive(Debug)]
 struct Buffers {
-    needs: Needs,
+    updates: UpdateMap,
     /// The colours that are drawn.
     histogram: Histogram,
 }
@@ -66,37 +67,37 @@ struct Buffers {
 struct Prepared {
     frame: RgbImage,
     delay_cs: u16,
-    /// Whether there is none before it.
+    /// There is no frame before it.
     first: bool,
-    /// See [`Kind`].
+    /// The frame drifts (see [`Kind`]).
     drifts: bool,
     buffers: Buffers,
     plan: Plan,
 }
 
-/// What it takes to prepare a frame.
+/// The inputs and buffers for preparing a frame.
 struct Preparation<'a> {
     pixels: &'a [[u8; 3]],
     width: usize,
     previous: Option<&'a Prepared>,
     drawn_error: f32,
     exact: bool,
-    allowance: &'a mut Allowance,
+    budget: &'a mut RefineBudget,
     parts: &'a mut [Histogram],
     whole: &'a mut Histogram,
     buffers: &'a mut Buffers,
 }
 
 impl Quantiser {
-    /// `exact`: whether frames of few colours are exact also where they drift.
+    /// Makes a quantiser. `exact`: frames of few colours stay exact also if they drift.
     pub(crate) fn new(exact: bool) -> Self {
         Self {
             exact,
             prepared: None,
             seen: RgbImage::default(),
-            allowance: Allowance::new(),
-            parts: (1..PARTS).map(|_| Histogram::new(MOST_BINS)).collect(),
-            whole: Histogram::new(MOST_BINS),
+            budget: RefineBudget::new(),
+            parts: (1..PARTS).map(|_| Histogram::new(MAX_BINS)).collect(),
+            whole: Histogram::new(MAX_BINS),
             spare: None,
             drawn_error: 0.0,
         }
@@ -104,7 +105,7 @@ impl Quantiser {
 
     /// Takes the next frame, and returns the block of the one before it.
     pub(crate) fn push(&mut self, frame: RgbImage, delay_cs: u16) -> Option<Block> {
-        // The whole step runs in the pool: otherwise each part of it would have to wait for a thread.
+        // The whole step runs in the pool. Otherwise each part of it would have to wait for a thread.
         rayon::scope(|_| self.step(frame, delay_cs))
     }
 
@@ -115,7 +116,7 @@ impl Quantiser {
         if first {
             self.seen = RgbImage::new(frame.width(), frame.height());
         }
-        let Self { exact, seen, allowance, parts, whole, spare, drawn_error, .. } = self;
+        let Self { exact, seen, budget, parts, whole, spare, drawn_error, .. } = self;
         let mut buffers = spare.take().unwrap_or_else(Buffers::new);
         let mut preparation = Preparation {
             pixels: pixels_of(&frame),
@@ -123,7 +124,7 @@ impl Quantiser {
             previous: previous.as_ref(),
             drawn_error: *drawn_error,
             exact: *exact,
-            allowance,
+            budget,
             parts,
             whole,
             buffers: &mut buffers,
@@ -139,7 +140,7 @@ impl Quantiser {
                     },
                 )
             }
-            // What will be seen is the previous frame itself.
+            // The canvas will be the previous frame itself.
             Some(previous) if matches!(previous.plan, Plan::Lossless(_)) => rayon::join(
                 || {
                     let compared = preparation.compare(&previous.frame);
@@ -157,36 +158,37 @@ impl Quantiser {
         }
         self.prepared = Some(Prepared { frame, delay_cs, first, drifts, buffers, plan });
         let (previous, (block, redrawn)) = (previous?, drawn?);
-        if let Plan::Lossy(LossyPlan { loan: Some(loan), changed, .. }) = &previous.plan {
-            self.allowance.pay(loan, &redrawn, *changed);
+        if let Plan::Lossy(LossyPlan { reservation: Some(reservation), changed, .. }) = &previous.plan {
+            self.budget.commit(reservation, &redrawn, *changed);
         }
         self.spare = Some(previous.buffers);
         Some(block)
     }
 
-    /// Looks at the frame that is drawn next once more, now that it is known what is seen before it.
+    /// Revises the plan of the frame that is drawn next, now that the canvas before it is known.
     fn settle(&mut self) {
-        let Self { prepared, seen, parts, allowance, .. } = self;
-        let Some(Prepared { frame, buffers: Buffers { needs, histogram }, plan: Plan::Lossy(plan), .. }) =
-            prepared
+        let Self { prepared, seen, parts, budget, .. } = self;
+        let Some(Prepared {
+            frame, buffers: Buffers { updates, histogram }, plan: Plan::Lossy(plan), ..
+        }) = prepared
         else {
             return;
         };
         let (pixels, width) = (pixels_of(frame), frame.width() as usize);
-        if plan.loan.is_none() || !needs.draw_what_is_off(pixels, pixels_of(seen), plan.bound) {
+        if plan.reservation.is_none() || !updates.draw_what_is_off(pixels, pixels_of(seen), plan.bound) {
             return;
         }
-        let mut loan = plan.loan.take();
-        *plan = LossyPlan::new(pixels, width, &mut loan, plan.bound, needs, histogram, parts);
-        if let Some(loan) = loan {
-            allowance.give_back(&loan);
+        let mut reservation = plan.reservation.take();
+        *plan = LossyPlan::new(pixels, width, &mut reservation, plan.bound, updates, histogram, parts);
+        if let Some(reservation) = reservation {
+            budget.release(&reservation);
         }
         if plan.area.is_some() {
             self.drawn_error = plan.level_error;
         }
     }
 
-    /// The block of the last frame.
+    /// Returns the block of the last frame.
     pub(crate) fn finish(&mut self) -> Option<Block> {
         rayon::scope(|_| self.settle());
         let last = self.prepared.take()?;
@@ -194,56 +196,56 @@ impl Quantiser {
     }
 }
 
-/// How a prepared frame is drawn, as a suspended animation holds it.
+/// Tags for the plan of a prepared frame in a suspended animation.
 const LOSSLESS: u8 = 0;
 const LOSSY: u8 = 1;
-/// With pixels that stay refined out of a loan.
-const LOSSY_WITH_LOAN: u8 = 2;
+/// The plan refines static pixels out of a reservation.
+const LOSSY_WITH_RESERVATION: u8 = 2;
 
 impl Quantiser {
-    /// Writes down what later blocks depend on. Nothing before the first frame.
+    /// Writes the state on which later blocks depend. Writes nothing before the first frame.
     pub(crate) fn write(&self, state: &mut StateWriter) -> io::Result<()> {
         let Some(Prepared { frame, delay_cs, first, drifts, buffers, plan }) = &self.prepared else {
             return Ok(());
         };
-        self.allowance.write(state)?;
+        self.budget.write(state)?;
         state.f32(self.drawn_error)?;
         state.u16(*delay_cs)?;
         state.bytes(&[u8::from(*first), u8::from(*drifts)])?;
         match plan {
             Plan::Lossless(_) => state.bytes(&[LOSSLESS])?,
-            Plan::Lossy(LossyPlan { loan: None, .. }) => state.bytes(&[LOSSY])?,
-            Plan::Lossy(LossyPlan { loan: Some(loan), bound, .. }) => {
-                state.bytes(&[LOSSY_WITH_LOAN, *bound])?;
-                loan.write(state)?;
+            Plan::Lossy(LossyPlan { reservation: None, .. }) => state.bytes(&[LOSSY])?,
+            Plan::Lossy(LossyPlan { reservation: Some(reservation), bound, .. }) => {
+                state.bytes(&[LOSSY_WITH_RESERVATION, *bound])?;
+                reservation.write(state)?;
             }
         }
         state.bytes(self.seen.as_raw())?;
-        // Mostly small: the frame as it differs from what is seen before it.
+        // The frame as its difference from the canvas, which is mostly small.
         for (now, seen) in rows(frame).zip(rows(&self.seen)) {
             let differences: Vec<u8> =
                 now.iter().zip(seen).map(|(now, seen)| now.wrapping_sub(*seen)).collect();
             state.bytes(&differences)?;
         }
-        for needs in buffers.needs.pixels.chunks(frame.width() as usize) {
-            let needs: Vec<u8> = needs.iter().map(|need| need.to_byte()).collect();
-            state.bytes(&needs)?;
+        for updates in buffers.updates.pixels.chunks(frame.width() as usize) {
+            let updates: Vec<u8> = updates.iter().map(|update| update.to_byte()).collect();
+            state.bytes(&updates)?;
         }
         Ok(())
     }
 
-    /// Reads what was written for frames of a size.
+    /// Reads the state that was written for frames of a size.
     pub(crate) fn read(
         state: &mut StateReader<'_>,
         (width, height): (u32, u32),
         exact: bool,
     ) -> Result<Self, Error> {
         let mut quantiser =
-            Self { allowance: Allowance::read(state)?, drawn_error: state.f32()?, ..Self::new(exact) };
+            Self { budget: RefineBudget::read(state)?, drawn_error: state.f32()?, ..Self::new(exact) };
         let (delay_cs, first, drifts) = (state.u16()?, state.u8()? != 0, state.u8()? != 0);
         let kind = state.u8()?;
-        let (bound, loan) = match kind {
-            LOSSY_WITH_LOAN => (state.u8()?, Some(Loan::read(state)?)),
+        let (bound, reservation) = match kind {
+            LOSSY_WITH_RESERVATION => (state.u8()?, Some(Reservation::read(state)?)),
             _ => (bound::NONE, None),
         };
         let pixels = width as usize * height as usize;
@@ -256,21 +258,23 @@ impl Quantiser {
             RgbImage::from_raw(width, height, levels).ok_or_else(|| damaged("its size is wrong"))
         };
         let (frame, seen) = (image(frame)?, image(seen)?);
-        let needs = state.bytes(pixels)?.into_iter().map(Need::of_byte).collect::<Option<Vec<_>>>();
-        let needs =
-            Needs::decided(width as usize, needs.ok_or_else(|| damaged("a pixel needs what there is not"))?);
-        let mut buffers = Buffers { needs, ..Buffers::new() };
+        let updates = state.bytes(pixels)?.into_iter().map(PixelUpdate::of_byte).collect::<Option<Vec<_>>>();
+        let updates = UpdateMap::decided(
+            width as usize,
+            updates.ok_or_else(|| damaged("a pixel has an unknown update"))?,
+        );
+        let mut buffers = Buffers { updates, ..Buffers::new() };
         let plan = match kind {
             LOSSLESS => {
                 let few = exact::few_colours(pixels_of(&frame));
                 Plan::Lossless(few.ok_or_else(|| damaged("a frame without loss has too many colours"))?)
             }
-            LOSSY | LOSSY_WITH_LOAN if loan.is_none() || !first => {
-                let Buffers { needs, histogram } = &mut buffers;
+            LOSSY | LOSSY_WITH_RESERVATION if reservation.is_none() || !first => {
+                let Buffers { updates, histogram } = &mut buffers;
                 let (pixels, parts) = (pixels_of(&frame), &mut quantiser.parts);
-                let (mut loan, width) = (loan, width as usize);
+                let (mut reservation, width) = (reservation, width as usize);
                 let plan = rayon::scope(|_| {
-                    LossyPlan::new(pixels, width, &mut loan, bound, needs, histogram, parts)
+                    LossyPlan::new(pixels, width, &mut reservation, bound, updates, histogram, parts)
                 });
                 Plan::Lossy(plan)
             }
@@ -288,39 +292,39 @@ fn rows(image: &RgbImage) -> impl Iterator<Item = &[u8]> {
 
 impl Buffers {
     fn new() -> Self {
-        Self { needs: Needs::default(), histogram: Histogram::new(MOST_BINS) }
+        Self { updates: UpdateMap::default(), histogram: Histogram::new(MAX_BINS) }
     }
 }
 
 impl Preparation<'_> {
-    /// Finds out what the frame needs, and what it may use of the allowance; no loan if all of it is drawn. `seen`: what a
-    /// viewer sees before the previous frame is drawn.
-    fn compare(&mut self, seen: &RgbImage) -> (Kind, Option<Loan>) {
+    /// Compares the frame with the canvas, and reserves a part of the refine budget. Makes no reservation if all of
+    /// the frame is drawn. `seen`: the canvas before the previous frame is drawn.
+    fn compare(&mut self, seen: &RgbImage) -> (Kind, Option<Reservation>) {
         let Self { pixels, width, previous, drawn_error, exact, .. } = *self;
         let before = previous.map(|previous| (pixels_of(&previous.frame), previous.drifts));
         let kind = Kind::of(pixels, before, exact);
-        let needs = &mut self.buffers.needs;
+        let updates = &mut self.buffers.updates;
         let Some(previous) = previous.filter(|_| kind.few.is_none()) else {
-            needs.draw_all(width, pixels.len());
+            updates.draw_all(width, pixels.len());
             return (kind, None);
         };
-        let left_error = if kind.drifts { LEFT_ERROR_IF_EXACT } else { LEFT_ERROR };
-        let previous = previous.seen_after(seen, drawn_error, left_error);
-        let refining = kind.change != Change::Slight && self.allowance.is_left();
-        let still = needs.compare(pixels, width, previous, refining);
-        let loan = self.allowance.lend(&still, pixels.len());
-        self.allowance.waited = needs.confine(loan.least_error, self.allowance.waited);
-        (kind, Some(loan))
+        let skip_error = if kind.drifts { EXACT_SKIP_ERROR } else { SKIP_ERROR };
+        let previous = previous.seen_after(seen, drawn_error, skip_error);
+        let refining = kind.change != Change::Slight && self.budget.is_left();
+        let still = updates.compare(pixels, width, previous, refining);
+        let reservation = self.budget.reserve(&still, pixels.len());
+        self.budget.waited = updates.confine(reservation.least_error, self.budget.waited);
+        (kind, Some(reservation))
     }
 
-    /// How the frame is drawn, and whether it drifts.
-    fn plan(self, (kind, loan): (Kind, Option<Loan>)) -> (Plan, bool) {
-        let Self { pixels, width, parts, whole, allowance, buffers: Buffers { needs, histogram }, .. } = self;
-        let mut loan = loan;
+    /// Plans how the frame is drawn. Returns also whether it drifts.
+    fn plan(self, (kind, reservation): (Kind, Option<Reservation>)) -> (Plan, bool) {
+        let Self { pixels, width, parts, whole, budget, buffers: Buffers { updates, histogram }, .. } = self;
+        let mut reservation = reservation;
         let plan = match kind.few {
             Some(colours) => Plan::Lossless(colours),
             None => {
-                let bound = match loan {
+                let bound = match reservation {
                     None => bound::NONE,
                     Some(_) if kind.drifts => bound::DRIFTING,
                     Some(_) => {
@@ -328,9 +332,9 @@ impl Preparation<'_> {
                         bound::of(pixels, whole)
                     }
                 };
-                let plan = LossyPlan::new(pixels, width, &mut loan, bound, needs, histogram, parts);
-                if let Some(loan) = loan {
-                    allowance.give_back(&loan);
+                let plan = LossyPlan::new(pixels, width, &mut reservation, bound, updates, histogram, parts);
+                if let Some(reservation) = reservation {
+                    budget.release(&reservation);
                 }
                 Plan::Lossy(plan)
             }
@@ -340,14 +344,14 @@ impl Preparation<'_> {
 }
 
 impl Prepared {
-    /// What the next frame is compared with. `seen`: what a viewer sees before this one is drawn.
-    fn seen_after<'a>(&'a self, seen: &'a RgbImage, error: f32, left_error: f32) -> Previous<'a> {
+    /// Returns the data with which the next frame is compared. `seen`: the canvas before this frame is drawn.
+    fn seen_after<'a>(&'a self, seen: &'a RgbImage, error: f32, skip_error: f32) -> Previous<'a> {
         Previous {
             frame: pixels_of(&self.frame),
-            needs: &self.buffers.needs.pixels,
+            updates: &self.buffers.updates.pixels,
             seen: pixels_of(seen),
             error,
-            left_error,
+            skip_error,
             nearest: match &self.plan {
                 Plan::Lossless(_) => None,
                 Plan::Lossy(plan) => Some((&self.buffers.histogram, &plan.quantised.nearest)),
@@ -355,7 +359,7 @@ impl Prepared {
         }
     }
 
-    /// Returns the block, and which of the pixels that stay were drawn anew.
+    /// Draws the frame. Returns the block, and the static pixels that were redrawn.
     fn draw(&self, seen: &mut RgbImage) -> (Block, Vec<Redrawn>) {
         let (width, pixels) = (self.frame.width() as usize, pixels_of(&self.frame));
         let seen = seen.as_chunks_mut::<3>().0;
@@ -364,13 +368,13 @@ impl Prepared {
                 (exact::draw(pixels, width, self.first, seen, colours, self.delay_cs), Vec::new())
             }
             Plan::Lossy(LossyPlan { area: None, .. }) => (Block::nothing(self.delay_cs), Vec::new()),
-            Plan::Lossy(LossyPlan { area: Some(area), quantised, changed, loan, bound, .. }) => {
+            Plan::Lossy(LossyPlan { area: Some(area), quantised, changed, reservation, bound, .. }) => {
                 let Quantised { palette, nearest, error } = &**quantised;
-                let transparent = loan.is_some().then_some(palette.colours.len() as u8);
+                let transparent = reservation.is_some().then_some(palette.colours.len() as u8);
                 let histogram = &self.buffers.histogram;
                 let (changed, error, bound) = (*changed, *error, *bound);
                 let colours = Colours { palette, nearest, histogram, transparent, changed, error, bound };
-                draw(pixels, width, *area, &self.buffers.needs.pixels, seen, colours, self.delay_cs)
+                draw(pixels, width, *area, &self.buffers.updates.pixels, seen, colours, self.delay_cs)
             }
         }
     }
@@ -380,8 +384,8 @@ fn pixels_of(image: &RgbImage) -> &[[u8; 3]] {
     image.as_raw().as_chunks().0
 }
 
-/// How many stripes at least a frame is divided into, given the part of it that is drawn because it changed and the number
-/// of its colours.
+/// Returns the least number of stripes of a frame. `changed`: the part of it that is drawn because it changed.
+/// `colours`: the number of its colours.
 fn least_stripes(changed: f64, colours: usize) -> usize {
     match colours {
         _ if changed >= MOST => STRIPES_IF_MOST,
@@ -394,7 +398,7 @@ fn draw(
     pixels: &[[u8; 3]],
     width: usize,
     area: Area,
-    needs: &[Need],
+    updates: &[PixelUpdate],
     seen: &mut [[u8; 3]],
     colours: Colours<'_>,
     delay_cs: u16,
@@ -415,7 +419,7 @@ fn draw(
             stripe.draw(Row {
                 pixels: &pixels[part.clone()],
                 above: &pixels[above],
-                needs: &needs[part],
+                updates: &updates[part],
                 seen: &mut seen[area.left..area.right],
             });
         }
@@ -434,7 +438,7 @@ mod tests {
         assert_eq!(least_stripes(MOST, 1), STRIPES_IF_MOST);
     }
 
-    /// Many colours, of which those from row `from` on are `by` levels higher.
+    /// A frame of many colours, which from row `from` on are `by` levels higher.
     fn frame(from: u32, by: u8) -> RgbImage {
         let level = |x: u32, y: u32| [x as u8 * 2, y as u8 * 2, (x + y) as u8];
         RgbImage::from_fn(64, 64, |x, y| {
@@ -451,17 +455,17 @@ mod tests {
             panic!("{:?}", quantiser.prepared)
         };
         assert_eq!((plan.area.map(|area| area.size()), plan.changed), (Some(64 * 64), 1.0));
-        assert!(plan.loan.is_none());
+        assert!(plan.reservation.is_none());
 
         let whole = quantiser.push(frame(48, 100), 6).unwrap();
         assert_eq!((whole.area.size(), whole.transparent, whole.delay_cs), (64 * 64, None, 5));
         let Some(Prepared { first: false, plan: Plan::Lossy(plan), .. }) = &quantiser.prepared else {
             panic!("{:?}", quantiser.prepared)
         };
-        // What is refined above it is left for a later frame, or is part of the area.
+        // Pixels refined above it wait for a later frame, or are part of the area.
         assert!(plan.area.is_some_and(|area| area.bottom == 64 && area.top <= 48));
         assert_eq!(plan.changed, 0.25);
-        assert!(plan.loan.is_some());
+        assert!(plan.reservation.is_some());
 
         let block = quantiser.finish().unwrap();
         assert_eq!(block.delay_cs, 6);

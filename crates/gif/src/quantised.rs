@@ -1,33 +1,33 @@
-//! A frame's colours by those of a palette: which colours it has, and which of them is drawn for each colour.
+//! The colours of a frame drawn with those of a palette: the palette, and the entry for each colour.
 
 use rayon::prelude::*;
 
 use crate::colour::{closest, levels_off};
 use crate::histogram::{Bin, Histogram};
 use crate::nearest::{self, Nearest};
-use crate::needs::Need;
 use crate::palette::{Guesses, Palette, Sample};
+use crate::update_map::PixelUpdate;
 
-/// Mean squared error (see [`colour`](crate::colour)) up to which a palette of half as many colours is taken: it takes up
-/// half as many bytes, and the indices fewer, too.
+/// The mean squared error (see [`colour`](crate::colour)) up to which a palette of half as many colours is used. Such
+/// a palette takes half as many bytes, and its indices take fewer bytes, too.
 const GOOD_ENOUGH: f32 = 0.8;
-/// Added to it: this divided by the number of pixels drawn, but at most `AT_MOST`. Where little is drawn, the palette is
-/// much of the file.
+/// The error allowed in addition is this divided by the number of pixels drawn, but at most `AT_MOST`. If few pixels
+/// are drawn, the palette is much of the file.
 const BY_PIXELS: f32 = 5000.0;
 const AT_MOST: f32 = 3.0;
-/// The fewest colours that a palette is halved to, transparent included.
+/// The smallest palette after halving, transparent included.
 const FEWEST: usize = 16;
-/// A frame with more bins keeps its large palette: a smaller one would hardly do, and takes long to make.
+/// A frame with more bins keeps its large palette: a smaller one would hardly suffice, and takes long to compute.
 const MOST_BINS_HALVED: usize = 4096;
 
-/// The most colours that a palette takes in because of the bound.
-const MOST_ADDED: usize = 64;
-/// With more colours that are too far off, a palette is not mended.
-const MOST_FAR: usize = 1 << 9;
-/// Pixels that are looked at together.
+/// The largest number of colours that are added to a palette because of the bound.
+const MAX_ADDED: usize = 64;
+/// A palette is not repaired if more colours than this are too far off.
+const MAX_FAR: usize = 1 << 9;
+/// Pixels that one thread processes at a time.
 const PART: usize = 1 << 14;
 
-/// A palette, the entry nearest to each bin, and the mean squared error of what is drawn.
+/// A palette, the entry nearest to each bin, and the mean squared error of the pixels drawn.
 #[derive(Debug)]
 pub(crate) struct Quantised {
     pub(crate) palette: Palette,
@@ -36,26 +36,26 @@ pub(crate) struct Quantised {
 }
 
 impl Quantised {
-    /// With at most so many colours.
+    /// Quantises to at most `size` colours.
     pub(crate) fn new(histogram: &Histogram, bins: &[Sample], size: usize) -> Self {
         let (palette, guesses) = Palette::of_bins(histogram, bins, size);
         Self::of(palette, &guesses, histogram, bins)
     }
 
-    /// With the colours of a palette.
+    /// Quantises to the colours of a palette.
     pub(crate) fn of(palette: Palette, guesses: &Guesses, histogram: &Histogram, bins: &[Sample]) -> Self {
         let nearest = Nearest::of_bins(bins, &palette, guesses);
         let error = nearest::mean_error(histogram, &nearest);
         Self { palette, nearest, error }
     }
 
-    /// Halves the palette as long as its error stays small enough. One index of it is left for transparent.
+    /// Halves the palette as long as its error stays small enough. One index is left for transparent.
     pub(crate) fn of_fewer_colours(mut self, histogram: &Histogram, bins: &[Sample]) -> Self {
         if bins.len() > MOST_BINS_HALVED {
             return self;
         }
         let bound = GOOD_ENOUGH + (BY_PIXELS / histogram.pixels() as f32).min(AT_MOST);
-        // Half as many colours have twice the error or more.
+        // Half as many colours have at least twice the error.
         while self.error * 2.0 <= bound {
             let size = (self.palette.colours.len() + 1).next_power_of_two() / 2;
             if size < FEWEST {
@@ -70,28 +70,28 @@ impl Quantised {
         self
     }
 
-    /// Changes entries so that each colour that is drawn has one within `bound`; `None` if that cannot be.
+    /// Replaces entries so that each colour drawn has one within `bound`. Returns `None` if that is impossible.
     pub(crate) fn within(
         mut self,
-        (pixels, needs): (&[[u8; 3]], &[Need]),
+        (pixels, updates): (&[[u8; 3]], &[PixelUpdate]),
         histogram: &Histogram,
         bins: &[Sample],
         bound: u8,
     ) -> Option<Self> {
         let mut room = (self.palette.colours.len() + 1).next_power_of_two() - 1;
         for again in [true, true, true, true, false] {
-            let mut far = self.too_far((pixels, needs), histogram, bound)?;
+            let mut far = self.too_far((pixels, updates), histogram, bound)?;
             if far.is_empty() {
                 return Some(self);
             }
-            // The one first that stands in for most of the others.
+            // First the colour that can replace most of the others.
             let mut added = Vec::new();
             let covered =
                 |rgb, far: &[[u8; 3]]| far.iter().filter(|far| levels_off(**far, rgb) <= bound).count();
             while let Some(&rgb) = far.iter().max_by_key(|rgb| covered(**rgb, &far)) {
                 added.push(rgb);
                 far.retain(|&other| levels_off(other, rgb) > bound);
-                if added.len() > MOST_ADDED {
+                if added.len() > MAX_ADDED {
                     return None;
                 }
             }
@@ -111,10 +111,10 @@ impl Quantised {
         None
     }
 
-    /// The colours that are drawn and have no entry within `bound`; `None` if there are too many.
+    /// Returns the colours that are drawn and have no entry within `bound`, or `None` if there are too many.
     fn too_far(
         &self,
-        (pixels, needs): (&[[u8; 3]], &[Need]),
+        (pixels, updates): (&[[u8; 3]], &[PixelUpdate]),
         histogram: &Histogram,
         bound: u8,
     ) -> Option<Vec<[u8; 3]>> {
@@ -129,18 +129,18 @@ impl Quantised {
             histogram.bins().iter().map(Bin::colour).filter_map(far).collect()
         } else {
             let parts =
-                pixels.par_chunks(PART).zip(needs.par_chunks(PART)).flat_map_iter(|(pixels, needs)| {
-                    let drawn = pixels.iter().zip(needs).filter(|(_, need)| need.may_draw());
-                    drawn.filter_map(|(&rgb, _)| far(rgb)).take(MOST_FAR)
+                pixels.par_chunks(PART).zip(updates.par_chunks(PART)).flat_map_iter(|(pixels, updates)| {
+                    let drawn = pixels.iter().zip(updates).filter(|(_, update)| update.may_draw());
+                    drawn.filter_map(|(&rgb, _)| far(rgb)).take(MAX_FAR)
                 });
             parts.collect()
         };
         found.sort_unstable();
         found.dedup();
-        (found.len() < MOST_FAR).then_some(found)
+        (found.len() < MAX_FAR).then_some(found)
     }
 
-    /// So many of the colours of the palette, without those that others can stand in for best.
+    /// Returns `count` colours of the palette: those that others could replace best are left out.
     fn most_useful(&self, bins: &[Bin], count: usize) -> Vec<[u8; 3]> {
         let colours = &self.palette.colours;
         if colours.len() <= count {
@@ -156,7 +156,7 @@ impl Quantised {
         costs[..count].iter().map(|&(_, at)| colours[at]).collect()
     }
 
-    /// With other colours, most of which are the same.
+    /// Quantises to other colours, most of which are those of this palette.
     fn with(&self, colours: Vec<[u8; 3]>, histogram: &Histogram, bins: &[Sample]) -> Self {
         let place = |rgb: &[u8; 3]| {
             colours.binary_search(rgb).unwrap_or_else(|next| next.min(colours.len() - 1)) as u8
@@ -170,10 +170,10 @@ impl Quantised {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::histogram::MOST_BINS;
+    use crate::histogram::MAX_BINS;
 
     fn of_fewer(colours: impl Iterator<Item = [u8; 3]>, count: u32) -> (usize, f32) {
-        let mut histogram = Histogram::new(MOST_BINS);
+        let mut histogram = Histogram::new(MAX_BINS);
         colours.for_each(|rgb| histogram.add(rgb, count));
         let bins = Sample::of_bins(&histogram);
         let Quantised { palette, nearest, error } =
@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn a_colour_that_is_too_far_off_is_taken_in_and_what_cannot_be_is_refused() {
-        let mut histogram = Histogram::new(MOST_BINS);
+        let mut histogram = Histogram::new(MAX_BINS);
         (0..400_u16).for_each(|k| histogram.add([(k / 4) as u8, (k % 4) as u8 * 8, 90], 1_000));
         histogram.add([255, 0, 255], 1);
         let bins = Sample::of_bins(&histogram);

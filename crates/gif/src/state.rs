@@ -1,8 +1,8 @@
-//! An animation between two frames as bytes, so that another process can go on with it.
+//! The state of an animation between two frames as bytes, so that another process can continue it.
 //!
-//! Says how numbers and pixels are written; what an encoder has to write, its parts say themselves. A state begins with a
-//! mark and the hash of the encoder's sources: another version might go on with other bytes, so it refuses. The rest is
-//! compressed by gzip, whose checksum finds damage.
+//! This module defines how numbers and pixels are written; each part of the encoder defines its own content. A state
+//! starts with a mark and the hash of the encoder's sources. A state of another version is refused, because its bytes
+//! might differ. The rest is compressed by gzip, whose checksum detects damage.
 
 use std::io::{self, Read, Write};
 
@@ -14,13 +14,13 @@ use crate::error::Error;
 
 const MARK: [u8; 8] = *b"rayfgif\n";
 
-/// The hash of the encoder's sources, by `build.rs`.
+/// The hash of the encoder's sources, computed by `build.rs`.
 const SOURCES: &str = env!("RAYFOLD_GIF_SOURCES");
 
-/// Most pixels are seen as they are meant, or nearly: little effort makes them small.
+/// Most pixels are seen exactly or nearly so: little effort makes them small.
 const EFFORT: Compression = Compression::fast();
 
-/// Writes a state.
+/// A writer of a state.
 pub(crate) struct StateWriter(GzEncoder<Vec<u8>>);
 
 impl StateWriter {
@@ -55,12 +55,14 @@ impl StateWriter {
     }
 }
 
-/// Reads a state. What cannot be read is [`Error::State`].
+/// A reader of a state. Reports unreadable bytes as [`Error::State`].
 pub(crate) struct StateReader<'a>(GzDecoder<&'a [u8]>);
 
 impl<'a> StateReader<'a> {
     pub(crate) fn new(state: &'a [u8]) -> Result<Self, Error> {
-        let Some(rest) = state.strip_prefix(&MARK) else { return Err(damaged("it is none of this encoder")) };
+        let Some(rest) = state.strip_prefix(&MARK) else {
+            return Err(damaged("it is not a state of this encoder"));
+        };
         let Some((found, rest)) = rest.split_first_chunk() else { return Err(damaged("it is cut off")) };
         if *found != version().to_le_bytes() {
             return Err(Error::StateVersion);
@@ -74,7 +76,7 @@ impl<'a> StateReader<'a> {
         Ok(array)
     }
 
-    /// So many bytes; memory grows with what is there, not with what is asked for.
+    /// Reads `count` bytes. Memory grows with the bytes that exist, not with `count`.
     pub(crate) fn bytes(&mut self, count: usize) -> Result<Vec<u8>, Error> {
         let mut bytes = Vec::new();
         self.0.by_ref().take(count as u64).read_to_end(&mut bytes).map_err(unreadable)?;
@@ -101,7 +103,7 @@ impl<'a> StateReader<'a> {
         self.array().map(f64::from_le_bytes)
     }
 
-    /// Checks that nothing follows, and with it the checksum.
+    /// Checks that nothing follows, which also checks the checksum.
     pub(crate) fn finish(mut self) -> Result<(), Error> {
         match self.0.read(&mut [0]).map_err(unreadable)? {
             0 => Ok(()),
@@ -111,7 +113,7 @@ impl<'a> StateReader<'a> {
 }
 
 fn version() -> u64 {
-    // A number, as `build.rs` wrote it.
+    // A number, as `build.rs` printed it.
     SOURCES.parse().unwrap_or_default()
 }
 

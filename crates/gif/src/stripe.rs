@@ -1,72 +1,73 @@
-//! Chooses the palette index of each pixel while LZW reads the indices.
+//! Chooses the palette index of each pixel while LZW compresses the indices.
 //!
-//! LZW writes a string of indices that is in its code table as one code. So where the best index would end the string, an
-//! index that is nearly as good and continues it is taken instead.
+//! LZW writes a string of indices that is in its code table as one code. So if the best index would end the string,
+//! an index that is nearly as good and continues it is used instead.
 //!
-//! The palette's error is spread by error diffusion: the residual of a pixel, what was meant minus what is shown, is
+//! Error diffusion spreads the palette's error: the residual of a pixel, its intended minus its shown colour, is
 //! divided between the pixels to the right and below. Three rules keep the file small:
 //!
-//! - A pixel corrects a part of the residual that reaches it, the more the farther its nearest palette entry is from it,
-//!   and only in smooth surroundings, where the eye sees the mean of neighbouring pixels.
-//! - Mostly this only decides between indices that continue the string. An index that is not the nearest begins a new
-//!   string only when that saves much error.
-//! - Where much of the frame changes, the tolerance grows with the palette's own error, and more in rough surroundings.
+//! - A pixel corrects a part of the residual that reaches it. The part grows with the distance of its nearest palette
+//!   entry. It is corrected only in smooth surroundings, where the eye sees the mean of neighbouring pixels.
+//! - Mostly this only decides between indices that continue the string. An index other than the nearest begins a new
+//!   string only if that saves much error.
+//! - If much of the frame changes, the tolerance grows with the palette's own error, and more in rough surroundings.
 //!
-//! A block is divided into stripes of rows, which are worked on in parallel; each is a part of the image data with a code
-//! table of its own.
+//! A block is divided into stripes of rows, which are processed in parallel. Each is a part of the image data with
+//! its own code table.
 
 use rayon::prelude::*;
 
-use crate::allowance::Redrawn;
 use crate::block::{self, Area, Block};
 use crate::colour::{self, LocalMetric};
 use crate::histogram::Histogram;
 use crate::lzw::{Part, Writer};
 use crate::nearest::Nearest;
-use crate::needs::Need;
 use crate::palette::Palette;
+use crate::refine_budget::Redrawn;
+use crate::update_map::PixelUpdate;
 
 /// The additional squared error (see [`colour`]) that an index may have if it makes the file smaller.
 const TOLERANCE: f32 = 5.85;
-/// The same where no pixel may be off by more than `FEW_LEVELS`: there a larger error is not seen either.
+/// The tolerance if no pixel may be off by more than `FEW_LEVELS`: there a larger error is not seen either.
 const TOLERANCE_IF_FEW_LEVELS: f32 = 9.0;
 const FEW_LEVELS: u8 = 2;
-/// The same where much of the frame changes, for each unit of the palette's mean error; the larger of the two holds. Such
-/// pixels are soon drawn anew, and need no better colours than the palette has.
+/// The tolerance per unit of the palette's mean error if much of the frame changes. The larger of both tolerances
+/// holds. Such pixels are soon redrawn, and need no better colours than the palette has.
 const TOLERANCE_BY_ERROR: f32 = 1.36;
-/// Added to it there where the surroundings are not smooth.
+/// The addition to that tolerance in surroundings that are not smooth.
 const TOLERANCE_IF_ROUGH: f32 = 10.0;
-/// A pixel that stays is drawn anew only if its squared error becomes so many times smaller: a smaller gain is not worth
-/// the flicker.
+/// A static pixel is redrawn only if its squared error shrinks by this factor: a smaller gain is
+/// not worth the flicker.
 const MUCH_BETTER: f32 = 2.0;
-/// The surroundings of a pixel are smooth if its level errors against the pixels to the left and above add up to at most
-/// this, and `SMOOTH_BY_ERROR` more for each unit of its nearest entry's squared error.
+/// The surroundings of a pixel are smooth if the sum of its level errors against the pixels to the left and above is
+/// at most this. `SMOOTH_BY_ERROR` is added per unit of the squared error of its nearest entry.
 const SMOOTH: f32 = 24.0;
 const SMOOTH_BY_ERROR: f32 = 0.6;
-/// The squared error of the nearest entry up to which a pixel corrects nothing.
+/// A pixel corrects nothing up to this squared error of the nearest entry.
 const SMALL: f32 = 6.0;
-/// The part of the residual that a pixel corrects for each unit of error above `SMALL`, and the largest part.
+/// The part of the residual that a pixel corrects per unit of error above `SMALL`, and the largest part.
 const CORRECTED: f32 = 0.022;
-const MOST_CORRECTED: f32 = 0.8;
-/// From this part of the frame on that is drawn because it changed, a pixel corrects as much as stated. Below, it corrects
-/// proportionally less, but at least `LEAST_PART` of it.
+const MAX_CORRECTED: f32 = 0.8;
+/// If this part of the frame or more is drawn because it changed, a pixel corrects the full amount. Below, it
+/// corrects proportionally less, but at least `LEAST_PART` of it.
 const MUCH_CHANGED: f64 = 0.4;
 const LEAST_PART: f32 = 0.4;
-/// The part of a residual that is diffused, one half of it to the right and one half down.
+/// The part of a residual that is diffused: half of it to the right and half down.
 const DIFFUSED: f32 = 0.8;
 /// The largest residual of a channel, in levels.
-const MOST_RESIDUAL: f32 = 24.0;
+const MAX_RESIDUAL: f32 = 24.0;
 /// The squared error that an index other than the nearest must save to begin a new string.
 const NEW_STRING: f32 = 40.0;
-/// The nearest entry is taken without comparing others if it continues the string and the residual adds at most this to
-/// its squared error.
+/// The nearest entry is used without comparing others if it continues the string and the residual adds at most this
+/// to its squared error.
 const AT_ONCE: f32 = 3.0;
-/// The most pixels of a stripe. Smaller stripes make the file larger: each begins with an empty code table.
+/// The largest number of pixels of a stripe. Smaller stripes make the file larger, because each begins with
+/// an empty code table.
 const STRIPE: usize = 160_000;
-/// Smaller ones are not worth a thread.
+/// The smallest stripe that is worth a thread.
 const LEAST_STRIPE: usize = 30_000;
 
-/// What a frame is drawn with.
+/// The colours with which a frame is drawn.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Colours<'a> {
     pub(crate) palette: &'a Palette,
@@ -77,19 +78,19 @@ pub(crate) struct Colours<'a> {
     pub(crate) transparent: Option<u8>,
     /// The part of the frame that is drawn because it changed.
     pub(crate) changed: f64,
-    /// Mean squared error of what is drawn.
+    /// The mean squared error of the pixels drawn.
     pub(crate) error: f32,
-    /// How far a pixel may be off; the nearest entries are within it.
+    /// The largest error of a pixel in levels. The nearest entries are within it.
     pub(crate) bound: u8,
 }
 
-/// Where a block lies, and how it is divided.
+/// The position of a block, and its division into stripes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Layout<'a> {
     pub(crate) area: Area,
-    /// Of the whole frame.
+    /// The width of the whole frame.
     pub(crate) width: usize,
-    /// The palette, and the index that leaves a pixel as it is.
+    /// The palette. `transparent` is the index that leaves a pixel as it is.
     pub(crate) colours: &'a [[u8; 3]],
     pub(crate) transparent: Option<u8>,
     pub(crate) delay_cs: u16,
@@ -97,8 +98,8 @@ pub(crate) struct Layout<'a> {
     pub(crate) stripes: usize,
 }
 
-/// Runs `draw` on stripes of whole rows of the layout's area, in parallel: with a writer, the stripe's first row, and what
-/// is seen in whole rows of the frame from there on. Returns the block and the results.
+/// Runs `draw` in parallel on stripes of whole rows of the layout's area. Its arguments are a writer, the first row
+/// of the stripe, and the canvas in whole rows of the frame from that row on. Returns the block and the results.
 pub(crate) fn in_stripes<R: Send>(
     layout: Layout<'_>,
     seen: &mut [[u8; 3]],
@@ -108,7 +109,7 @@ pub(crate) fn in_stripes<R: Send>(
     let bits = block::bits(colours.len() + usize::from(transparent.is_some()));
     let height = area.bottom - area.top;
     let pixels = (area.right - area.left) * height;
-    // An even number: with an odd one, one of two threads would wait for the last stripe.
+    // An even number. With an odd one, one of two threads would wait for the last stripe.
     let count = match pixels.div_ceil(STRIPE) {
         1 => stripes.min((pixels / LEAST_STRIPE).max(1)),
         many => many.next_multiple_of(2).max(stripes),
@@ -124,34 +125,34 @@ pub(crate) fn in_stripes<R: Send>(
     (Block::new(area, colours, transparent, delay_cs, &parts), results)
 }
 
-/// Chooses indices row by row.
+/// The choice of indices in a stripe, row by row.
 #[derive(Debug)]
 pub(crate) struct Stripe<'a> {
     colours: Colours<'a>,
     writer: &'a mut Writer,
     redrawn: Redrawn,
     metric: LocalMetric,
-    /// The part of the residual that a pixel corrects, for each unit of error.
+    /// The part of the residual that a pixel corrects per unit of error.
     corrected: f32,
-    /// Where the surroundings are smooth, and where not.
+    /// The tolerances in smooth and in other surroundings.
     tolerances: [f32; 2],
     /// The residual that each pixel of the row above diffuses down.
     from_above: Vec<[f32; 3]>,
 }
 
-/// Part of a row of a frame: its pixels, what they need, and what a viewer sees.
+/// A part of a row of a frame: its pixels, their updates, and the canvas.
 pub(crate) struct Row<'a> {
     pub(crate) pixels: &'a [[u8; 3]],
-    /// Of the frame, in the row above.
+    /// The pixels of the frame in the row above.
     pub(crate) above: &'a [[u8; 3]],
-    pub(crate) needs: &'a [Need],
+    pub(crate) updates: &'a [PixelUpdate],
     pub(crate) seen: &'a mut [[u8; 3]],
 }
 
 impl<'a> Stripe<'a> {
     pub(crate) fn new(colours: Colours<'a>, writer: &'a mut Writer) -> Self {
         let part = (colours.changed / MUCH_CHANGED).min(1.0) as f32;
-        // A viewer may see the first frame for long.
+        // A viewer may see the first frame for a long time.
         let soon_gone = if colours.transparent.is_some() { part } else { 0.0 };
         let least = if colours.bound <= FEW_LEVELS { TOLERANCE_IF_FEW_LEVELS } else { TOLERANCE };
         let tolerance = least.max(TOLERANCE_BY_ERROR * colours.error * soon_gone);
@@ -166,7 +167,7 @@ impl<'a> Stripe<'a> {
         }
     }
 
-    /// What all rows together drew anew.
+    /// Returns the pixels that all rows together redrew.
     pub(crate) fn redrawn(self) -> Redrawn {
         self.redrawn
     }
@@ -178,25 +179,25 @@ impl<'a> Stripe<'a> {
         self.from_above.resize(row.pixels.len(), [0.0; 3]);
         let mut diffused = [0.0; 3];
         for k in 0..row.pixels.len() {
-            let (now, need, seen) = (row.pixels[k], row.needs[k], row.seen[k]);
+            let (now, update, seen) = (row.pixels[k], row.updates[k], row.seen[k]);
             let above = self.from_above[k];
             let residual = [diffused[0] + above[0], diffused[1] + above[1], diffused[2] + above[2]];
             diffused = [0.0; 3];
-            let index = match need {
-                Need::Keep => {
+            let index = match update {
+                PixelUpdate::Keep => {
                     let transparent = transparent.unwrap_or(0);
                     self.writer.put(transparent);
                     transparent
                 }
-                Need::Either => self.kept_or_repeated(now, seen, previous),
-                Need::Refine | Need::Draw => {
+                PixelUpdate::Either => self.kept_or_repeated(now, seen, previous),
+                PixelUpdate::Refine | PixelUpdate::Draw => {
                     if last.0 != now || last.1.is_none() {
                         last = (now, Some(self.nearest(now)));
                     }
                     let Some(entry) = last.1 else { continue };
                     let levels = colour::levels(now);
                     if entry.error > SMALL && row.is_smooth(k, entry.error) {
-                        let part = ((entry.error - SMALL) * self.corrected).min(MOST_CORRECTED);
+                        let part = ((entry.error - SMALL) * self.corrected).min(MAX_CORRECTED);
                         let target = [
                             levels[0] + part * residual[0],
                             levels[1] + part * residual[1],
@@ -215,7 +216,7 @@ impl<'a> Stripe<'a> {
             previous = Some(index);
             if Some(index) != transparent {
                 let colour = self.colour(index);
-                if need == Need::Refine {
+                if update == PixelUpdate::Refine {
                     self.redrawn.count(self.metric.error(seen, colour), colour::levels_apart(seen, colour));
                 }
                 row.seen[k] = colour;
@@ -223,8 +224,8 @@ impl<'a> Stripe<'a> {
         }
     }
 
-    /// The index of a pixel that may be drawn or left: transparent, unless that would end the string and the index of the
-    /// pixel before does not, and is no worse.
+    /// Returns the index of a pixel that may be drawn or left. It is transparent, unless that would end the string
+    /// and the index of the pixel before continues it and is no worse.
     fn kept_or_repeated(&mut self, now: [u8; 3], seen: [u8; 3], previous: Option<u8>) -> u8 {
         let transparent = self.colours.transparent.unwrap_or(0);
         if self.writer.extend(transparent) {
@@ -244,18 +245,18 @@ impl<'a> Stripe<'a> {
         index
     }
 
-    /// The error above that of the best index that is accepted to make the file smaller.
+    /// Returns the error above that of the best index that is accepted to make the file smaller.
     fn tolerance(&self, row: &Row<'_>, k: usize, entry: Nearest) -> f32 {
         let [smooth, rough] = self.tolerances;
         if rough > smooth && !row.is_smooth(k, entry.error) { rough } else { smooth }
     }
 
-    /// Writes the index of a pixel that is to be drawn, and returns it.
+    /// Writes the index of a pixel that is drawn, and returns it.
     ///
-    /// `target`: the pixel's levels with the corrected part of the residual. `entry`: the palette entry nearest to the
-    /// pixel itself. `new_string`: the error that another index must save to begin a new string.
+    /// `target`: the levels of the pixel plus the corrected part of the residual. `entry`: the palette entry nearest
+    /// to the pixel itself. `new_string`: the error that another index must save to begin a new string.
     fn drawn(&mut self, row: &Row<'_>, k: usize, target: [f32; 3], entry: Nearest, new_string: f32) -> u8 {
-        let (now, need, seen) = (row.pixels[k], row.needs[k], row.seen[k]);
+        let (now, update, seen) = (row.pixels[k], row.updates[k], row.seen[k]);
         // No error and no bytes. A pixel that is seen right may also be left, which is tried below.
         if entry.error == 0.0
             && (self.colours.transparent.is_none() || now != seen)
@@ -269,12 +270,12 @@ impl<'a> Stripe<'a> {
             && self.is_within(now, seen)
         {
             let shown = form.error(target, colour::levels(seen));
-            let bound = if need == Need::Refine { MUCH_BETTER * nearest } else { nearest };
+            let bound = if update == PixelUpdate::Refine { MUCH_BETTER * nearest } else { nearest };
             if bound >= shown {
                 self.writer.put(transparent);
                 return transparent;
             }
-            if need != Need::Refine
+            if update != PixelUpdate::Refine
                 && shown <= nearest + self.tolerances[1]
                 && shown <= nearest + self.tolerance(row, k, entry)
                 && self.writer.extend(transparent)
@@ -309,7 +310,7 @@ impl<'a> Stripe<'a> {
         if !tried(best.0) && self.writer.extend(best.0) {
             return best.0;
         }
-        // Of those that continue the string, the one with the least error within the tolerance.
+        // Of the indices that continue the string, the one with the least error within the tolerance.
         let mut candidates = self.writer.may_continue(&others.indices);
         let mut found = best;
         if candidates != 0 || best.0 != entry.index {
@@ -333,7 +334,7 @@ impl<'a> Stripe<'a> {
         found.0
     }
 
-    /// The palette entry nearest to a colour, or the closest where that one is too far off.
+    /// Returns the palette entry nearest to a colour, or the closest in levels if that one is too far off.
     fn nearest(&self, now: [u8; 3]) -> Nearest {
         let bin = self.colours.histogram.find(now).unwrap_or(0);
         let entry = self.colours.nearest[bin];
@@ -354,7 +355,7 @@ impl<'a> Stripe<'a> {
 }
 
 impl Row<'_> {
-    /// Whether the surroundings of a pixel are smooth. `error`: of its nearest palette entry.
+    /// Returns whether the surroundings of a pixel are smooth. `error`: the error of its nearest palette entry.
     fn is_smooth(&self, k: usize, error: f32) -> bool {
         let (now, left) = (self.pixels[k], self.pixels[k.saturating_sub(1)]);
         let step = colour::level_error(now, left) + colour::level_error(now, self.above[k]);
@@ -362,25 +363,24 @@ impl Row<'_> {
     }
 }
 
-/// What a pixel passes on to each of two others: its share of the residual that reached the pixel, plus what is meant,
-/// minus what is shown.
+/// Returns the residual that a pixel passes to each of two others: half of the diffused part of its own residual. That
+/// is the residual that reached the pixel, plus its intended minus its shown colour.
 fn diffuse(residual: [f32; 3], meant: [f32; 3], shown: [f32; 3]) -> [f32; 3] {
-    let channel = |k: usize| {
-        (residual[k] + meant[k] - shown[k]).clamp(-MOST_RESIDUAL, MOST_RESIDUAL) * (0.5 * DIFFUSED)
-    };
+    let channel =
+        |k: usize| (residual[k] + meant[k] - shown[k]).clamp(-MAX_RESIDUAL, MAX_RESIDUAL) * (0.5 * DIFFUSED);
     [channel(0), channel(1), channel(2)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::histogram::MOST_BINS;
+    use crate::histogram::MAX_BINS;
 
     const SIDE: usize = 64;
 
-    /// What is seen of a square of one colour.
+    /// Returns the canvas after a square of one colour was drawn.
     fn drawn(rgb: [u8; 3], colours: &[[u8; 3]]) -> Vec<[u8; 3]> {
-        let mut histogram = Histogram::new(MOST_BINS);
+        let mut histogram = Histogram::new(MAX_BINS);
         histogram.add(rgb, 1);
         let palette = Palette::new(colours.to_vec());
         let point = colour::point_of(rgb);
@@ -400,8 +400,8 @@ mod tests {
         let mut stripe = Stripe::new(colours, &mut writer);
         let mut seen = vec![[0; 3]; SIDE * SIDE];
         for seen in seen.chunks_mut(SIDE) {
-            let (pixels, needs) = ([rgb; SIDE], [Need::Draw; SIDE]);
-            stripe.draw(Row { pixels: &pixels, above: &pixels, needs: &needs, seen });
+            let (pixels, updates) = ([rgb; SIDE], [PixelUpdate::Draw; SIDE]);
+            stripe.draw(Row { pixels: &pixels, above: &pixels, updates: &updates, seen });
         }
         seen
     }
@@ -417,7 +417,7 @@ mod tests {
             diffuse([1.0, -2.0, 0.0], [100.0; 3], [98.0, 104.0, 100.0]),
             [3.0 * half, -6.0 * half, 0.0]
         );
-        let most = MOST_RESIDUAL * half;
+        let most = MAX_RESIDUAL * half;
         assert_eq!(diffuse([0.0; 3], [255.0, 0.0, 10.0], [0.0, 255.0, 0.0]), [most, -most, 10.0 * half]);
     }
 

@@ -1,4 +1,4 @@
-//! Frames that come faster than players show them are left out.
+//! Drops frames that come faster than players show them.
 
 use std::io;
 
@@ -7,17 +7,17 @@ use image::RgbImage;
 use crate::error::{Error, LONGEST_SIDE};
 use crate::state::{StateReader, StateWriter, damaged};
 
-/// Frames a second where there are too many: every player shows one for two hundredths of a second.
+/// The frame rate after thinning: every player shows a frame for two hundredths of a second.
 const THINNED_FPS: f64 = 50.0;
 
-/// Leaves out frames of an animation that has more of them a second than players show.
+/// A filter that drops frames of an animation with more frames per second than players show.
 ///
-/// Of each fiftieth of a second the first frame stays, but of the last one the last: an animation ends with its last
-/// frame.
+/// Of each fiftieth of a second the first frame stays. Of the last one the last frame stays, so that an animation
+/// ends with its last frame.
 #[derive(Debug)]
 pub struct Thinning {
     fps: f64,
-    /// Whether frames are left out.
+    /// Frames are dropped.
     thins: bool,
     pushed: u64,
     held: Option<Held>,
@@ -27,24 +27,24 @@ pub struct Thinning {
 #[derive(Debug)]
 struct Held {
     first: RgbImage,
-    /// The newest, if it is another one.
+    /// The newest frame, unless it is `first`.
     last: Option<RgbImage>,
 }
 
 impl Thinning {
-    /// For an animation of `fps` frames a second, of which players show at most `most_fps`.
+    /// Makes a filter for an animation of `fps` frames per second, of which players show at most `most_fps`.
     #[must_use]
     pub fn new(fps: f64, most_fps: f64) -> Self {
         Self { fps, thins: fps > most_fps, pushed: 0, held: None }
     }
 
-    /// Frames a second that are left.
+    /// Returns the frame rate after thinning.
     #[must_use]
     pub fn fps(&self) -> f64 {
         if self.thins { THINNED_FPS } else { self.fps }
     }
 
-    /// How many of so many frames are left.
+    /// Returns how many of this many frames remain.
     #[must_use]
     pub fn left_of(&self, frames: u64) -> u64 {
         match frames.checked_sub(1) {
@@ -53,12 +53,12 @@ impl Thinning {
         }
     }
 
-    /// The number of the fiftieth of a second in which a frame begins.
+    /// Returns the number of the fiftieth of a second in which a frame begins.
     fn slot(&self, frame: u64) -> u64 {
         (frame as f64 * THINNED_FPS / self.fps).floor() as u64
     }
 
-    /// Takes the next frame, and returns the next one that is left, if that is known already.
+    /// Takes the next frame. Returns the next frame that remains, if that is known already.
     pub fn push(&mut self, frame: RgbImage) -> Option<RgbImage> {
         let number = self.pushed;
         self.pushed += 1;
@@ -75,19 +75,19 @@ impl Thinning {
         }
     }
 
-    /// The last frame, unless it was returned before.
+    /// Returns the last frame, unless it was returned before.
     pub fn finish(&mut self) -> Option<RgbImage> {
         self.held.take().map(|held| held.last.unwrap_or(held.first))
     }
 }
 
 impl Thinning {
-    /// Columns and rows of the frames that are held.
+    /// Returns columns and rows of the frames that are held.
     pub(crate) fn size(&self) -> Option<(u32, u32)> {
         self.held.as_ref().map(|held| held.first.dimensions())
     }
 
-    /// Writes down what is held.
+    /// Writes the frames that are held.
     pub(crate) fn write(&self, state: &mut StateWriter) -> io::Result<()> {
         let Some(Held { first, last }) = &self.held else { return state.bytes(&[0]) };
         state.bytes(&[1 + u8::from(last.is_some())])?;
@@ -97,7 +97,7 @@ impl Thinning {
         last.as_ref().map_or(Ok(()), |last| state.bytes(last.as_raw()))
     }
 
-    /// Reads what was written after so many frames.
+    /// Reads the state that was written after `pushed` frames.
     pub(crate) fn read(self, state: &mut StateReader<'_>, pushed: u64) -> Result<Self, Error> {
         let count = state.u8()?;
         if count > 2 || count > 0 && !self.thins {
@@ -117,7 +117,7 @@ impl Thinning {
     }
 }
 
-/// Columns and rows that a frame can have.
+/// Reads the columns and rows of a frame, and checks that the format can hold them.
 pub(crate) fn read_size(state: &mut StateReader<'_>) -> Result<(u32, u32), Error> {
     let sides = (state.u64()?, state.u64()?);
     let side = |side: u64| u32::try_from(side).ok().filter(|side| (1..=LONGEST_SIDE).contains(side));
@@ -131,7 +131,7 @@ pub(crate) fn read_size(state: &mut StateReader<'_>) -> Result<(u32, u32), Error
 mod tests {
     use super::*;
 
-    /// The numbers of the frames that are left of `count`.
+    /// Returns the numbers of the frames that remain of `count`.
     fn left(fps: f64, count: u32) -> Vec<u8> {
         let mut thinning = Thinning::new(fps, 50.0);
         let expected = thinning.left_of(count.into());

@@ -1,19 +1,20 @@
-//! When each frame is shown.
+//! The delay of each frame.
 //!
-//! A GIF counts in hundredths of a second, and players slow a delay below two of them down to ten. So frame `k` starts
-//! at `100 k / fps` rounded, which carries the rounding error from frame to frame (30 fps gives 3, 4, 3, ...). Above 50
-//! frames a second some are [left out](crate::Thinning), and each of the others is shown for two hundredths.
+//! A GIF counts in hundredths of a second, and players slow a delay below two of them down to ten. So frame
+//! `k` starts at `100 k / fps` rounded, which carries the rounding error from frame to frame (30 fps gives 3,
+//! 4, 3, ...). Above 50 frames per second some are [dropped](crate::Thinning), and each of the others is
+//! shown for two hundredths.
 
 use crate::error::Error;
 
-/// The shortest delay that players keep to, in hundredths of a second.
+/// The shortest delay that players respect, in hundredths of a second.
 const SHORTEST_DELAY_CS: u64 = 2;
 /// The longest delay that the format can hold, in hundredths of a second.
 const LONGEST_DELAY_CS: f64 = 65_535.0;
-/// The most frames a second that [`SHORTEST_DELAY_CS`] leaves room for.
-pub(crate) const MOST_FPS: f64 = 100.0 / SHORTEST_DELAY_CS as f64;
+/// The largest frame rate for which [`SHORTEST_DELAY_CS`] leaves room.
+pub(crate) const MAX_FPS: f64 = 100.0 / SHORTEST_DELAY_CS as f64;
 
-/// Hands out delays for frames in order.
+/// A source of delays for frames in order.
 #[derive(Debug, Clone)]
 pub(crate) struct Timeline {
     fps: f64,
@@ -28,21 +29,21 @@ impl Timeline {
         Ok(Self { fps, next: 0 })
     }
 
-    /// The same, with so many frames handed out.
+    /// Returns a timeline that has already handed out `frames` delays.
     pub(crate) fn after(self, frames: u64) -> Self {
         Self { next: frames, ..self }
     }
 
-    /// How many frames have a delay.
+    /// Returns the number of frames that have a delay.
     pub(crate) fn handed_out(&self) -> u64 {
         self.next
     }
 
-    /// The delay of the next frame in hundredths of a second.
+    /// Returns the delay of the next frame in hundredths of a second.
     pub(crate) fn advance(&mut self) -> u16 {
         let k = self.next;
         self.next += 1;
-        let start = |k: u64| (k as f64 * 100.0 / self.fps.min(MOST_FPS)).round();
+        let start = |k: u64| (k as f64 * 100.0 / self.fps.min(MAX_FPS)).round();
         (start(k + 1) - start(k)).min(LONGEST_DELAY_CS) as u16
     }
 }

@@ -1,4 +1,4 @@
-//! The assemble function's animator: PNG frames to a GIF by `rayfold-gif`, piece by piece.
+//! The assemble function's animator: encodes PNG frames to a GIF with `rayfold-gif`, piece by piece.
 
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -11,10 +11,10 @@ use rayfold_scene::{AnimationSettings, Limits};
 
 use crate::{png, pool};
 
-/// Makes GIFs.
+/// An animator that makes GIFs.
 #[derive(Debug, Clone, Copy)]
 pub struct GifAnimator {
-    /// Of a frame; what claims to have more is none that was drawn here.
+    /// The largest number of pixels of a frame. A file that claims more was not drawn by rayfold.
     pub most_pixels: u64,
 }
 
@@ -43,9 +43,9 @@ impl Animator for GifAnimator {
     }
 }
 
-/// A GIF being encoded.
+/// A GIF that is being encoded.
 pub struct GifEncoding {
-    /// `None` while a frame is worked on, and after a failure.
+    /// `None` while a frame is being encoded, and after a failure.
     encoder: Option<Encoder<Shelf>>,
     ready: Shelf,
     most_pixels: u64,
@@ -93,7 +93,7 @@ fn failed_before() -> Reason {
     Reason::new("the encoder failed on an earlier frame")
 }
 
-/// Where the encoder leaves what it has written until it is fetched.
+/// A buffer in which the encoder leaves its output until it is fetched.
 #[derive(Debug, Clone, Default)]
 struct Shelf(Arc<Mutex<Vec<u8>>>);
 

@@ -1,46 +1,47 @@
-//! What a function answers: an outcome for each record, or the failure that makes the platform try again.
+//! The answer of a function: an outcome per record, or a failure that makes the platform retry.
 //!
-//! What would be the same at the next try (a bad script, a key of no interest, an unreadable event) is written down and
-//! is no failure. Only what may pass is one, and then the whole batch comes again: records that are done cost a few
-//! requests and no work.
+//! An error that would be the same at the next try (a bad script, a key of no interest, an unreadable event) is
+//! recorded and is no failure. Only a transient error is a failure, and then the whole batch comes again. For records
+//! that are done this costs a few requests and no work.
 
 use rayfold_pipeline::Error;
 use serde::Serialize;
 
-/// The answer of a call that the platform need not repeat.
+/// The answer to a call that the platform need not repeat.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Answer {
-    /// In the order of the records.
+    /// The outcomes in the order of the records.
     pub outcomes: Vec<Outcome>,
-    /// Messages of the failure queue that are to come again.
+    /// The messages of the failure queue that must come again.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub batch_item_failures: Vec<BatchItem>,
 }
 
-/// What came of a record.
+/// The outcome of a record.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Outcome {
     /// The key, or the animation that was swept.
     pub of: String,
-    /// In a word or a sentence.
+    /// The result in a word or a sentence.
     pub what: String,
 }
 
-/// A message that is to come again.
+/// A message that must come again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct BatchItem {
-    /// Its id.
+    /// The id of the message.
     pub item_identifier: String,
 }
 
-/// At least one record could not be worked on for now.
+/// A failure: at least one record could not be processed for now.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", .0.iter().map(|(key, error)| format!("{}: {key}", chain(error))).collect::<Vec<_>>().join("; "))]
 pub struct Failed(pub Vec<(String, Error)>);
 
-/// An error with its causes. Starts with the error's own words: the platform hands them to whoever records the failure.
+/// Formats an error with its causes. Starts with the error's own message, because the platform passes it on to the
+/// record of the failure.
 pub(crate) fn chain(error: &Error) -> String {
     let mut text = error.to_string();
     let mut source = std::error::Error::source(error);
@@ -52,8 +53,8 @@ pub(crate) fn chain(error: &Error) -> String {
     text
 }
 
-/// Whether another try could end otherwise.
-pub(crate) fn may_pass(error: &Error) -> bool {
+/// Returns whether another try could succeed.
+pub(crate) fn is_transient(error: &Error) -> bool {
     !matches!(error, Error::Key { .. })
 }
 

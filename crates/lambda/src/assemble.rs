@@ -1,4 +1,4 @@
-//! The assemble function: claims, the sweep, and events that failed for good.
+//! The assemble function: claims, the sweep, and events that failed permanently.
 
 use rayfold_pipeline::assemble::{Assembled, assemble};
 use rayfold_pipeline::failure::{Failure, Recorded, parse_record, record_failure};
@@ -7,16 +7,16 @@ use rayfold_pipeline::sweep::sweep;
 use rayfold_pipeline::{Error, Policy};
 use serde_json::Value;
 
-use crate::answer::{Answer, BatchItem, Failed, Outcome, chain, may_pass};
+use crate::answer::{Answer, BatchItem, Failed, Outcome, chain, is_transient};
 use crate::context::{Call, Context};
 use crate::event::{Event, FAILURE_QUEUE, Message, Sweep, Unreadable};
 use crate::logs::ms;
 use crate::records;
 
-/// Works on a payload.
+/// Handles a payload.
 ///
 /// # Errors
-/// [`Failed`] when another try may end otherwise; for messages of the failure queue the answer says so instead.
+/// [`Failed`] if another try may succeed. For messages of the failure queue the answer lists them instead.
 pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value) -> Result<Answer, Failed> {
     match Event::parse(payload) {
         Ok(Event::Objects(objects)) => {
@@ -24,7 +24,7 @@ pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value)
         }
         Ok(Event::Failures(messages)) => Ok(failures(context, call, messages).await),
         Ok(Event::Sweep(how)) => clean(context, call, how).await,
-        // Acknowledged, the batch would be deleted: so it comes again, and ends among the dead letters.
+        // If it were acknowledged, the batch would be deleted. So it comes again, and ends in the dead-letter queue.
         Err(Unreadable::Malformed { of: FAILURE_QUEUE, source }) => {
             tracing::error!(request_id = %call.request_id, error = %source, "unreadable batch");
             let error = Error::Malformed { key: "the failure queue's batch".into(), source: source.into() };
@@ -37,7 +37,7 @@ pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value)
     }
 }
 
-/// Works on one claim.
+/// Handles one claim.
 async fn record<S: Store>(context: &Context<S>, call: &Call, key: String) -> Result<String, Error> {
     let assembled = assemble(&context.invocation(&context.policy, call), &context.animator, &key).await?;
     let Some(assembled) = assembled else {
@@ -70,14 +70,15 @@ async fn failures<S: Store>(context: &Context<S>, call: &Call, messages: Vec<Mes
         let failures = match parse_record(body.as_bytes()) {
             Ok(failures) => failures,
             Err(error) => {
-                // It comes again, for a newer version may read it, until the queue moves it to the dead letters.
+                // The message comes again, because a newer version may read it, until the queue moves it
+                // to the dead letters.
                 tracing::error!(request_id = %call.request_id, id, error = chain(&error), "unreadable record");
                 answer.batch_item_failures.push(BatchItem { item_identifier: id });
                 continue;
             }
         };
         if failures.is_empty() {
-            // The schedule's, for example: the next sweep does what this one would have done.
+            // For example one of the schedule: the next sweep does what this one would have done.
             tracing::error!(request_id = %call.request_id, id, unhandled = true, "a failed event about no object");
         }
         for failure in failures {
@@ -101,7 +102,7 @@ async fn write_down<S: Store>(context: &Context<S>, call: &Call, failure: &Failu
         Ok(Recorded::GivenUp(_)) => "given up".to_owned(),
         Ok(Recorded::Refused(_)) => "refused".to_owned(),
         Ok(Recorded::LeftToSweep) => "left to the sweep".to_owned(),
-        Err(error) if may_pass(&error) => {
+        Err(error) if is_transient(&error) => {
             tracing::error!(request_id = %call.request_id, key = failure.key, error = chain(&error), "failed");
             return Err(error);
         }
@@ -152,7 +153,7 @@ async fn clean<S: Store>(context: &Context<S>, call: &Call, how: Sweep) -> Resul
                     answer.outcomes.push(Outcome { of: animation.to_string(), what: "swept".into() });
                 }
             }
-            // The next sweep comes soon; one animation's trouble is not the others'.
+            // The next sweep comes soon, and an error of one animation must not stop the others.
             Err(error) => {
                 tracing::error!(
                     request_id = %call.request_id,
@@ -187,7 +188,7 @@ mod tests {
     use crate::logs::tests::Kept;
     use crate::raytracer::RayTracer;
 
-    /// A bucket that fails whatever is asked of one animation's GIF.
+    /// A bucket in which every request for the GIF of one animation fails.
     struct Faulty(MemoryStore<SystemClock>);
 
     impl Store for Faulty {

@@ -1,72 +1,74 @@
-//! What one invocation bears, and into how many bands a frame is cut that is more than that.
+//! The capacity of an invocation, and the number of bands for a frame that exceeds it.
 //!
-//! Time is measured: thin strips of the frame are drawn, spread over its height, until it is clear whether the whole fits.
-//! Frames of few rays are not measured at all; they are drawn, and whoever sees that take too long cuts after all. Memory is
-//! reckoned from pixels. Knows no scene, only numbers.
+//! Time is measured: thin strips of the frame, spread over its height, are drawn until it is clear whether the whole
+//! fits. Frames of few rays are drawn without measurement; if one takes too long, it is cut after all. Memory is
+//! computed from the number of pixels. This module knows no scene, only numbers.
 
 use std::num::NonZeroU32;
 use std::ops::Range;
 use std::time::Duration;
 
-/// Up to so many rays from the camera a frame is drawn without being measured: on the slowest machine most take seconds.
+/// A frame with at most this many camera rays is drawn without measurement: on the slowest machine most take seconds.
 pub(crate) const FEW_RAYS: u64 = 1 << 24;
 
-/// Rows of a strip: those of a tile of most pictures.
+/// The rows of a strip, which are the rows of a tile of most pictures.
 pub(crate) const STRIP: u32 = 16;
 
-/// The most strips that are drawn to measure a frame.
-const MOST_STRIPS: u32 = 16;
+/// The largest number of strips that are drawn to measure a frame.
+const MAX_STRIPS: u32 = 16;
 
-/// A frame is drawn in one piece if that is estimated to take at most this share of the time that is left. Estimates by a
-/// few strips were off by a factor of up to 1.7 (docs/decisions/frames-in-bands.md).
+/// A frame is drawn in one piece if that is estimated to take at most this share of the remaining time. Estimates
+/// from a few strips were off by a factor of up to 1.7 (docs/decisions/frames-in-bands.md).
 const WHOLE_SHARE: f64 = 0.5;
 
-/// The same of a band: its rows may be the dearest, and its processor a slower one.
+/// The share for a band: its rows may be the most expensive ones, and its processor a slower one.
 const BAND_SHARE: f64 = 0.4;
 
-/// If the dearest strip, so many times dearer, still fits, no more are drawn.
+/// No more strips are drawn if the frame would fit even if all rows cost this many times the most expensive strip.
 const SURELY: f64 = 8.0;
 
-/// After this share of the time a drawing is stopped that was expected to fit, so that there is time to cut it.
+/// A drawing that was expected to fit is stopped after this share of the time, so that there is time to cut it.
 pub(crate) const STOP_SHARE: f64 = 0.8;
 
-/// A function's memory that pixels may take; the rest is for the script, what is prepared of it, and the program.
+/// The share of the function's memory that pixels may take. The rest is for the script, the prepared
+/// scene, and the program.
 const PIXELS_SHARE: f64 = 0.5;
 
-/// Bytes of a pixel of the image and of its PNG, which may be as large and is copied when it grows.
+/// The bytes per pixel of the image and of its PNG. The PNG may be as large as the image, and is
+/// copied when it grows.
 const IMAGE_BYTES: u64 = 9;
 
-/// The most bands that a frame is cut into where nobody says otherwise: each is an invocation that somebody pays.
-pub const MOST_BANDS: NonZeroU32 = NonZeroU32::new(64).expect("64 is not zero");
+/// The default maximum number of bands of a frame. Each band is an invocation that is billed.
+pub const MAX_BANDS: NonZeroU32 = NonZeroU32::new(64).expect("64 is not zero");
 
-/// What an invocation has.
+/// The resources of an invocation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacity {
-    /// Bytes of the function's memory, if it is known.
+    /// The function's memory in bytes, if it is known.
     pub memory: Option<u64>,
-    /// The most bands that a frame is cut into; with one no frame is.
+    /// The maximum number of bands of a frame. With 1, no frame is cut.
     pub most_bands: NonZeroU32,
 }
 
 impl Default for Capacity {
     fn default() -> Self {
-        Self { memory: None, most_bands: MOST_BANDS }
+        Self { memory: None, most_bands: MAX_BANDS }
     }
 }
 
-/// A frame, as far as its size goes.
+/// The quantities of a frame that depend on its size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Extent {
     pub(crate) width: u32,
     pub(crate) height: u32,
-    /// Bytes that a pixel takes while it is drawn, beside the image.
+    /// The bytes per pixel while it is drawn, besides the image.
     pub(crate) pixel_bytes: u64,
-    /// Rows above and below a band that are drawn with it.
+    /// The rows above and below a band that are drawn with it.
     pub(crate) margin: u32,
 }
 
 impl Extent {
-    /// What drawing so many rows takes, and their file.
+    /// Returns the memory for drawing this many rows and for their file.
     fn bytes(&self, rows: u32) -> u64 {
         let width = u64::from(self.width);
         let drawn = u64::from(rows.saturating_add(self.margin.saturating_mul(2)).min(self.height));
@@ -74,45 +76,45 @@ impl Extent {
         width.saturating_mul(drawing.saturating_add(u64::from(rows).saturating_mul(IMAGE_BYTES)))
     }
 
-    /// What putting the frame together takes: its file, and one band of it.
+    /// Returns the memory for joining the frame: its file, and one band.
     fn bytes_joined(&self, bands: u32) -> u64 {
         let rows = u64::from(self.height) + u64::from(self.height.div_ceil(bands));
         u64::from(self.width).saturating_mul(rows).saturating_mul(IMAGE_BYTES - 3)
     }
 }
 
-/// What was measured of a frame.
+/// The measurements of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Measured {
-    /// Before the first pixel: reading the script, preparing the scene. Each band takes this, too.
+    /// The time before the first pixel: reading the script, preparing the scene. Each band takes this time, too.
     pub(crate) before: Duration,
-    /// A row on the average, in seconds.
+    /// The mean time of a row, in seconds.
     pub(crate) row: f64,
-    /// A row of the dearest strip.
+    /// The time of a row of the most expensive strip, in seconds.
     pub(crate) dearest_row: f64,
 }
 
-/// What is to be done about a frame.
+/// The decision about a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Verdict {
-    /// It fits.
+    /// The frame fits into an invocation.
     Whole,
-    /// It is drawn in so many bands.
+    /// The frame is drawn in this many bands.
     Bands(NonZeroU32),
-    /// It fits in no number of bands that may be: what it takes, and what there is.
+    /// The frame fits in no allowed number of bands. The text says what it takes, and what there is.
     TooBig(String),
 }
 
 impl Capacity {
-    /// Whether any frame is cut.
+    /// Returns whether frames may be cut.
     pub(crate) fn cuts(&self) -> bool {
         self.most_bands.get() > 1
     }
 
-    /// The least number of bands that memory allows.
+    /// Returns the least number of bands that memory allows.
     ///
     /// # Errors
-    /// How much it would take and how much there is, if no number does.
+    /// Returns what the frame would take and what there is, if no number of bands suffices.
     fn bands_by_memory(&self, extent: &Extent) -> Result<NonZeroU32, String> {
         let Some(memory) = self.memory else { return Ok(NonZeroU32::MIN) };
         let room = (memory as f64 * PIXELS_SHARE) as u64;
@@ -138,7 +140,7 @@ impl Capacity {
         })
     }
 
-    /// What to do about a frame whose time is not known, or short.
+    /// Decides about a frame whose time is unknown or short.
     pub(crate) fn judge_memory(&self, extent: &Extent) -> Verdict {
         match self.bands_by_memory(extent) {
             Ok(bands) if bands.get() == 1 => Verdict::Whole,
@@ -147,7 +149,8 @@ impl Capacity {
         }
     }
 
-    /// What to do about a frame that was measured, in an invocation that has so much time `left`, as others will have.
+    /// Decides about a frame that was measured, in an invocation with the time `left`. The invocations for
+    /// bands have as much.
     pub(crate) fn judge(&self, extent: &Extent, measured: &Measured, left: Duration) -> Verdict {
         let by_memory = match self.bands_by_memory(extent) {
             Ok(bands) => bands,
@@ -162,10 +165,10 @@ impl Capacity {
         let most = self.most_bands.get().min(extent.height);
         let margin = 2.0 * f64::from(extent.margin);
         let band = |bands: f64| before + (height / bands + margin).min(height) * measured.dearest_row;
-        // What is left of a band's share for its own rows.
+        // The part of a band's share that remains for its own rows.
         let own = BAND_SHARE * left - before - margin * measured.dearest_row;
         let wanted = if own > 0.0 { (height * measured.dearest_row / own).ceil() } else { f64::INFINITY };
-        // Estimates are not exact: what may fit though it takes more than its share is tried.
+        // Estimates are not exact: a band that may fit is tried, even if it takes more than its share.
         if most < 2 || wanted > f64::from(most) && band(f64::from(most)) > left {
             let share = if most < 2 {
                 String::new()
@@ -181,23 +184,24 @@ impl Capacity {
         Verdict::Bands(by_memory.max(NonZeroU32::new(wanted).unwrap_or(by_memory)))
     }
 
-    /// Whether more strips need be drawn: not if the whole would fit even if all were so many times dearer than the dearest.
+    /// Returns whether no more strips need be drawn: the frame would fit even if every row cost [`SURELY`] times
+    /// the most expensive one.
     pub(crate) fn is_sure(&self, extent: &Extent, measured: &Measured, left: Duration) -> bool {
         let most = measured.before.as_secs_f64() + SURELY * f64::from(extent.height) * measured.dearest_row;
         most <= WHOLE_SHARE * left.as_secs_f64()
     }
 }
 
-/// Rounded up, so that what is more than there is does not look the same.
+/// Converts to megabytes, rounded up, so that a size above the limit does not look equal to it.
 fn megabytes(bytes: u64) -> u64 {
     bytes.div_ceil(1 << 20)
 }
 
-/// The strips of a frame of so many rows, in the order in which they are drawn: whoever stops early has seen places all over
-/// it. Together they are at most a sixteenth of a high frame.
+/// Returns the strips of a frame in the order in which they are drawn. After any number of them, the places measured
+/// are spread over the frame. Together they are at most a sixteenth of a high frame.
 pub(crate) fn strips(height: u32) -> impl Iterator<Item = Range<u32>> {
     let rows_of_strips = height.div_ceil(STRIP);
-    let count = (rows_of_strips / MOST_STRIPS).clamp(1, MOST_STRIPS);
+    let count = (rows_of_strips / MAX_STRIPS).clamp(1, MAX_STRIPS);
     let bits = count.next_power_of_two().trailing_zeros();
     let order = (0..count.next_power_of_two())
         .map(move |k| if bits == 0 { 0 } else { k.reverse_bits() >> (u32::BITS - bits) });
@@ -234,7 +238,7 @@ mod tests {
         assert_eq!(Capacity::default().judge_memory(&extent(u32::MAX, u32::MAX, 64, 9)), Verdict::Whole);
     }
 
-    /// Each band, its margin included, takes at most its share of the time, as far as it is known.
+    /// Each band, its margin included, takes at most its share of the time, according to the measurements.
     #[test]
     fn bands_of_a_frame_that_takes_long_take_their_share() {
         let mut dice = fastrand::Rng::with_seed(5);
@@ -277,7 +281,7 @@ mod tests {
         // A short time does not make fewer of them.
         let known = measured(0, 0.02, 0.02);
         assert_eq!(capacity(1769, 64).judge(&frame, &known, MINUTES), Verdict::Bands(bands));
-        // Half of so little holds no file of all pixels.
+        // Half of this memory cannot hold a file of all pixels.
         let Verdict::TooBig(why) = capacity(256, 64).judge_memory(&frame) else { panic!() };
         assert!(why.starts_with("8000 x 8000 pixels take 4456 MB of memory, in 64 bands"), "{why}");
         assert!(why.contains("the render function has 128 MB"), "{why}");
@@ -316,7 +320,7 @@ mod tests {
             sorted.sort_by_key(|rows| rows.start);
             sorted.dedup();
             assert_eq!(sorted.len(), strips.len());
-            // The first two are a half of the frame apart, more or less.
+            // The first two are about half of the frame apart.
             if let [first, second, ..] = &strips[..] {
                 assert!(first.start.abs_diff(second.start) > height / 4, "{strips:?}");
             }

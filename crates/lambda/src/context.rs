@@ -1,4 +1,4 @@
-//! What a process makes once, at its cold start, and keeps while it is warm.
+//! The context that a process makes once, at its cold start, and keeps while it is warm.
 
 use std::env;
 use std::str::FromStr;
@@ -12,41 +12,42 @@ use crate::animator::GifAnimator;
 use crate::limits::{capacity, limits, most_frames};
 use crate::raytracer::RayTracer;
 
-/// The store's client and what the steps are given.
+/// The store's client and the inputs of the steps.
 #[derive(Debug)]
 pub struct Context<S> {
-    /// The bucket.
+    /// The client of the bucket.
     pub store: S,
-    /// Its name: events of others are not ours.
+    /// The name of the bucket. Events of other buckets are ignored.
     pub bucket: String,
-    /// Draws.
+    /// The renderer of frames.
     pub renderer: RayTracer,
-    /// Makes the GIF.
+    /// The animator that makes the GIF.
     pub animator: GifAnimator,
-    /// The numbers of the protocol.
+    /// The parameters of the protocol.
     pub policy: Policy,
-    /// Spreads the invocations that would collide.
+    /// The random source that spreads invocations which would collide.
     pub random: Randomness,
 }
 
 /// One call of the function.
 #[derive(Clone, Debug)]
 pub struct Call {
-    /// The platform's name for the event; its retries share it.
+    /// The platform's id of the event, which its retries share.
     pub request_id: String,
-    /// When the platform kills the process.
+    /// The time at which the platform kills the process.
     pub deadline: Timestamp,
 }
 
 impl Context<S3Store> {
-    /// From the function's environment: `RAYFOLD_BUCKET`, and the standard AWS variables for who and where.
+    /// Reads the function's environment: `RAYFOLD_BUCKET`, and the standard AWS variables for credentials and region.
     ///
-    /// `RAYFOLD_MAX_OBJECTS` and its like bound what a script may ask for. `RAYFOLD_QUIET_MS` and `RAYFOLD_STUCK_AFTER_MS`
-    /// change the pauses of the protocol, `RAYFOLD_ATTEMPTS` how often the sweep wakes a frame before it gives it up,
-    /// `RAYFOLD_SPARE_FRAMES` how early an assembler leaves a long GIF to the next one; `RAYFOLD_SEED` makes random pauses repeatable.
+    /// `RAYFOLD_MAX_OBJECTS` and the other `RAYFOLD_MAX_` variables limit scripts. `RAYFOLD_QUIET_MS` and
+    /// `RAYFOLD_STUCK_AFTER_MS` set the pauses of the protocol. `RAYFOLD_ATTEMPTS` sets how often the sweep wakes a
+    /// frame before it gives up. `RAYFOLD_SPARE_FRAMES` sets how early an assembler leaves a long GIF to the next
+    /// one. `RAYFOLD_SEED` makes random pauses repeatable.
     ///
     /// # Errors
-    /// What is missing in the environment, or unreadable.
+    /// Returns which variable is missing or unreadable.
     pub async fn from_environment() -> anyhow::Result<Self> {
         let bucket = env::var("RAYFOLD_BUCKET").context("RAYFOLD_BUCKET must name the bucket")?;
         let store = S3Store::from_environment(&bucket).await?;
@@ -76,7 +77,7 @@ impl Context<S3Store> {
 }
 
 impl<S: Store> Context<S> {
-    /// What the pipeline's steps work with during a call.
+    /// Returns the context of the pipeline's steps during a call.
     pub(crate) fn invocation<'a>(
         &'a self,
         policy: &'a Policy,
@@ -91,7 +92,7 @@ fn number<T: FromStr<Err: std::error::Error + Send + Sync + 'static>>(
     name: &str,
 ) -> anyhow::Result<Option<T>> {
     match env::var(name) {
-        Ok(text) => Ok(Some(text.parse().with_context(|| format!("{name}={text} is no number"))?)),
+        Ok(text) => Ok(Some(text.parse().with_context(|| format!("{name}={text} is not a number"))?)),
         Err(_) => Ok(None),
     }
 }

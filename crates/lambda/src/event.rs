@@ -1,82 +1,82 @@
-//! What wakes a function, out of the JSON that the platform sends.
+//! Parsing of the JSON payloads with which the platform invokes a function.
 //!
-//! S3's events come in AWS's shape and in MinIO's (which prefixes names with `s3:`, escapes slashes in keys and adds
-//! fields), the schedule's as Terraform writes it or as EventBridge does by default, failed events in a batch of SQS.
-//! Knows no pipeline: keys stay text, decoded.
+//! S3's events have AWS's shape or MinIO's, which prefixes names with `s3:`, escapes slashes in keys and adds fields.
+//! The schedule's have the shape in which Terraform writes it or EventBridge's default. Failed events come in a batch
+//! of SQS. This module knows no pipeline: it decodes keys, and leaves them as text.
 
 use aws_lambda_events::event::s3::S3Event;
 use rayfold_pipeline::keys::decode_event_key;
 use serde::Deserialize;
 use serde_json::Value;
 
-/// What a malformed batch of the failure queue looks like an event of.
+/// The `of` of [`Unreadable::Malformed`] for a batch of the failure queue.
 pub const FAILURE_QUEUE: &str = "SQS";
 
-/// Why a payload is none of ours. It would be the same at the next try.
+/// The reason why a payload cannot be read. It would be the same at the next try.
 #[derive(Debug, thiserror::Error)]
 pub enum Unreadable {
-    /// No shape that is known here.
-    #[error("the payload is no event of S3, SQS or the schedule")]
+    /// The payload has none of the known shapes.
+    #[error("unknown payload: expected an S3, SQS or schedule event")]
     Unknown,
-    /// Almost.
-    #[error("the payload looks like an event of {of} but is none")]
+    /// The payload resembles a known event, but is malformed.
+    #[error("malformed {of} event")]
     Malformed {
-        /// Whose.
+        /// The source of the event.
         of: &'static str,
-        /// What is wrong with it.
+        /// The error of the parser.
         source: serde_json::Error,
     },
 }
 
-/// What wakes a function.
+/// An event that invokes a function.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// Objects came or went.
+    /// Objects were created or deleted.
     Objects(Vec<ObjectEvent>),
-    /// Events that failed for good.
+    /// Events that failed permanently.
     Failures(Vec<Message>),
-    /// It is time to sweep.
+    /// The schedule asks for a sweep.
     Sweep(Sweep),
 }
 
-/// How to sweep.
+/// The mode of a sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sweep {
-    /// Patiently: what is pending may be queued.
+    /// Pending work may be queued, so only work that has waited for long is woken.
     Patient,
-    /// Nothing can be queued, as nobody listened for events until now: whatever is pending is woken.
+    /// No event can be queued, because nothing received events until now: all pending work is woken.
     CatchUp,
 }
 
-/// An object came or went.
+/// The event that an object was created or deleted.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ObjectEvent {
-    /// Of which bucket.
+    /// The name of the bucket.
     pub bucket: String,
-    /// Decoded; as it came when that is no text.
+    /// The decoded key, or the raw one if it cannot be decoded.
     pub key: String,
 }
 
 /// A message of the failure queue.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
-    /// What the queue knows it by.
+    /// The id by which the queue knows the message.
     pub id: String,
     /// The record of the failed event.
     pub body: String,
 }
 
 impl Event {
-    /// Reads a payload.
+    /// Parses a payload.
     ///
     /// # Errors
-    /// [`Unreadable`].
+    /// Returns [`Unreadable`] if the payload is no known event.
     pub fn parse(payload: Value) -> Result<Self, Unreadable> {
         if payload["sweep"] == Value::Bool(true) || payload["detail-type"] == "Scheduled Event" {
             let catch_up = payload["catch_up"] == Value::Bool(true);
             return Ok(Self::Sweep(if catch_up { Sweep::CatchUp } else { Sweep::Patient }));
         }
-        // What S3 sends when its notifications are set up: about no object.
+        // S3 sends this when notifications are set up. It is about no object.
         if payload["Event"] == "s3:TestEvent" {
             return Ok(Self::Objects(Vec::new()));
         }

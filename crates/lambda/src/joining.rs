@@ -1,5 +1,5 @@
-//! Bands of a frame, each a PNG, to the PNG of the frame: row by row through the encoder that draws in one piece, so that the
-//! bytes are the same. Holds the file that it writes, and one band.
+//! Joins the bands of a frame, each a PNG, to the PNG of the frame. The rows go through the same encoder as a frame
+//! in one piece, so the bytes are the same. Holds the file that it writes, and one band.
 
 use std::num::NonZeroU64;
 
@@ -10,17 +10,17 @@ use rayfold_pipeline::manifest::Reason;
 
 use crate::{png, pool};
 
-/// A frame being put together.
+/// A frame that is joined from bands.
 pub struct PngJoining {
     size: (u32, u32),
-    /// Those to come.
+    /// The bands that are still to come, the last first.
     bands: Vec<Band>,
-    /// `None` while a band is worked on, and after a failure.
+    /// `None` while a band is being encoded, and after a failure.
     rows: Option<png::Rows>,
 }
 
 impl PngJoining {
-    /// A frame of so many columns and rows, in so many bands.
+    /// Begins a frame of this size, in columns and rows, made of `count` bands.
     pub(crate) fn begin(size: (u32, u32), count: NonZeroU64) -> Result<Self, Reason> {
         if count.get() > u64::from(size.1) {
             return Err(Reason::new(format!("a frame of {} rows has no {count} bands", size.1)));
@@ -106,7 +106,7 @@ mod tests {
         let count = NonZeroU64::new(2).unwrap();
         let right = bands(count);
         let mut joining = PngJoining::begin((23, 17), count).unwrap();
-        // The second one has a row more; others are none at all.
+        // The second band has a row more; the others are no bands at all.
         for wrong in [right[1].clone(), right[0].slice(..40), Bytes::from("garbage"), Bytes::new()] {
             assert!(joining.push(wrong).await.is_err());
         }

@@ -1,12 +1,13 @@
-//! The render and the assemble function on AWS Lambda, thin: events in, the pipeline's steps, outcomes and logs out.
+//! The render and the assemble function on AWS Lambda, as thin wrappers: they take events, run the pipeline's steps,
+//! and return outcomes and logs.
 //!
-//! The two binaries are this crate with another handler. The store's client is made once a cold start. Handlers take
-//! the payload as JSON and know nothing of the runtime, so that they are tested without it; what a step decides is not
-//! decided again here. `raytracer` and `animator` are what the steps draw and animate with.
+//! The two binaries are this crate with different handlers. The store's client is made once per cold start. Handlers
+//! take the payload as JSON and know nothing of the runtime, so they are tested without it. A handler repeats no
+//! decision of a step. `raytracer` and `animator` are the steps' renderer and animator.
 //!
-//! Invariants: a batch gives an outcome a record; what another try cannot change never fails an invocation; what nothing
-//! here could handle stays in its queue, or is logged with `unhandled`, which an alarm watches; logs are JSON and hold no
-//! script contents.
+//! Invariants: a batch gives one outcome per record. An error that another try cannot change never fails an
+//! invocation. A message that cannot be handled stays in its queue, or is logged with `unhandled`, which an alarm
+//! watches. Logs are JSON and hold no script contents.
 
 pub mod animator;
 pub mod answer;
@@ -34,22 +35,22 @@ use serde_json::Value;
 use answer::{Answer, Failed};
 use context::{Call, Context};
 
-/// Which function a process is.
+/// The function that a process runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Function {
-    /// Draws a frame.
+    /// It renders a frame.
     Render,
-    /// Writes the GIF, sweeps, records failed events.
+    /// It writes the GIF, sweeps, and records failed events.
     Assemble,
 }
 
-/// Serves the runtime until it ends.
+/// Serves the Lambda runtime until it ends.
 ///
 /// # Errors
-/// What is missing in the environment, or the runtime's.
+/// Returns what is missing in the environment, or the error of the runtime.
 pub fn run(function: Function) -> anyhow::Result<()> {
     logs::start();
-    // One invocation at a time: a thread for requests and timers; the pixels have the rayon pool.
+    // There is one invocation at a time, so one thread serves requests and timers. The pixels have the rayon pool.
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
     runtime.block_on(async {
         let context = Arc::new(

@@ -1,21 +1,21 @@
-//! What a script may ask for at most, out of the function's environment.
+//! The limits of scripts, from the function's environment.
 //!
-//! Whoever may upload makes the account pay, and a script too large for the function's memory fails three times before
-//! it is given up. So the limits are settings of the stack. Knows only names and numbers; what a limit means is
-//! [`Limits`]'s.
+//! Every upload costs the owner of the account money, and a script too large for the function's memory fails three
+//! times before it is given up. So the limits are settings of the stack. This module knows only names and numbers;
+//! [`Limits`] defines their meaning.
 
 use std::num::{NonZeroU32, NonZeroU64};
 
 use anyhow::Context as _;
 use rayfold_scene::Limits;
 
-use crate::capacity::{Capacity, MOST_BANDS};
+use crate::capacity::{Capacity, MAX_BANDS};
 
-/// The default limits, changed by the variables that `variable` finds: `RAYFOLD_MAX_SCRIPT_BYTES`, `RAYFOLD_MAX_OBJECTS`,
-/// `RAYFOLD_MAX_LIGHTS`, `RAYFOLD_MAX_PIXELS` and `RAYFOLD_MAX_FRAMES` (of one script).
+/// Reads the default limits, as changed by the variables that `variable` finds: `RAYFOLD_MAX_SCRIPT_BYTES`,
+/// `RAYFOLD_MAX_OBJECTS`, `RAYFOLD_MAX_LIGHTS`, `RAYFOLD_MAX_PIXELS` and `RAYFOLD_MAX_FRAMES` (of one script).
 ///
 /// # Errors
-/// The variable that is no whole number of at least 1.
+/// Returns an error if a variable is no whole number of at least 1.
 pub(crate) fn limits(variable: impl Fn(&str) -> Option<String>) -> anyhow::Result<Limits> {
     let default = Limits::default();
     let number = |name: &str| number(&variable, name);
@@ -26,31 +26,31 @@ pub(crate) fn limits(variable: impl Fn(&str) -> Option<String>) -> anyhow::Resul
         max_objects: size("RAYFOLD_MAX_OBJECTS")?.unwrap_or(default.max_objects),
         max_lights: size("RAYFOLD_MAX_LIGHTS")?.unwrap_or(default.max_lights),
         max_pixels: number("RAYFOLD_MAX_PIXELS")?.unwrap_or(default.max_pixels),
-        // Each is an invocation, also where nobody has set a limit.
+        // Each frame is an invocation, so there is a limit even by default.
         max_frames: size("RAYFOLD_MAX_FRAMES")?.or(usize::try_from(Limits::FRAMES).ok()),
         max_described: default.max_described,
     })
 }
 
-/// How many frames an animation may have, by `RAYFOLD_MAX_ANIMATION_FRAMES`; without it any number.
+/// Reads the largest number of frames of an animation from `RAYFOLD_MAX_ANIMATION_FRAMES`. `None` means no limit.
 ///
 /// # Errors
-/// When the variable is no whole number of at least 1.
+/// Returns an error if the variable is no whole number of at least 1.
 pub(crate) fn most_frames(variable: impl Fn(&str) -> Option<String>) -> anyhow::Result<Option<u64>> {
     number(&variable, "RAYFOLD_MAX_ANIMATION_FRAMES")
 }
 
-/// What an invocation bears, by Lambda's own `AWS_LAMBDA_FUNCTION_MEMORY_SIZE`, in megabytes, and `RAYFOLD_MAX_BANDS`, into how
-/// many bands a frame may be cut.
+/// Reads the capacity of an invocation: its memory in megabytes from Lambda's own `AWS_LAMBDA_FUNCTION_MEMORY_SIZE`,
+/// and the largest number of bands of a frame from `RAYFOLD_MAX_BANDS`.
 ///
 /// # Errors
-/// When one of them is no whole number of at least 1.
+/// Returns an error if one of them is no whole number of at least 1.
 pub(crate) fn capacity(variable: impl Fn(&str) -> Option<String>) -> anyhow::Result<Capacity> {
     let megabytes = number(&variable, "AWS_LAMBDA_FUNCTION_MEMORY_SIZE")?;
     let bands = number(&variable, "RAYFOLD_MAX_BANDS")?.map(|bands| u32::try_from(bands).unwrap_or(u32::MAX));
     Ok(Capacity {
         memory: megabytes.map(|megabytes| megabytes.saturating_mul(1 << 20)),
-        most_bands: bands.and_then(NonZeroU32::new).unwrap_or(MOST_BANDS),
+        most_bands: bands.and_then(NonZeroU32::new).unwrap_or(MAX_BANDS),
     })
 }
 
@@ -116,7 +116,7 @@ mod tests {
         }
     }
 
-    /// The stack must set variables that are read here, and each of them.
+    /// The stack must set variables that are read here, and all of them.
     #[test]
     fn the_stack_sets_these_variables() {
         let stack = include_str!("../../../infra/terraform/functions.tf");

@@ -1,7 +1,7 @@
-//! Logs as JSON, a line an event, to standard output, where the platform collects them.
+//! JSON logs, one line per event, to standard output, where the platform collects them.
 //!
-//! Script contents are never logged: they are the user's. What nobody will see to unless an alarm tells them carries the
-//! field `unhandled = true`, which the stack's alarms count.
+//! Script contents are never logged, because they belong to the user. An error that neither a retry nor a receipt
+//! covers carries the field `unhandled = true`, which the stack's alarms count.
 
 use std::env;
 
@@ -9,20 +9,20 @@ use tracing::Subscriber;
 use tracing::level_filters::LevelFilter;
 use tracing_subscriber::fmt::MakeWriter;
 
-/// From here on, events of at least the platform's level are logged (`AWS_LAMBDA_LOG_LEVEL`; INFO without it).
+/// Starts logging events of at least the platform's level (`AWS_LAMBDA_LOG_LEVEL`; default: INFO).
 pub(crate) fn start() {
     let level = env::var("AWS_LAMBDA_LOG_LEVEL").ok().and_then(|level| level.parse().ok());
     let format = json(std::io::stdout, level.unwrap_or(LevelFilter::INFO));
-    // One logger a process: a second start finds the first.
+    // A process has one logger: a second start finds the first.
     let _ = tracing::subscriber::set_global_default(format);
 }
 
-/// Whole milliseconds, the unit of every duration that is logged.
+/// Returns whole milliseconds, the unit of every duration that is logged.
 pub(crate) fn ms(duration: std::time::Duration) -> u64 {
     u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)
 }
 
-/// The format of the logs.
+/// Returns the format of the logs.
 fn json<W>(writer: W, level: LevelFilter) -> impl Subscriber + Send + Sync
 where
     W: for<'a> MakeWriter<'a> + Send + Sync + 'static,
@@ -45,7 +45,7 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// Lines of a log.
+    /// The lines of a log.
     #[derive(Clone, Default)]
     pub(crate) struct Kept(Arc<Mutex<Vec<u8>>>);
 
@@ -60,7 +60,7 @@ pub(crate) mod tests {
     }
 
     impl Kept {
-        /// From here on, and until the guard goes, the thread's events are kept.
+        /// Keeps the thread's events from now on until the guard is dropped.
         pub(crate) fn start() -> (Self, tracing::subscriber::DefaultGuard) {
             let kept = Self::default();
             let writer = kept.clone();
@@ -68,7 +68,7 @@ pub(crate) mod tests {
             (kept, guard)
         }
 
-        /// The lines that the alarm of the stack counts: those that match `{ $.unhandled IS TRUE }`.
+        /// Returns the lines that the alarm of the stack counts: those that match `{ $.unhandled IS TRUE }`.
         pub(crate) fn unhandled(&self) -> Vec<serde_json::Value> {
             let bytes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             let lines = std::str::from_utf8(&bytes).unwrap().lines();

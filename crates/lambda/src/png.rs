@@ -1,5 +1,5 @@
-//! Frames as the bucket keeps them: PNG files of exactly an image's RGB pixels. The bytes of a file depend on its pixels
-//! alone, not on how many rows at a time came in.
+//! Frames in the form in which the bucket stores them: PNG files of exactly an image's RGB pixels. The bytes of a
+//! file depend on its pixels alone, not on the number of rows per write.
 
 use std::io::{Cursor, Write};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,33 +10,33 @@ use image::error::{LimitError, LimitErrorKind};
 use image::{ImageDecoder, ImageError, ImageResult, RgbImage};
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, Filter, StreamWriter};
 
-/// Bytes of a chunk of the file.
+/// The size of a chunk of the file in bytes.
 const CHUNK: usize = 1 << 16;
 
-/// Of what a PNG can hold at most, 16 bits of red, green, blue and alpha.
+/// The largest number of bytes per pixel of a PNG: 16 bits each of red, green, blue and alpha.
 const BYTES_A_PIXEL: u64 = 8;
 
-/// An image as a PNG.
+/// Encodes an image as PNG.
 ///
 /// # Errors
-/// When the image cannot be held as PNG, which one with pixels always can.
+/// An error if the image cannot be stored as PNG, which is always possible for one with pixels.
 pub(crate) fn encode(image: &RgbImage) -> Result<Bytes, EncodingError> {
     let mut rows = Rows::begin(image.width(), image.height())?;
     rows.push(image.as_raw())?;
     rows.finish()
 }
 
-/// A PNG being written, from the top. Memory for its file and a few rows.
+/// A PNG that is written from the top. Takes memory for its file and a few rows.
 pub(crate) struct Rows {
     writer: StreamWriter<'static, Sink>,
     sink: Sink,
 }
 
 impl Rows {
-    /// An image of so many columns and rows.
+    /// Begins an image of this many columns and rows.
     ///
     /// # Errors
-    /// When there are none, or more than the format knows.
+    /// An error if there are none, or more than the format allows.
     pub(crate) fn begin(width: u32, height: u32) -> Result<Self, EncodingError> {
         let sink = Sink::default();
         let mut encoder = Encoder::new(sink.clone(), width, height);
@@ -51,22 +51,22 @@ impl Rows {
     /// Adds the RGB pixels of the next rows.
     ///
     /// # Errors
-    /// When they are more than the image has.
+    /// An error if the image has fewer rows.
     pub(crate) fn push(&mut self, pixels: &[u8]) -> Result<(), EncodingError> {
         Ok(self.writer.write_all(pixels)?)
     }
 
-    /// The file.
+    /// Returns the finished file.
     ///
     /// # Errors
-    /// When rows are missing.
+    /// An error if rows are missing.
     pub(crate) fn finish(self) -> Result<Bytes, EncodingError> {
         self.writer.finish()?;
         Ok(std::mem::take(&mut *self.sink.0.lock().unwrap_or_else(PoisonError::into_inner)).into())
     }
 }
 
-/// Where the encoder, which keeps what it writes to, leaves the file.
+/// A buffer in which the encoder, which owns its writer, leaves the file.
 #[derive(Clone, Default)]
 struct Sink(Arc<Mutex<Vec<u8>>>);
 
@@ -81,17 +81,17 @@ impl Write for Sink {
     }
 }
 
-/// The RGB pixels of a PNG.
+/// Decodes the RGB pixels of a PNG.
 ///
 /// # Errors
-/// What is wrong with the file; one of more than `most_pixels` is refused before anything is decoded.
+/// The error of the decoder. A file of more than `most_pixels` is refused before anything is decoded.
 pub(crate) fn decode(png: &[u8], most_pixels: u64) -> ImageResult<RgbImage> {
     let mut decoder = PngDecoder::new(Cursor::new(png))?;
     let (width, height) = decoder.dimensions();
     if u64::from(width) * u64::from(height) > most_pixels {
         return Err(ImageError::Limits(LimitError::from_kind(LimitErrorKind::DimensionError)));
     }
-    // What is not the image (profiles, texts) takes no more than the largest image would.
+    // Anything besides the image (profiles, texts) may take no more memory than the largest image.
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(most_pixels.saturating_mul(BYTES_A_PIXEL));
     decoder.set_limits(limits)?;
@@ -113,7 +113,7 @@ mod tests {
         }
     }
 
-    /// Bands of any height give the file that the whole gives, of what compresses and of what does not.
+    /// Bands of any height give the same file as the whole image, for compressible and incompressible pixels.
     #[test]
     fn the_bytes_do_not_depend_on_how_rows_come_in() {
         let mut dice = fastrand::Rng::with_seed(7);
@@ -129,7 +129,7 @@ mod tests {
                 let mut rows = Rows::begin(301, 200).unwrap();
                 let mut rest = &image.as_raw()[..];
                 while !rest.is_empty() {
-                    // Also pieces that are no whole rows.
+                    // The pieces need not be whole rows.
                     let (piece, after) = rest.split_at(dice.usize(1..=rest.len()));
                     rows.push(piece).unwrap();
                     rest = after;
@@ -142,7 +142,7 @@ mod tests {
         assert!(short.finish().is_err(), "a row is missing");
     }
 
-    /// A few bytes that say they are 4 gigapixels.
+    /// A file of a few bytes whose header says 4 gigapixels.
     #[test]
     fn a_picture_that_claims_to_be_huge_is_refused_by_its_header() {
         let mut png = encode(&RgbImage::new(1, 1)).unwrap().to_vec();
@@ -153,7 +153,7 @@ mod tests {
         assert!(matches!(decode(&png, 64_000_000), Err(ImageError::Limits(_))));
     }
 
-    /// The checksum of a PNG's chunk (ISO 3309), bit by bit.
+    /// Returns the checksum of a PNG's chunk (ISO 3309), bit by bit.
     fn crc(bytes: &[u8]) -> u32 {
         let step = |sum: u32| (sum >> 1) ^ (0xedb8_8320 * (sum & 1));
         let byte = |sum: u32, byte: &u8| (0..8).fold(sum ^ u32::from(*byte), |sum, _| step(sum));

@@ -1,7 +1,7 @@
-//! The render function's renderer: scripts to PNG images by `rayfold-scene` and `rayfold-tracer`.
+//! The render function's renderer: turns scripts into PNG images with `rayfold-scene` and `rayfold-tracer`.
 //!
-//! A drawing that nobody waits for any more is cancelled. One that is too big for an invocation, by what [`Capacity`] makes of
-//! a few strips of it or by how long it takes, is to be drawn in bands.
+//! A drawing is cancelled when its caller stops waiting. A frame that is too big for an invocation is drawn in bands.
+//! [`Capacity`] decides that by a few strips of the frame, or after drawing has taken too long.
 
 use std::num::{NonZeroU32, NonZeroU64};
 use std::pin::pin;
@@ -20,14 +20,15 @@ use crate::capacity::{Capacity, Extent, FEW_RAYS, Measured, STOP_SHARE, STRIP, V
 use crate::joining::PngJoining;
 use crate::{png, pool};
 
-/// Bytes of a pixel's sums where it may have many samples, and of what its first one saw where not all pixels get sums.
+/// The bytes per pixel of its sums if it may have many samples. `FIRST_BYTES` are those of the first sample if not
+/// all pixels get sums.
 const SUMS_BYTES: u64 = 56;
 const FIRST_BYTES: u64 = 9;
 
-/// The share of the time that is left after which no more strips are drawn.
+/// No more strips are drawn after this share of the remaining time.
 const MEASURING_SHARE: f64 = 0.1;
 
-/// Draws scripts.
+/// A renderer of scene scripts.
 ///
 /// ```
 /// use rayfold_lambda::raytracer::RayTracer;
@@ -40,9 +41,9 @@ const MEASURING_SHARE: f64 = 0.1;
 /// ```
 #[derive(Debug, Clone, Default)]
 pub struct RayTracer {
-    /// What a script may ask for.
+    /// The limits of a script.
     pub limits: Limits,
-    /// What an invocation bears.
+    /// The resources of an invocation.
     pub capacity: Capacity,
 }
 
@@ -72,7 +73,7 @@ impl Renderer for RayTracer {
         match tokio::time::timeout(patience.mul_f64(STOP_SHARE), &mut drawing).await {
             Ok(drawn) => drawn,
             Err(_) => {
-                // What draws ends soon, and says into how many bands the frame is to be cut.
+                // The drawing ends soon, and says how many bands the frame is to be cut into.
                 stop.0.store(true, Ordering::Relaxed);
                 drawing.await
             }
@@ -113,7 +114,7 @@ impl Renderer for RayTracer {
     }
 }
 
-/// Works on the pool.
+/// Runs work on the pool.
 async fn run<T: Send + 'static>(
     name: &ScriptName,
     work: impl FnOnce() -> Result<T> + Send + 'static,
@@ -122,7 +123,7 @@ async fn run<T: Send + 'static>(
     pool::run(work).await.unwrap_or_else(given_up)
 }
 
-/// Why there is no band of what is no frame: a script that was cut does not change, so it has a frame.
+/// Returns the reason why a band has no frame. A script that was cut does not change, so it should have one.
 fn no_single_frame(file: &str, drawing: Drawing) -> Reason {
     match drawing {
         Drawing::Fault(reason) => reason,
@@ -131,10 +132,10 @@ fn no_single_frame(file: &str, drawing: Drawing) -> Reason {
     }
 }
 
-/// What an invocation has for a drawing.
+/// The time and the resources for a drawing.
 struct Time {
     began: Instant,
-    /// From then on.
+    /// The time that is left after `began`.
     left: Option<Duration>,
     capacity: Capacity,
 }
@@ -143,13 +144,13 @@ struct Time {
 struct Shot {
     file: String,
     script: Script,
-    /// Counted from 0.
+    /// The frame's position in the script, from 0.
     place: usize,
     scene: Scene,
 }
 
 impl Shot {
-    /// Reads a script; what comes of it if it is not a frame to be drawn.
+    /// Reads a script. Returns the result of the drawing if there is no frame to draw.
     fn read(file: &str, script: &[u8], part: Part, limits: &Limits) -> std::result::Result<Self, Drawing> {
         let parsed = rayfold_scene::parse(file, script, limits);
         let Some(script) = parsed.script else {
@@ -167,12 +168,12 @@ impl Shot {
         }
     }
 
-    /// Columns and rows.
+    /// Returns columns and rows.
     fn size(&self) -> (u32, u32) {
         (self.scene.screen.width(), self.scene.screen.height())
     }
 
-    /// Prepares the picture.
+    /// Prepares the picture, and passes it to `then`.
     fn expose<T>(
         &self,
         options: &RenderOptions,
@@ -183,7 +184,7 @@ impl Shot {
         then(&Picture::exposed(Exposure::moving(&self.scene, &after), options)?)
     }
 
-    /// Draws the frame, unless it is too big for that.
+    /// Draws the frame, unless it is too big.
     fn draw(&self, time: &Time, stop: &AtomicBool) -> Result<Drawing> {
         let options = RenderOptions { cancel: Some(stop), ..Default::default() };
         let drawn = self.expose(&options, |picture| {
@@ -247,7 +248,7 @@ impl Shot {
         Extent { width, height, pixel_bytes, margin }
     }
 
-    /// What to do about the frame, by strips of it where it may be more than an invocation bears.
+    /// Decides about the frame. Draws strips of it first if it may exceed the invocation.
     fn judge(&self, picture: &Picture, extent: &Extent, time: &Time) -> Verdict {
         let by_memory = time.capacity.judge_memory(extent);
         let rays = self.scene.screen.pixels().saturating_mul(u64::from(self.scene.samples.most()));
@@ -260,7 +261,7 @@ impl Shot {
         for rows in strips(extent.height) {
             let (start, count) = (Instant::now(), rows.end - rows.start);
             if picture.sketch_rows(rows).is_err() {
-                // It is stopped: this strip alone took longer than a frame may.
+                // The strip was stopped: it alone took longer than a frame may.
                 return time.judge_late(extent, STRIP);
             }
             let took = start.elapsed().as_secs_f64();
@@ -279,17 +280,18 @@ impl Shot {
 }
 
 impl Time {
-    /// What to do about a frame of which it is known only that so many rows of it take longer than there is time.
+    /// Decides about a frame of which only the following is known: this many rows take longer
+    /// than the remaining time.
     fn judge_late(&self, extent: &Extent, rows: u32) -> Verdict {
         let left = self.left.unwrap_or_default();
-        // Twice as long, for who knows.
+        // Assumes twice the time, because the real time is unknown.
         let row = 2.0 * left.as_secs_f64() / f64::from(rows.min(extent.height));
         let measured = Measured { before: Duration::ZERO, row, dearest_row: row };
         self.capacity.judge(extent, &measured, left)
     }
 }
 
-/// Stops a drawing that nobody waits for any more.
+/// A guard that stops a drawing when its caller stops waiting.
 #[derive(Default)]
 struct CancelOnDrop(Arc<AtomicBool>);
 
@@ -309,7 +311,7 @@ mod tests {
         ScriptName::new("big").unwrap()
     }
 
-    /// Balls on a floor, seen in mirrors.
+    /// A script of balls on a floor, seen in mirrors.
     fn script(size: &str, samples: &str) -> Bytes {
         let text = format!(
             "Screen {size}\nSamples {samples}\nLook 0 3 9  0 0 0  40\nBackground .5 .6 .8\nIlight .6 .6 .55  1 -1.7 -1  9\n\
@@ -319,7 +321,7 @@ mod tests {
         text.into()
     }
 
-    /// Of any number of bands, so that a machine that others keep busy finds none too big.
+    /// Returns a renderer that allows any number of bands, so that no frame is too big on a busy machine.
     fn patient() -> RayTracer {
         let capacity = Capacity { memory: None, most_bands: NonZeroU32::new(100_000).unwrap() };
         RayTracer { capacity, ..RayTracer::default() }
@@ -352,7 +354,7 @@ mod tests {
         }
     }
 
-    /// Of many rays: by strips, before it is drawn.
+    /// A frame of many rays: measured by strips before it is drawn.
     #[tokio::test]
     async fn a_frame_that_is_measured_to_take_too_long_is_cut() {
         let script = script("3000 3000", "64 0");
@@ -363,7 +365,7 @@ mod tests {
         assert!(bands.get() >= 2);
     }
 
-    /// Of few: when it is seen to take long.
+    /// A frame of few rays: cut after it has taken too long.
     #[tokio::test]
     async fn a_frame_that_turns_out_to_take_too_long_is_cut() {
         let cut = draw(&script("1000 1000", "16 0"), Some(5)).await;

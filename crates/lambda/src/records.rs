@@ -1,14 +1,14 @@
-//! The records of a batch of object events, one by one. What is done with one, the caller says.
+//! The records of a batch of object events, one by one. The caller provides the work for a record.
 
 use rayfold_pipeline::Error;
 
-use crate::answer::{Answer, Failed, Outcome, chain, may_pass};
+use crate::answer::{Answer, Failed, Outcome, chain, is_transient};
 use crate::event::ObjectEvent;
 
-/// Works on each record of our bucket by its key, whatever becomes of the others.
+/// Runs `record` for the key of each record of our bucket, whatever the results of the others.
 ///
 /// # Errors
-/// [`Failed`] with those that another try may end otherwise.
+/// [`Failed`] with the records for which another try may succeed.
 pub(crate) async fn work<F>(
     bucket: &str,
     request_id: &str,
@@ -27,7 +27,7 @@ where
         }
         match record(key.clone()).await {
             Ok(what) => answer.outcomes.push(Outcome { of: key, what }),
-            Err(error) if may_pass(&error) => {
+            Err(error) if is_transient(&error) => {
                 tracing::error!(request_id, key, error = chain(&error), "failed");
                 failed.push((key, error));
             }

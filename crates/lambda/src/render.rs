@@ -1,4 +1,4 @@
-//! The render function: an event a frame.
+//! The render function, which handles one event per frame.
 
 use rayfold_pipeline::Error;
 use rayfold_pipeline::keys::{SCRIPTS, Uploaded};
@@ -12,10 +12,10 @@ use crate::event::Event;
 use crate::logs::ms;
 use crate::records;
 
-/// Works on a payload.
+/// Handles a payload.
 ///
 /// # Errors
-/// [`Failed`] when another try may end otherwise.
+/// [`Failed`] if another try may succeed.
 pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value) -> Result<Answer, Failed> {
     let objects = match Event::parse(payload) {
         Ok(Event::Objects(objects)) => objects,
@@ -31,7 +31,7 @@ pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value)
     records::work(&context.bucket, &call.request_id, objects, |key| record(context, call, key)).await
 }
 
-/// Works on one event.
+/// Handles one event.
 async fn record<S: Store>(context: &Context<S>, call: &Call, key: String) -> Result<String, Error> {
     if key.starts_with(SCRIPTS) && Uploaded::of(&key, 0) == Uploaded::Nothing {
         return Ok("nothing that is read".into());

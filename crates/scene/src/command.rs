@@ -1,6 +1,7 @@
-//! The commands of the language, and which is meant by a misspelt one.
+//! The commands of the language, and the correction of misspelt ones.
 //!
-//! The one list of them: each refers to its [`Form`], which stands with what the command makes.
+//! This is the only list of commands. Each refers to its [`Form`], which is defined beside the type
+//! that the command makes.
 
 use std::fmt;
 
@@ -11,83 +12,74 @@ use crate::model::{
     Torus, Triangle, USE,
 };
 
-/// What a command does.
+/// The effect of a command.
 #[derive(Clone, Copy)]
-pub(crate) enum Act {
-    /// Sets the size of the image.
+pub(crate) enum Effect {
     Screen,
-    /// Sets the camera.
     Camera(Reader<Camera>),
-    /// Sets what a ray sees that hits nothing.
+    /// Sets the colour of rays that hit nothing.
     Background,
-    /// Sets the lens.
     Lens,
-    /// Sets the rays of a pixel.
+    /// Sets the number of rays per pixel.
     Samples,
-    /// Sets how long a frame is exposed.
+    /// Sets the exposure time of a frame.
     Shutter,
-    /// Sets how colours become levels.
+    /// Sets the conversion of colours to levels.
     Tone,
-    /// Sets how many bounces are followed.
+    /// Sets the largest number of bounces.
     Depth,
-    /// Sets which frames a `Trace` is.
+    /// Sets the frame numbers of a `Trace`.
     Frames,
-    /// Names a material.
+    /// Defines a named material.
     Material,
-    /// Starts a group.
     Group,
-    /// Ends a group.
     End,
-    /// Draws a group.
     Use,
-    /// Adds an object.
     Object(Reader<Object>),
-    /// Adds a light.
     Light(Reader<Light>),
     /// Removes objects and lights.
     Clear,
-    /// Renders frames.
     Trace,
 }
 
-/// From the numbers of a line; all that is wrong with them.
+/// A function that makes an item from the numbers of a line, or returns all errors in them.
 pub(crate) type Reader<T> = fn(&mut Numbers<'_>) -> Result<T, Faults>;
 
 fn read<T: Scripted + Into<U>, U>(numbers: &mut Numbers<'_>) -> Result<U, Faults> {
     T::read(numbers).map(Into::into)
 }
 
-/// Defines [`Command`] from its names, so that the list of all is whole.
+/// Defines [`Command`] from its names, so that the list of all commands is complete.
 macro_rules! commands {
-    ($($command:ident: $form:expr, $act:expr, $about:literal;)*) => {
+    ($($command:ident: $form:expr, $effect:expr, $summary:literal;)*) => {
         /// A command of the scene language.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Command {
-            $(#[doc = $about] $command,)*
+            $(#[doc = $summary] $command,)*
         }
 
         impl Command {
-            /// All of them, in the order of the documentation.
+            /// All commands, in the order of the documentation.
             pub const ALL: &[Self] = &[$(Self::$command,)*];
 
-            /// How it is written.
+            /// Returns the syntax of the command.
             pub const fn form(self) -> &'static Form {
                 match self {
                     $(Self::$command => &const { $form },)*
                 }
             }
 
-            /// What it is for, in a few words.
-            pub const fn about(self) -> &'static str {
+            /// Returns a one-line summary of the command.
+            pub const fn summary(self) -> &'static str {
                 match self {
-                    $(Self::$command => $about,)*
+                    $(Self::$command => $summary,)*
                 }
             }
 
-            /// What it does.
-            pub(crate) const fn act(self) -> Act {
+            /// Returns the effect of the command.
+            pub(crate) const fn effect(self) -> Effect {
                 match self {
-                    $(Self::$command => $act,)*
+                    $(Self::$command => $effect,)*
                 }
             }
         }
@@ -99,33 +91,33 @@ const fn group(name: &'static str) -> Form {
 }
 
 commands! {
-    Screen: Screen::FORM, Act::Screen, "The size of the image.";
-    Orthocamera: ORTHOCAMERA, Act::Camera(|_| Ok(Camera::Orthographic)), "A parallel projection.";
-    Camera: Pinhole::FORM, Act::Camera(read::<Pinhole, _>), "A pinhole camera.";
-    Look: Look::FORM, Act::Camera(read::<Look, _>), "A camera that looks at a target.";
-    Lens: Lens::FORM, Act::Lens, "A lens that is sharp at one distance.";
-    Background: Background::FORM, Act::Background, "What a ray sees that hits nothing.";
-    Samples: Samples::FORM, Act::Samples, "Rays of a pixel.";
-    Shutter: Shutter::FORM, Act::Shutter, "The share of a frame's time that it is exposed.";
-    Tone: Tone::FORM, Act::Tone, "From colours to levels.";
-    Depth: Depth::FORM, Act::Depth, "How many bounces are followed.";
-    Sphere: Sphere::FORM, Act::Object(read::<Sphere, _>), "A sphere.";
-    Triangle: Triangle::FORM, Act::Object(read::<Triangle, _>), "A triangle.";
-    Cuboid: Cuboid::FORM, Act::Object(read::<Cuboid, _>), "A box along the axes.";
-    Plane: Plane::FORM, Act::Object(read::<Plane, _>), "A plane without end.";
-    Disc: Disc::FORM, Act::Object(read::<Disc, _>), "A flat, round disc.";
-    Cylinder: Cylinder::FORM, Act::Object(read::<Cylinder, _>), "A closed cylinder.";
-    Cone: Cone::FORM, Act::Object(read::<Cone, _>), "A closed cone, also cut off.";
-    Torus: Torus::FORM, Act::Object(read::<Torus, _>), "A ring.";
-    Material: MATERIAL, Act::Material, "How a surface answers light, by name.";
-    Group: group("Group"), Act::Group, "Names the objects up to its `End`.";
-    End: Form::new("End", &[]), Act::End, "Ends a group.";
-    Use: USE, Act::Use, "Draws a group.";
-    Ilight: DirectionalLight::FORM, Act::Light(read::<DirectionalLight, _>), "A light at infinity.";
-    Plight: Lamp::FORM, Act::Light(read::<Lamp, _>), "A light at a place.";
-    Frames: FrameNumbers::FORM, Act::Frames, "Which frames a `Trace` is.";
-    Clear: Form::new("Clear", &[]), Act::Clear, "Removes objects and lights.";
-    Trace: Form::new("Trace", &[]), Act::Trace, "Renders a frame.";
+    Screen: Screen::FORM, Effect::Screen, "The size of the image.";
+    Orthocamera: ORTHOCAMERA, Effect::Camera(|_| Ok(Camera::Orthographic)), "A parallel projection.";
+    Camera: Pinhole::FORM, Effect::Camera(read::<Pinhole, _>), "A pinhole camera.";
+    Look: Look::FORM, Effect::Camera(read::<Look, _>), "A camera that looks at a target.";
+    Lens: Lens::FORM, Effect::Lens, "A lens that is in focus at one distance.";
+    Background: Background::FORM, Effect::Background, "The colour of rays that hit nothing.";
+    Samples: Samples::FORM, Effect::Samples, "The number of rays per pixel.";
+    Shutter: Shutter::FORM, Effect::Shutter, "The share of a frame's time that the shutter is open.";
+    Tone: Tone::FORM, Effect::Tone, "The conversion of colours to levels.";
+    Depth: Depth::FORM, Effect::Depth, "The largest number of reflections and refractions of a ray.";
+    Sphere: Sphere::FORM, Effect::Object(read::<Sphere, _>), "A sphere.";
+    Triangle: Triangle::FORM, Effect::Object(read::<Triangle, _>), "A triangle.";
+    Cuboid: Cuboid::FORM, Effect::Object(read::<Cuboid, _>), "A box along the axes.";
+    Plane: Plane::FORM, Effect::Object(read::<Plane, _>), "An infinite plane.";
+    Disc: Disc::FORM, Effect::Object(read::<Disc, _>), "A flat, round disc.";
+    Cylinder: Cylinder::FORM, Effect::Object(read::<Cylinder, _>), "A closed cylinder.";
+    Cone: Cone::FORM, Effect::Object(read::<Cone, _>), "A closed cone or truncated cone.";
+    Torus: Torus::FORM, Effect::Object(read::<Torus, _>), "A ring (torus).";
+    Material: MATERIAL, Effect::Material, "A surface material with a name.";
+    Group: group("Group"), Effect::Group, "Names the objects up to its `End`.";
+    End: Form::new("End", &[]), Effect::End, "Ends a group.";
+    Use: USE, Effect::Use, "Draws a group.";
+    Ilight: DirectionalLight::FORM, Effect::Light(read::<DirectionalLight, _>), "A directional light.";
+    Plight: Lamp::FORM, Effect::Light(read::<Lamp, _>), "A light with a position.";
+    Frames: FrameNumbers::FORM, Effect::Frames, "The frame numbers of a `Trace`.";
+    Clear: Form::new("Clear", &[]), Effect::Clear, "Removes objects and lights.";
+    Trace: Form::new("Trace", &[]), Effect::Trace, "Renders a frame.";
 }
 
 impl fmt::Display for Command {
@@ -134,7 +126,7 @@ impl fmt::Display for Command {
     }
 }
 
-/// The most numbers that a command takes.
+/// The largest count of numbers that a command takes.
 pub(crate) const MAX_NUMBERS: usize = {
     let (mut most, mut i) = (0, 0);
     while i < Command::ALL.len() {
@@ -145,8 +137,8 @@ pub(crate) const MAX_NUMBERS: usize = {
     most
 };
 
-/// The commands by the first letters of their names, each letter's as a chain: the place in [`Command::ALL`] of the first,
-/// and behind each the next; `NONE` ends a chain.
+/// An index of the commands by the first letter of their names. Each letter has a chain: `first` is the index in
+/// [`Command::ALL`] of its first command, and `next` that of the one after each. `NONE` ends a chain.
 struct Index {
     first: [u8; 26],
     next: [u8; Command::ALL.len()],
@@ -154,7 +146,7 @@ struct Index {
 
 const NONE: u8 = u8::MAX;
 
-/// So that a line's command is found with a comparison or two.
+/// With this index, the command of a line is found with one or two comparisons.
 const INDEX: Index = {
     let mut index = Index { first: [NONE; 26], next: [NONE; Command::ALL.len()] };
     let mut i = Command::ALL.len();
@@ -168,12 +160,12 @@ const INDEX: Index = {
 };
 
 impl Command {
-    /// Its name.
+    /// Returns the name of the command.
     pub const fn name(self) -> &'static str {
         self.form().name
     }
 
-    /// The command of this name, in any letter case.
+    /// Returns the command with this name, in any letter case.
     pub fn from_name(name: &str) -> Option<Self> {
         let letter = name.bytes().next()?.to_ascii_lowercase().wrapping_sub(b'a');
         let first = *INDEX.first.get(usize::from(letter))?;
@@ -181,13 +173,13 @@ impl Command {
             std::iter::successors(Some(first), |place| INDEX.next.get(usize::from(*place)).copied())
                 .map_while(|place| Self::ALL.get(usize::from(place)).copied())
         };
-        // Most write it as the documentation does, which is compared faster.
+        // Most scripts use the documentation's letter case, which is compared faster.
         chain().find(|c| c.name() == name).or_else(|| chain().find(|c| c.name().eq_ignore_ascii_case(name)))
     }
 
-    /// The command that was probably meant: a slip or two away, or cut short.
+    /// Returns the command that was probably meant: one with a similar name, or one that starts with `name`.
     pub(crate) fn nearest(name: &str) -> Option<Self> {
-        // Longer than that and it is no slip; the distance is quadratic in the length.
+        // A longer word is no typo, and the distance takes quadratic time.
         if name.len() > 40 {
             return None;
         }

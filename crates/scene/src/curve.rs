@@ -1,17 +1,17 @@
-//! Numbers that change: curves through keys.
+//! Curves: numbers that change over the frames, by interpolation between keys.
 //!
-//! Times are frame numbers, also between frames. All is computed in 64-bit floats in the order in which
-//! `docs/language.md` writes it, with no function whose last bit differs between machines. Knows nothing of text but
-//! how a curve is written.
+//! Times are frame numbers and may be fractional. Everything is computed in 64-bit floats in the order of
+//! `docs/language.md`, with no function whose last bit differs between machines. This module knows no text except the
+//! written form of a curve.
 //!
-//! Invariants: at least one key, and two where it cycles, their frames finite and strictly increasing; no value overflows
-//! at any time.
+//! Invariants: there is at least one key, and two for a cycle. Their frames are finite and strictly increasing. No
+//! value overflows at any time.
 
 use std::fmt::{self, Display, Formatter};
 
 use crate::form::write_number;
 
-/// A number that changes with time.
+/// A number that changes over time.
 ///
 /// ```
 /// let curve = rayfold_scene::parse_curve("(smooth 1:0 25:3)").unwrap();
@@ -26,33 +26,33 @@ pub struct Curve {
     largest: f64,
 }
 
-/// What a number is at a frame.
+/// A key of a curve: its value at a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Key {
-    /// When; not always a whole number.
+    /// The frame; may be fractional.
     pub frame: f64,
-    /// What.
+    /// The value at that frame.
     pub value: f64,
 }
 
-/// What happens between two keys.
+/// The interpolation between two keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
-    /// In a straight line.
+    /// Linear interpolation.
     #[default]
     Linear,
-    /// Along a cubic that never overshoots (Fritsch and Butland 1984, "A method for constructing local monotone
-    /// piecewise cubic interpolants").
+    /// Cubic interpolation that never overshoots (Fritsch and Butland 1984, "A method for constructing local
+    /// monotone piecewise cubic interpolants").
     Smooth,
-    /// The last key's value stays.
+    /// The value of the last key, until the next one.
     Step,
 }
 
 impl Mode {
-    /// All of them, in the order of the documentation.
+    /// All modes, in the order of the documentation.
     pub const ALL: &[Self] = &[Self::Linear, Self::Smooth, Self::Step];
 
-    /// The word that asks for it.
+    /// Returns the word for the mode.
     pub fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
@@ -61,37 +61,38 @@ impl Mode {
         }
     }
 
-    /// What it does, in a few words.
-    pub(crate) fn about(self) -> &'static str {
+    /// Returns a one-line summary of the mode.
+    pub(crate) fn summary(self) -> &'static str {
         match self {
-            Self::Linear => "In straight lines from key to key.",
-            Self::Smooth => "Without corners; it eases in and out, and never overshoots a key.",
-            Self::Step => "The value of the last key stays.",
+            Self::Linear => "Straight lines from key to key.",
+            Self::Smooth => "A smooth curve that eases in and out and never overshoots a key.",
+            Self::Step => "The value of the last key until the next one.",
         }
     }
 }
 
-/// The word that makes a curve start again behind its last key.
+/// The word that makes a curve restart after its last key.
 pub(crate) const CYCLE: &str = "cycle";
 
-/// Two neighbouring keys between which a curve overflows.
+/// The error that a curve overflows after the key with this index.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Overflow(pub(crate) usize);
 
-/// A value, and when.
+/// A value at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Moment {
     pub(crate) frame: f64,
     pub(crate) value: f64,
 }
 
-/// How far computed values may lie outside of those at the ends of a stretch without keys, over the largest value of
-/// a key. A cubic's terms are at most 23 times its ends, and there are less than 16 roundings.
+/// The distance by which computed values may lie outside of the values at the ends of an interval without
+/// keys, relative to the largest value of a key. A cubic's terms are at most 23 times its ends, and there are
+/// less than 16 roundings.
 const SLACK: f64 = 1.0 / (1u64 << 43) as f64;
 
 impl Curve {
-    /// Through keys; `None` where there is no key, or one of a cycle, where their frames and values are not finite or the
-    /// frames not strictly increasing, and where a value between them overflows.
+    /// Makes a curve through keys. Returns `None` for no key, or one key of a cycle; for frames or values that are
+    /// not finite; for frames that are not strictly increasing; and if a value between keys overflows.
     pub fn through(mode: Mode, cycle: bool, keys: Vec<Key>) -> Option<Self> {
         let is_finite = keys.iter().all(|key| key.frame.is_finite() && key.value.is_finite());
         let is_in_order = keys.windows(2).all(|pair| pair[0].frame < pair[1].frame);
@@ -99,30 +100,30 @@ impl Curve {
         if is_finite && is_in_order && is_enough { Self::new(mode, cycle, keys).ok() } else { None }
     }
 
-    /// What happens between two keys.
+    /// Returns the interpolation between two keys.
     pub fn mode(&self) -> Mode {
         self.mode
     }
 
-    /// Whether it starts again at its last key.
+    /// Returns whether the curve restarts at its last key.
     pub fn is_cycle(&self) -> bool {
         self.cycle
     }
 
-    /// Its keys, their frames strictly increasing; at least one.
+    /// Returns the keys, at least one, with strictly increasing frames.
     pub fn keys(&self) -> &[Key] {
         &self.keys
     }
 
-    /// The key that decides the value at a time, if one stands just there: of a cycle that of its first time around, and at
-    /// its end the first.
+    /// Returns the key exactly at a time, if there is one. For a cycle, the time is reduced to the first cycle, and
+    /// at the end of a cycle the first key counts.
     pub fn key_at(&self, frame: f64) -> Option<Key> {
         let frame = if self.cycle { self.within_cycle(frame) } else { frame };
         self.keys.iter().find(|key| key.frame == frame).copied()
     }
 
-    /// The same with a key at a time, instead of one that stands there; of a cycle where that time lies the first time around.
-    /// `None` where a value overflows then.
+    /// Returns the curve with a key at a time, in place of an existing one. For a cycle, the time is reduced to the
+    /// first cycle. Returns `None` if a value would overflow.
     pub fn with_key(&self, frame: f64, value: f64) -> Option<Self> {
         let frame = if self.cycle { self.within_cycle(frame) } else { frame };
         let mut keys = self.keys.clone();
@@ -134,10 +135,10 @@ impl Curve {
         Self::through(self.mode, self.cycle, keys)
     }
 
-    /// `keys` are at least one, and two of a cycle, their frames finite and strictly increasing.
+    /// Makes a curve. `keys` are at least one, or two for a cycle, with finite and strictly increasing frames.
     ///
     /// # Errors
-    /// The place of the first key after which a value overflows.
+    /// Returns the index of the first key after which a value overflows.
     pub(crate) fn new(mode: Mode, cycle: bool, keys: Vec<Key>) -> Result<Self, Overflow> {
         debug_assert!(
             keys.len() > usize::from(cycle) && keys.windows(2).all(|pair| pair[0].frame < pair[1].frame)
@@ -151,7 +152,7 @@ impl Curve {
         }
     }
 
-    /// Its value at a time.
+    /// Returns the value at a time.
     pub fn at(&self, frame: f64) -> f64 {
         let (first, last) = (self.keys[0], self.keys[self.keys.len() - 1]);
         let frame = if self.cycle { self.within_cycle(frame) } else { frame };
@@ -164,8 +165,8 @@ impl Curve {
         }
     }
 
-    /// The moments of a stretch of time that say where its values lie, in order: its ends, the keys between, and what
-    /// comes just before a cycle starts again. Of many cycles one is looked at.
+    /// Visits the moments of an interval that determine the range of its values, in order: its ends, the keys
+    /// between, and the moment just before a cycle restarts. Of many cycles, only one is visited.
     pub(crate) fn moments(&self, from: f64, to: f64, mut seen: impl FnMut(Moment)) {
         seen(Moment { frame: from, value: self.at(from) });
         if self.cycle {
@@ -197,8 +198,8 @@ impl Curve {
         seen(Moment { frame: to, value: self.at(to) });
     }
 
-    /// The least and the greatest value of a stretch of time, or a little beyond; adds to `work` how many keys were
-    /// looked at.
+    /// Returns bounds on the least and the greatest value in an interval. They may be slightly too wide. Adds the
+    /// number of visited keys to `work`.
     pub(crate) fn range(&self, from: f64, to: f64, work: &mut usize) -> (f64, f64) {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         *work += if self.cycle { 2 * self.keys.len() } else { 0 };
@@ -213,7 +214,7 @@ impl Curve {
         (low - slack, high + slack)
     }
 
-    /// The largest absolute value of its keys, which no value exceeds by more than roundings.
+    /// Returns the largest absolute value of a key. No value exceeds it by more than rounding errors.
     pub(crate) fn largest(&self) -> f64 {
         self.largest
     }
@@ -222,14 +223,14 @@ impl Curve {
         self.keys[self.keys.len() - 1].frame - self.keys[0].frame
     }
 
-    /// The time of the first cycle at which it has the value of `frame`.
+    /// Returns the time within the first cycle that corresponds to `frame`.
     fn within_cycle(&self, frame: f64) -> f64 {
         let (start, period) = (self.keys[0].frame, self.period());
         let since = (frame - start).rem_euclid(period);
         start + if since < period { since } else { 0.0 }
     }
 
-    /// Its value at `frame`, which is between keys `i` and `i + 1`.
+    /// Returns the value at `frame`, which is between keys `i` and `i + 1`.
     fn between(&self, i: usize, frame: f64) -> f64 {
         let (here, next) = (self.keys[i], self.keys[i + 1]);
         let (x, h) = (frame - here.frame, next.frame - here.frame);
@@ -247,7 +248,7 @@ impl Curve {
         }
     }
 
-    /// The coefficients of x, x² and x³ behind key `i`.
+    /// Returns the coefficients of x, x² and x³ after key `i`.
     fn cubic(&self, i: usize) -> (f64, f64, f64) {
         let (here, next) = (self.keys[i], self.keys[i + 1]);
         let (h, slope) = (next.frame - here.frame, self.slope(i));
@@ -255,13 +256,13 @@ impl Curve {
         (m, (3.0 * slope - 2.0 * m - n) / h, (m + n - 2.0 * slope) / (h * h))
     }
 
-    /// From key `i` to the next.
+    /// Returns the slope from key `i` to the next.
     fn slope(&self, i: usize) -> f64 {
         let (here, next) = (self.keys[i], self.keys[i + 1]);
         (next.value - here.value) / (next.frame - here.frame)
     }
 
-    /// The slope at key `i`: the weighted harmonic mean of those on both sides.
+    /// Returns the slope at key `i`: the weighted harmonic mean of the slopes on both sides.
     fn tangent(&self, i: usize) -> f64 {
         let last = self.keys.len() - 1;
         let (before, after) = match (i, self.cycle) {
@@ -280,7 +281,7 @@ impl Curve {
         (p + q) / (p / left + q / right)
     }
 
-    /// Whether nothing overflows between keys `i` and `i + 1`.
+    /// Returns whether nothing overflows between keys `i` and `i + 1`.
     fn is_bounded(&self, i: usize) -> bool {
         let (here, next) = (self.keys[i], self.keys[i + 1]);
         let h = next.frame - here.frame;
@@ -297,7 +298,7 @@ impl Curve {
     }
 }
 
-/// `(smooth cycle 1:0 25:3)`.
+/// Writes the curve, such as `(smooth cycle 1:0 25:3)`.
 impl Display for Curve {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         f.write_str("(")?;
@@ -410,16 +411,16 @@ mod tests {
 
     #[test]
     fn moments_hold_all_extremes() {
-        let told = |curve: &Curve, from, to| {
-            let mut told = Vec::new();
-            curve.moments(from, to, |moment| told.push((moment.frame, moment.value)));
-            told
+        let moments = |curve: &Curve, from, to| {
+            let mut moments = Vec::new();
+            curve.moments(from, to, |moment| moments.push((moment.frame, moment.value)));
+            moments
         };
         let hill = curve(Mode::Linear, false, &[(0.0, 0.0), (2.0, 4.0), (4.0, 0.0)]);
-        assert_eq!(told(&hill, 1.0, 3.5), [(1.0, 2.0), (2.0, 4.0), (3.5, 1.0)]);
-        assert_eq!(told(&hill, -9.0, 9.0).len(), 5);
+        assert_eq!(moments(&hill, 1.0, 3.5), [(1.0, 2.0), (2.0, 4.0), (3.5, 1.0)]);
+        assert_eq!(moments(&hill, -9.0, 9.0).len(), 5);
         let saw = curve(Mode::Linear, true, &[(0.0, 1.0), (10.0, -1.0)]);
-        let seen = told(&saw, 1.0, 11.0);
+        let seen = moments(&saw, 1.0, 11.0);
         assert!(
             seen.iter().any(|&(frame, value)| frame < 10.0 && frame > 9.999 && value < -0.999),
             "{seen:?}"

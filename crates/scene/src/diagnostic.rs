@@ -1,9 +1,9 @@
-//! What is wrong with a text, where, and what was expected.
+//! Diagnostics: the errors and warnings of a text, with their places and corrections.
 //!
-//! A diagnostic carries the piece of text that it is about, so that it can be stored, sent and shown where the text
-//! itself is not at hand. Messages are for people; [`Code`] is what programs tell diagnostics apart by.
+//! A diagnostic contains the excerpt of the text that it is about, so it can be stored, sent and shown without the
+//! text itself. Messages are for people; programs distinguish diagnostics by [`Code`].
 //!
-//! Invariants: lines and columns count from 1, columns in characters; the size of a diagnostic is bounded, however
+//! Invariants: lines and columns count from 1, columns in characters. The size of a diagnostic is bounded, however
 //! long the line is.
 //!
 //! ```
@@ -20,17 +20,17 @@ use serde::{Deserialize, Serialize};
 
 use crate::shown::visible;
 
-/// Whether a text is unusable or only doubtful.
+/// The severity of a diagnostic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Severity {
     /// The script is not rendered.
     Error,
-    /// The script is rendered, but perhaps not as it was meant.
+    /// The script is rendered, but perhaps not as intended.
     Warning,
 }
 
-/// What kind of fault a diagnostic is about; stable where the wording is not.
+/// The kind of a fault. Unlike the message, it is stable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -51,7 +51,7 @@ pub enum Code {
     NotANumber,
     /// A number beyond what a 64-bit float holds.
     NumberTooLarge,
-    /// A number, or several together, that the command has no meaning for.
+    /// A number, or a combination of numbers, that is not allowed.
     InvalidValue,
     /// More objects, lights, pixels or frames than the limit.
     LimitExceeded,
@@ -59,37 +59,37 @@ pub enum Code {
     NoScreen,
     /// Nothing is rendered.
     NoTrace,
-    /// A triangle that can never be hit.
+    /// A triangle without area, which is never hit.
     DegenerateTriangle,
-    /// A command that no `Trace` follows, or none before a `Clear`.
+    /// A command without effect, because no `Trace` follows it before a `Clear` or the end.
     Unused,
-    /// A number that was probably written with a comma for a point, and is two.
+    /// A number that was probably written with a decimal comma, and is read as two numbers.
     DecimalComma,
-    /// A curve that is not written as one.
+    /// A malformed curve.
     MalformedCurve,
-    /// A curve where none may stand.
+    /// A curve where none is allowed.
     UnwantedCurve,
-    /// A curve whose numbers become too large.
+    /// A curve whose numbers overflow.
     CurveOverflow,
-    /// A name that is not written as one, or is missing.
+    /// A malformed or missing name.
     MalformedName,
-    /// A name that nothing has, or nothing before it.
+    /// A name that is not defined, or not before this line.
     UnknownName,
-    /// A name that is given twice.
+    /// A name that is defined twice.
     DuplicateName,
     /// A word that is no clause of a material.
     UnknownClause,
     /// A clause that a material has already.
     DuplicateClause,
-    /// A pattern of a material that has more than coefficients.
+    /// A pattern's material with clauses other than coefficients.
     UnfitMaterial,
-    /// A command where it may not stand: in a group, or an `End` outside of one.
+    /// A command in a wrong place: in a group, or an `End` outside of one.
     Misplaced,
     /// A group without an `End`.
     UnclosedGroup,
-    /// A picture that is wider or narrower than what it shows.
+    /// A picture with pixels that are not square.
     SquashedImage,
-    /// More faults than are described one by one.
+    /// More faults than are described individually.
     TooManyFaults,
     /// Settings that are not JSON, or not an object.
     MalformedSettings,
@@ -101,50 +101,50 @@ pub enum Code {
     InvalidField,
 }
 
-/// A fault in a text.
+/// An error or a warning about a text.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Diagnostic {
     /// Whether it makes the text unusable.
     pub severity: Severity,
-    /// What kind of fault it is.
+    /// The kind of the fault.
     pub code: Code,
     /// The name under which the text was parsed.
     pub file: String,
-    /// Line of the fault, from 1.
+    /// The line of the fault, from 1.
     pub line: usize,
-    /// Column of its first character, from 1, in characters.
+    /// The column of its first character, from 1, in characters.
     pub column: usize,
-    /// Its bytes in the text as it was given; empty for a place between two characters.
+    /// The range of its bytes in the original text; empty for a place between two characters.
     pub span: Range<usize>,
-    /// What is wrong, without a full stop.
+    /// The description of the problem, without a full stop.
     pub message: String,
-    /// What should be in its place.
+    /// The correct text in its place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expected: Option<String>,
-    /// What to do about it.
+    /// Advice for a correction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub help: Option<String>,
-    /// The text around it.
+    /// The text around the fault.
     pub excerpt: Excerpt,
 }
 
-/// The line of a fault, or the part of it around the fault where the line is long.
+/// The line of a fault, or its part around the fault if the line is long.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Excerpt {
-    /// One line at most; bytes that are not UTF-8 are replaced by U+FFFD.
+    /// The text, at most one line. Bytes that are not UTF-8 are replaced by U+FFFD.
     pub text: String,
-    /// The fault's bytes in `text`.
+    /// The range of the fault's bytes in `text`.
     pub marked: Range<usize>,
 }
 
 impl Diagnostic {
-    /// Whether it makes the text unusable.
+    /// Returns whether the diagnostic makes the text unusable.
     pub fn is_error(&self) -> bool {
         self.severity == Severity::Error
     }
 
-    /// As a person reads it: message, place, the line with the fault underlined, help; several lines, without a line
-    /// feed at the end. `color` adds ANSI escapes.
+    /// Formats the diagnostic for people: message, place, the line with the fault underlined, and help. The result
+    /// has several lines without a final line feed. `color` adds ANSI escapes.
     pub fn render(&self, color: bool) -> String {
         let renderer = if color { Renderer::styled() } else { Renderer::plain() };
         let level = match self.severity {
@@ -174,12 +174,12 @@ impl Diagnostic {
 }
 
 impl Excerpt {
-    /// Characters kept before a fault: more than the longest command has.
+    /// The number of characters kept before a fault: more than the longest command has.
     const BEFORE: usize = 500;
-    /// Characters kept of the fault itself, and of what follows it.
+    /// The number of characters kept of the fault itself, and of the text after it.
     const REACH: usize = 100;
 
-    /// Of `line`, which holds no line feed, around its bytes `fault`.
+    /// Makes the excerpt of `line`, which holds no line feed, around its bytes `fault`.
     pub(crate) fn new(line: &[u8], fault: Range<usize>) -> Self {
         let before = last_chars(&line[..fault.start], Self::BEFORE);
         let inside = first_chars(&line[fault.clone()], Self::REACH);
@@ -203,7 +203,7 @@ impl Excerpt {
         Self { text, marked: start..end }
     }
 
-    /// The marked bytes; nothing at the start where a foreign excerpt does not fit its text.
+    /// Returns the marked bytes; empty if a foreign excerpt does not fit its text.
     fn marked(&self) -> Range<usize> {
         if self.text.get(self.marked.clone()).is_some() { self.marked.clone() } else { 0..0 }
     }
@@ -213,7 +213,7 @@ fn is_char_start(byte: u8) -> bool {
     byte & 0xc0 != 0x80
 }
 
-/// The first `count` characters, in text that is not UTF-8 no more than four times as many bytes.
+/// Returns the first `count` characters. In text that is not UTF-8, returns at most four times as many bytes.
 fn first_chars(text: &[u8], count: usize) -> &[u8] {
     let reach = &text[..text.len().min(4 * count + 1)];
     match reach.iter().enumerate().filter(|&(_, &b)| is_char_start(b)).nth(count) {
@@ -222,7 +222,7 @@ fn first_chars(text: &[u8], count: usize) -> &[u8] {
     }
 }
 
-/// The last `count` characters, in text that is not UTF-8 no more than four times as many bytes.
+/// Returns the last `count` characters. In text that is not UTF-8, returns at most four times as many bytes.
 fn last_chars(text: &[u8], count: usize) -> &[u8] {
     let reach = &text[text.len().saturating_sub(4 * count)..];
     match reach.iter().enumerate().rev().filter(|&(_, &b)| is_char_start(b)).nth(count - 1) {

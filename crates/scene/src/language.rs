@@ -1,7 +1,7 @@
-//! The table of the language: every command, clause and mode, with what each number is, counts by and may be.
+//! The table of the language: every command, clause and mode, with the meaning, unit and range of each number.
 //!
-//! What the parser reads by, as data for editors: `rayfold check --format json` gives it out, and `docs/language.md` is
-//! tested against it. Knows no text.
+//! This is the parser's table as data for editors. `rayfold check --format json` prints it, and a test compares
+//! `docs/language.md` with it. Knows no text.
 //!
 //! ```
 //! let table = rayfold_scene::language();
@@ -20,118 +20,121 @@ use crate::model::Clause;
 /// The version of the language.
 const VERSION: u32 = 2;
 
-/// The whole language.
+/// The table of the whole language.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Language {
-    /// Its version.
+    /// The version of the language.
     pub version: u32,
-    /// In the order of the documentation.
+    /// The commands in the order of the documentation.
     pub commands: Vec<CommandEntry>,
-    /// What a `Material` can say.
+    /// The clauses of a `Material`.
     pub clauses: Vec<CommandEntry>,
-    /// The words that a curve may start with.
+    /// The words with which a curve may start.
     pub curve_modes: Vec<ModeEntry>,
 }
 
 /// A command, or a clause of a material.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CommandEntry {
-    /// In the letter case of the documentation; any will do.
+    /// The name in the letter case of the documentation. Any case is accepted.
     pub name: &'static str,
-    /// How it is written.
+    /// The syntax, such as `Sphere R cx cy cz …`.
     pub usage: String,
-    /// What it is for.
+    /// A one-line summary.
     pub about: &'static str,
-    /// A name that stands before the numbers: what it does (`defines` or `refers`) and to what (`material` or `group`).
+    /// The name before the numbers: its role (`defines` or `refers`) and its kind (`material` or `group`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub subject: Option<SubjectEntry>,
-    /// Its numbers, parameter by parameter.
+    /// The numbers, parameter by parameter.
     pub parameters: Vec<ParameterEntry>,
-    /// What several of them must keep together, in words.
+    /// The constraints on several numbers, in words.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub together: Vec<String>,
-    /// Whether its numbers may be curves.
+    /// Whether the numbers may be curves.
     pub curves: bool,
-    /// The number in whose place, and that of all that follow, the name of a material may stand.
+    /// The first number that the name of a material may replace, together with all that follow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub material_instead_from: Option<&'static str>,
-    /// What a name behind the numbers is of.
+    /// The kind of the name after the numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ends_with: Option<&'static str>,
 }
 
-/// A name that stands before the numbers.
+/// A name before the numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SubjectEntry {
-    /// `defines` or `refers`.
+    /// The role, `defines` or `refers`.
     pub role: &'static str,
-    /// `material` or `group`.
+    /// The kind, `material` or `group`.
     pub of: &'static str,
 }
 
 /// A parameter: a number or the components of a vector.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterEntry {
-    /// Of its numbers.
+    /// The names of its numbers.
     pub names: &'static [&'static str],
-    /// What it is.
+    /// The meaning of the parameter.
     pub meaning: String,
-    /// What it measures.
+    /// The measured quantity.
     pub kind: String,
-    /// What it counts by.
+    /// The unit of the numbers.
     pub unit: String,
-    /// Which values it may have, in words.
+    /// The allowed values, in words.
     pub range: String,
-    /// The least value, where there is one.
+    /// The least value, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub minimum: Option<f64>,
     /// Whether the least value itself is excluded.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub above_minimum: bool,
-    /// The greatest value, where there is one.
+    /// The greatest value, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub maximum: Option<f64>,
     /// Whether the greatest value itself is excluded.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub below_maximum: bool,
-    /// Whether only whole numbers will do.
+    /// Whether only whole numbers are allowed.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub whole: bool,
-    /// The words that will do, for one that is no number.
+    /// The allowed words, for a parameter that is no number.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     pub words: &'static [&'static str],
-    /// `required`, `optional` (whole or not at all) or `from the end` (number by number).
+    /// The presence: `required`, `optional` (whole or not at all) or `from the end` (number by number).
     pub presence: &'static str,
-    /// What holds where it is left out.
+    /// The default of an omitted parameter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub default: Option<&'static str>,
 }
 
-/// A word that a curve may start with.
+/// A word with which a curve may start.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ModeEntry {
-    /// In the letter case of the documentation; any will do.
+    /// The name in the letter case of the documentation. Any case is accepted.
     pub name: &'static str,
-    /// What it does.
+    /// A one-line summary.
     pub about: &'static str,
 }
 
-/// The whole language as data.
+/// Returns the table of the whole language.
 pub fn language() -> Language {
-    let modes = Mode::ALL.iter().map(|mode| ModeEntry { name: mode.name(), about: mode.about() });
-    let cycle = ModeEntry { name: CYCLE, about: "It starts again at its last key; beside another mode." };
+    let modes = Mode::ALL.iter().map(|mode| ModeEntry { name: mode.name(), about: mode.summary() });
+    let cycle = ModeEntry {
+        name: CYCLE,
+        about: "The curve restarts at its last key; can be combined with another mode.",
+    };
     Language {
         version: VERSION,
-        commands: Command::ALL.iter().map(|c| entry(c.form(), c.about())).collect(),
-        clauses: Clause::ALL.iter().map(|c| entry(c.form(), c.about())).collect(),
+        commands: Command::ALL.iter().map(|c| entry(c.form(), c.summary())).collect(),
+        clauses: Clause::ALL.iter().map(|c| entry(c.form(), c.summary())).collect(),
         curve_modes: modes.chain([cycle]).collect(),
     }
 }
 
 fn entry(form: &'static Form, about: &'static str) -> CommandEntry {
     let subject = form.subject.map(|subject| match subject {
-        Subject::Defines(names) => SubjectEntry { role: "defines", of: names.thing() },
-        Subject::Refers(names) => SubjectEntry { role: "refers", of: names.thing() },
+        Subject::Defines(names) => SubjectEntry { role: "defines", of: names.noun() },
+        Subject::Refers(names) => SubjectEntry { role: "refers", of: names.noun() },
     });
     CommandEntry {
         name: form.name,
@@ -139,10 +142,10 @@ fn entry(form: &'static Form, about: &'static str) -> CommandEntry {
         about,
         subject,
         parameters: form.fields.iter().map(parameter).collect(),
-        together: form.together.iter().map(|together| together.told(form)).collect(),
+        together: form.constraints.iter().map(|constraint| constraint.describe(form)).collect(),
         curves: form.curves && !form.fields.is_empty(),
         material_instead_from: form.surface().map(|i| form.number(i).0),
-        ends_with: form.ends_with.map(Names::thing),
+        ends_with: form.ends_with.map(Names::noun),
     }
 }
 

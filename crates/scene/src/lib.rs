@@ -1,6 +1,6 @@
-//! Scene scripts to typed scenes and back, with every diagnostic.
+//! Parser and writer of scene scripts: text to typed scenes and back, with all diagnostics.
 //!
-//! Knows no other crate of the project and does no I/O: text comes in, trees and diagnostics go out.
+//! Knows no other crate of the project and does no I/O: text comes in, scenes and diagnostics go out.
 //!
 //! ```
 //! use rayfold_scene::{Limits, parse};
@@ -33,7 +33,7 @@ mod shown;
 pub use command::Command;
 pub use curve::{Curve, Key, Mode};
 pub use diagnostic::{Code, Diagnostic, Severity};
-pub use form::{Field, Form, Kind, Names, Presence, Subject, Together, Unit, Values};
+pub use form::{Constraint, Field, Form, Kind, Names, Presence, Subject, Unit, Values};
 pub use language::{CommandEntry, Language, ModeEntry, ParameterEntry, SubjectEntry, language};
 pub use limits::Limits;
 pub use model::{

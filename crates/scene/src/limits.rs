@@ -1,44 +1,44 @@
-//! How much a script may ask for.
+//! The limits of a script.
 //!
-//! Scripts come from strangers: without limits one line could ask for more memory than the machine has. Every limit
-//! is a setting; the defaults are generous for hand-written and generated scenes alike.
+//! Scripts come from unknown users: without limits, one line could request more memory than the machine has. Every
+//! limit is a setting. The defaults are generous for both hand-written and generated scenes.
 
-/// What a script may ask for at most; a script that exceeds one gets a diagnostic that names it.
+/// The largest quantities that a script may use. A script that exceeds one gets a diagnostic that names it.
 ///
 /// ```
 /// let limits = rayfold_scene::Limits { max_pixels: 1 << 30, ..Default::default() };
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Size of a script's text in bytes.
+    /// The size of a script's text in bytes.
     pub max_script_bytes: usize,
-    /// Objects of one scene: those that a `Trace` sees.
+    /// The objects of one scene, as seen by a `Trace`.
     pub max_objects: usize,
-    /// Lights of one scene.
+    /// The lights of one scene.
     pub max_lights: usize,
-    /// Pixels of an image, width times height.
+    /// The pixels of an image, width times height.
     pub max_pixels: u64,
-    /// Frames of one script; with `None` it may have any number of `Trace` commands, and up to [`Self::FRAMES`] frames
-    /// where `Frames` makes many of one.
+    /// The frames of one script. With `None` it may have any number of `Trace` commands, and up to
+    /// [`Self::FRAMES`] frames through `Frames`.
     pub max_frames: Option<usize>,
-    /// How many errors, and how many warnings, are described one by one. Those beyond are counted.
+    /// The largest number of errors, and of warnings, that are described individually. The others are counted.
     pub max_described: usize,
 }
 
 impl Limits {
     /// 256 MiB: two to three million triangles.
     pub const SCRIPT_BYTES: usize = 256 << 20;
-    /// What fits into a few gigabytes together with what speeds up tracing.
+    /// As many objects as fit into a few gigabytes together with the acceleration structures.
     pub const OBJECTS: usize = 4_000_000;
-    /// How many groups may be drawn for each object that may: groups that only use others cost time, too.
+    /// The largest number of drawn groups per allowed object: groups that only use others cost time, too.
     pub(crate) const USES_PER_OBJECT: usize = 4;
-    /// Every light is a shadow ray at every hit: far beyond what can be waited for.
+    /// Every light needs a shadow ray at every hit, so this is far more than is practical.
     pub const LIGHTS: usize = 1024;
     /// 64 megapixels, 8000 x 8000.
     pub const PIXELS: u64 = 64_000_000;
-    /// Eleven hours at 24 frames a second: more is a slip of the finger.
+    /// Eleven hours at 24 frames per second: more is probably a typo.
     pub const FRAMES: u64 = 1_000_000;
-    /// More than anybody reads, less than what fills the memory when every line of a large file is wrong.
+    /// More than a person reads, and few enough to fit into memory if every line of a large file is wrong.
     pub const DESCRIBED: usize = 100_000;
 }
 

@@ -1,24 +1,24 @@
-//! What the name of a file says about it: the one classification of scripts, settings and all else, for folders on a disk
+//! The classification of file names: the single definition of scripts, settings and other files, for folders on disk
 //! and for keys in a bucket. `docs/pipeline.md` has the table.
 
-/// The file beside a folder's scripts that says how to show them.
+/// The settings file beside the scripts of a folder.
 pub const SETTINGS_FILE: &str = "animation.json";
 
 /// The class of a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Name<'a> {
-    /// A script: its name without `.txt`.
+    /// A script; the name is without `.txt`.
     Script(&'a str),
-    /// The settings, `animation.json`.
+    /// The settings file `animation.json`.
     Settings,
-    /// What systems and programs leave in folders. It counts for nothing and nobody is told.
+    /// A file that systems and programs leave in folders. It is ignored without a warning.
     Ignored,
-    /// What is meant as a script or as settings but is not called so, with what would be right. It is not read, and named
-    /// in a warning.
+    /// A name that looks like a script or settings but is wrong, with the correction. The file is not read, and
+    /// a warning names it.
     NearMiss(&'static str),
-    /// A script, settings or a near miss where no animation's folder is, with what would be right.
+    /// A script, settings or a near miss outside of an animation's folder, with the correction.
     Misplaced(&'static str),
-    /// Anything else: a picture, a README.
+    /// Any other file: a picture, a README.
     Other,
 }
 
@@ -59,7 +59,7 @@ impl<'a> Name<'a> {
         }
     }
 
-    /// Classifies an object of so many bytes by its key, without the `scripts/` before it.
+    /// Classifies an object of this size in bytes by its key, without the `scripts/` before it.
     ///
     /// ```
     /// use rayfold_scene::Name;
@@ -79,7 +79,7 @@ impl<'a> Name<'a> {
             return Name::Ignored;
         }
         if file.is_empty() {
-            // Consoles and mounts mark a folder so.
+            // Consoles and mounts mark a folder with such an object.
             return if bytes == 0 { Name::Ignored } else { Name::Misplaced(EMPTY) };
         }
         let problem = folder.split('/').find_map(|segment| match segment {
@@ -100,9 +100,9 @@ const EMPTY: &str = "an animation's name has an empty segment";
 const DOTS: &str = "an animation's name has a segment . or ..";
 const BACKSLASH: &str = "the key has a backslash: folders are separated by /";
 
-/// The name of the script that a file of a folder is: the file's name without `.txt`. `None` for files that are no
-/// scripts. Names, not files' names, are what [`natural_cmp`](crate::natural_cmp) orders: `f` comes before `f-1`, though
-/// `f.txt` would not.
+/// Returns the script name of a file in a folder, which is the file name without `.txt`, or `None` if the file
+/// is no script. [`natural_cmp`](crate::natural_cmp) orders names, not file names: `f` comes before `f-1`,
+/// though `f.txt` would not.
 pub fn script_name(file: &str) -> Option<&str> {
     match Name::of(file) {
         Name::Script(name) => Some(name),
@@ -110,7 +110,7 @@ pub fn script_name(file: &str) -> Option<&str> {
     }
 }
 
-/// Says whether a file or folder is hidden, or a system's own.
+/// Returns whether a file or folder is hidden, or a system's own.
 fn is_left_behind(segment: &str) -> bool {
     let is_hidden = segment.starts_with('.') && !matches!(segment, "." | "..");
     is_hidden || ["thumbs.db", "desktop.ini"].iter().any(|name| segment.eq_ignore_ascii_case(name))
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
     use crate::natural_cmp;
 
-    /// The class in a word.
+    /// Returns the class in a word.
     fn class(name: Name<'_>) -> &'static str {
         match name {
             Name::Script(_) => "script",

@@ -1,11 +1,12 @@
-//! The order of scripts: the one in which people number files.
+//! The natural order of script names, in which digits count as numbers.
 
 use std::cmp::Ordering;
 
-/// Compares names so that `f2` comes before `f10`: digits in a row count as one number, of any length, and everything
-/// else by its bytes.
+/// Compares names so that `f2` comes before `f10`: consecutive digits count as one number of any length, and
+/// everything else is compared by bytes.
 ///
-/// A total order: names that number alike (`f1`, `f01`) are ordered by their bytes, so only equal names are equal.
+/// This is a total order: names with equal numbers (`f1`, `f01`) are ordered by their bytes, so only
+/// identical names are equal.
 ///
 /// ```
 /// let mut names = ["f10.txt", "f2.txt", "f1.txt"];
@@ -29,7 +30,7 @@ pub fn natural_cmp(a: &str, b: &str) -> Ordering {
     x.len().cmp(&y.len()).then_with(|| a.cmp(b))
 }
 
-/// Takes the digits at the start; returns them without leading zeros.
+/// Removes the digits at the start, and returns them without leading zeros.
 fn take_number<'a>(text: &mut &'a [u8]) -> &'a [u8] {
     let end = text.iter().position(|b| !b.is_ascii_digit()).unwrap_or(text.len());
     let (digits, rest) = text.split_at(end);

@@ -1,28 +1,28 @@
-//! Collects diagnostics: places them in the text and keeps their number bounded.
+//! A collector of diagnostics, which places them in the text and bounds their number.
 //!
-//! Knows neither the language nor JSON. A fault beyond the bound is counted and never put into words, so that a large
-//! file in which every line is wrong takes no longer than one that is right.
+//! Knows neither the language nor JSON. Faults beyond the bound are counted but never formatted, so a large file in
+//! which every line is wrong takes no longer than a correct one.
 
 use std::ops::Range;
 
 use crate::diagnostic::{Code, Diagnostic, Excerpt, Severity};
 use crate::shown::grouped;
 
-/// What some editors put before UTF-8 text.
+/// The bytes that some editors write before UTF-8 text.
 pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// A line of the text that is being parsed, without its line end.
+/// A line of the parsed text, without its line end.
 #[derive(Clone, Copy)]
 pub(crate) struct Line<'a> {
-    /// From 1.
+    /// The line number, from 1.
     pub(crate) number: usize,
-    /// Where it starts in the text as it was given.
+    /// The position of its start in the original text.
     pub(crate) offset: usize,
     pub(crate) bytes: &'a [u8],
 }
 
 impl<'a> Line<'a> {
-    /// The line of `text` that holds the byte at `offset`, and where in it.
+    /// Returns the line of `text` that contains the byte at `offset`, and the position within it.
     pub(crate) fn around(text: &'a [u8], offset: usize) -> (Self, usize) {
         let start = text[..offset].iter().rposition(|&b| b == b'\n').map_or(0, |at| at + 1);
         let end = text[offset..].iter().position(|&b| b == b'\n').map_or(text.len(), |at| offset + at);
@@ -31,7 +31,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// What is wrong, apart from where.
+/// The content of a diagnostic without its place.
 pub(crate) struct Fault {
     pub(crate) code: Code,
     pub(crate) message: String,
@@ -44,7 +44,7 @@ impl Fault {
         Self { code, message: message.into(), expected: None, help: None }
     }
 
-    /// About bytes `fault` of the line; `what` is the whole text.
+    /// Makes a fault about bytes `fault` of the line. `what` names the kind of text.
     pub(crate) fn not_utf8(line: Line<'_>, fault: Range<usize>, what: &str) -> Self {
         let bytes: Vec<_> = line.bytes[fault].iter().map(|b| format!("0x{b:02X}")).collect();
         Self::new(Code::NotUtf8, format!("this is not UTF-8 text: {}", bytes.join(" ")))
@@ -66,14 +66,14 @@ impl Fault {
 /// The diagnostics of one text.
 pub(crate) struct Report<'a> {
     file: &'a str,
-    /// How many of each severity are kept.
+    /// The largest number of diagnostics of each severity.
     max_described: usize,
     kept: Vec<Diagnostic>,
     errors: Tally,
     warnings: Tally,
 }
 
-/// How many there were, and the first that was not described.
+/// The number of faults, and the first that was not described.
 #[derive(Default)]
 struct Tally {
     count: usize,
@@ -93,17 +93,17 @@ impl<'a> Report<'a> {
         self.errors.count > 0
     }
 
-    /// Whether another error would be put into words.
+    /// Returns whether another error would be described.
     pub(crate) fn describes_next(&self) -> bool {
         self.errors.first_left_out.is_none()
     }
 
-    /// `span` counts from the start of the line.
+    /// Adds an error. `span` counts from the start of the line.
     pub(crate) fn error(&mut self, line: Line<'_>, span: Range<usize>, fault: impl FnOnce() -> Fault) {
         self.add(Severity::Error, line, span, fault);
     }
 
-    /// `span` counts from the start of the line.
+    /// Adds a warning. `span` counts from the start of the line.
     pub(crate) fn warning(&mut self, line: Line<'_>, span: Range<usize>, fault: impl FnOnce() -> Fault) {
         self.add(Severity::Warning, line, span, fault);
     }
@@ -138,7 +138,7 @@ impl<'a> Report<'a> {
         }
     }
 
-    /// All diagnostics in the order of the text; what was not described is counted at the place where it starts.
+    /// Returns all diagnostics in the order of the text. Those not described are counted at the place of the first.
     pub(crate) fn finish(mut self) -> Vec<Diagnostic> {
         for (tally, name) in [(self.errors, "error"), (self.warnings, "warning")] {
             if let Some(first) = tally.first_left_out {
@@ -186,10 +186,10 @@ mod tests {
         }
         report.error(line, 0..3, || unreachable!("never put into words"));
         assert!(report.has_errors());
-        let told: Vec<_> = report.finish().into_iter().map(|d| (d.message, d.column)).collect();
-        let told: Vec<_> = told.iter().map(|(message, column)| (message.as_str(), *column)).collect();
+        let lines: Vec<_> = report.finish().into_iter().map(|d| (d.message, d.column)).collect();
+        let lines: Vec<_> = lines.iter().map(|(message, column)| (message.as_str(), *column)).collect();
         assert_eq!(
-            told,
+            lines,
             [
                 ("odd", 1),
                 ("wrong", 1),

@@ -1,27 +1,27 @@
-//! The numbers of a line as they stand in a script, each still or a curve, and which conditions they surely keep.
+//! The numbers of a line, each constant or a curve, and the proof that they satisfy constraints.
 //!
-//! Knows forms, but neither what a command makes of the numbers nor where they stand in a text.
+//! Knows forms, but neither the effect of the numbers nor their places in a text.
 
 use std::fmt::{self, Formatter};
 use std::sync::Arc;
 
 use crate::command::MAX_NUMBERS;
 use crate::curve::Curve;
-use crate::form::{Form, Presence, Together, Values, write_number};
+use crate::form::{Constraint, Form, Presence, Values, write_number};
 use crate::model::PARALLEL;
 
 /// A number of a line.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Number {
-    Still(f64),
-    Moving(Curve),
+    Constant(f64),
+    Animated(Curve),
 }
 
-/// The numbers of a line, shared by all that keep them.
+/// The numbers of a line, shared by all users.
 #[derive(Clone, Debug)]
 pub(crate) struct Row(Arc<[Number]>);
 
-/// The least and the greatest value of a number over some time.
+/// The least and the greatest value of a number in an interval.
 type Range = (f64, f64);
 
 impl Row {
@@ -29,20 +29,20 @@ impl Row {
         Self(numbers.into())
     }
 
-    /// How many were written.
+    /// Returns the count of written numbers.
     pub(crate) fn len(&self) -> usize {
         self.0.len()
     }
 
-    pub(crate) fn is_still(&self) -> bool {
-        self.0.iter().all(|number| matches!(number, Number::Still(_)))
+    pub(crate) fn is_constant(&self) -> bool {
+        self.0.iter().all(|number| matches!(number, Number::Constant(_)))
     }
 
     pub(crate) fn numbers(&self) -> &[Number] {
         &self.0
     }
 
-    /// The values at a time; 0 for those that were not written.
+    /// Returns the values at a time; 0 for omitted ones.
     pub(crate) fn at(&self, frame: f64) -> [f64; MAX_NUMBERS] {
         let mut values = [0.0; MAX_NUMBERS];
         for (value, number) in values.iter_mut().zip(self.0.iter()) {
@@ -51,62 +51,62 @@ impl Row {
         values
     }
 
-    /// A bound on the absolute value of number `i` at any time; `None` if it was not written.
+    /// Returns a bound on the absolute value of number `i` at any time, or `None` if it was omitted.
     pub(crate) fn largest(&self, i: usize) -> Option<f64> {
         self.0.get(i).map(|number| match number {
-            Number::Still(value) => value.abs(),
-            Number::Moving(curve) => curve.largest(),
+            Number::Constant(value) => value.abs(),
+            Number::Animated(curve) => curve.largest(),
         })
     }
 
-    /// Whether everything that `form` demands surely holds from one time to another. Where it says no it may hold
-    /// nevertheless. Adds to `work` how many keys were looked at.
-    pub(crate) fn surely_keeps(&self, form: &Form, from: f64, to: f64, work: &mut usize) -> bool {
+    /// Returns whether the numbers provably satisfy all constraints of `form` in an interval. If not, they may
+    /// satisfy them nevertheless. Adds the number of visited keys to `work`.
+    pub(crate) fn provably_satisfies(&self, form: &Form, from: f64, to: f64, work: &mut usize) -> bool {
         let mut ranges = [(0.0, 0.0); MAX_NUMBERS];
         for (range, number) in ranges.iter_mut().zip(self.0.iter()) {
             *range = match number {
-                Number::Still(value) => (*value, *value),
-                Number::Moving(curve) => curve.range(from, to, work),
+                Number::Constant(value) => (*value, *value),
+                Number::Animated(curve) => curve.range(from, to, work),
             };
         }
         let field = |i: usize| &ranges[form.span(i)];
         let alone = (0..form.fields.len()).all(|i| {
-            // What was left out keeps every condition.
+            // An omitted number satisfies every constraint.
             form.span(i).start >= self.len() || keeps(form.fields[i].values, field(i))
         });
-        alone && form.together.iter().all(|together| self.keep_together(form, *together, &field))
+        alone && form.constraints.iter().all(|constraint| self.keeps_constraint(form, *constraint, &field))
     }
 
-    fn keep_together<'a>(
+    fn keeps_constraint<'a>(
         &self,
         form: &Form,
-        together: Together,
+        constraint: Constraint,
         field: &impl Fn(usize) -> &'a [Range],
     ) -> bool {
         let apart = |a: usize, b: usize| field(a).iter().zip(field(b)).map(|(a, b)| a.1 < b.0 || b.1 < a.0);
-        match together {
-            Together::Differ(a, b) => apart(a, b).any(|apart| apart),
-            Together::DifferEverywhere(a, b) => apart(a, b).all(|apart| apart),
-            Together::NotParallel(a, b) => surely_cross(field(a), field(b)),
-            Together::LooksAside(from, to, up) => {
+        match constraint {
+            Constraint::Differ(a, b) => apart(a, b).any(|apart| apart),
+            Constraint::DifferEverywhere(a, b) => apart(a, b).all(|apart| apart),
+            Constraint::NotParallel(a, b) => provably_cross(field(a), field(b)),
+            Constraint::LooksAside(from, to, up) => {
                 let gaze = [0, 1, 2].map(|i| minus(half(field(to)[i]), half(field(from)[i])));
                 let is_left_out =
                     form.span(up).start >= self.len() && form.fields[up].presence != Presence::Required;
-                is_left_out || surely_cross(&gaze, field(up))
+                is_left_out || provably_cross(&gaze, field(up))
             }
-            Together::Greater(a, b) => field(a)[0].0 > field(b)[0].1,
-            Together::NotBothZero(a, b) => field(a)[0].0 > 0.0 || field(b)[0].0 > 0.0,
-            Together::InOrder(a, b) => field(a)[0].1 <= field(b)[0].0,
+            Constraint::Greater(a, b) => field(a)[0].0 > field(b)[0].1,
+            Constraint::NotBothZero(a, b) => field(a)[0].0 > 0.0 || field(b)[0].0 > 0.0,
+            Constraint::InOrder(a, b) => field(a)[0].1 <= field(b)[0].0,
         }
     }
 
-    /// As they stand in a line, each behind a blank; words for those that stand for words.
+    /// Writes the numbers as in a line, each after a space. Numbers that represent words are written as words.
     pub(crate) fn write(&self, f: &mut Formatter<'_>) -> fmt::Result {
         for number in self.0.iter() {
             f.write_str(" ")?;
             match number {
-                Number::Still(value) => write_number(f, *value)?,
-                Number::Moving(curve) => write!(f, "{curve}")?,
+                Number::Constant(value) => write_number(f, *value)?,
+                Number::Animated(curve) => write!(f, "{curve}")?,
             }
         }
         Ok(())
@@ -116,8 +116,8 @@ impl Row {
 impl Number {
     pub(crate) fn at(&self, frame: f64) -> f64 {
         match self {
-            Self::Still(value) => *value,
-            Self::Moving(curve) => curve.at(frame),
+            Self::Constant(value) => *value,
+            Self::Animated(curve) => curve.at(frame),
         }
     }
 }
@@ -152,13 +152,13 @@ fn times(a: Range, b: Range) -> Range {
     )
 }
 
-/// Whether two directions are far from parallel, whatever they are in their ranges: by more than a thousand times
-/// what is taken for parallel, which rounding here cannot hide.
-fn surely_cross(a: &[Range], b: &[Range]) -> bool {
+/// Returns whether two directions are far from parallel for all values in their ranges: by more than a thousand times
+/// the tolerance for parallel, which exceeds all rounding errors here.
+fn provably_cross(a: &[Range], b: &[Range]) -> bool {
     let largest =
         |v: &[Range]| v.iter().fold(0.0, |most: f64, (low, high)| most.max(low.abs()).max(high.abs()));
     let (size_a, size_b) = (largest(a), largest(b));
-    // Products of others may overflow or vanish.
+    // Products of other sizes may overflow or underflow.
     let sensible = |size: f64| (1e-100..1e100).contains(&size);
     if !sensible(size_a) || !sensible(size_b) {
         return false;

@@ -1,4 +1,4 @@
-//! `animation.json`: what a folder of scripts says about its animation as a whole.
+//! `animation.json`: the settings of a folder's animation.
 //!
 //! ```
 //! use rayfold_scene::parse_settings;
@@ -23,7 +23,7 @@ use crate::shown::quoted;
 
 const FIELDS: [&str; 3] = ["frames", "fps", "loop"];
 
-/// How the frames of a folder become an animation.
+/// The settings of an animation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Fields", into = "Fields")]
 pub struct AnimationSettings {
@@ -32,7 +32,7 @@ pub struct AnimationSettings {
     loops: u16,
 }
 
-/// As they are written.
+/// The fields in the JSON file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Fields {
@@ -44,16 +44,17 @@ struct Fields {
 }
 
 impl AnimationSettings {
-    /// Frames a second unless something else is asked for.
+    /// The default frame rate per second.
     pub const DEFAULT_FPS: f64 = 10.0;
-    /// A frame of a hundred seconds is a slide; a thousandth of one is beyond what any animation format can time.
+    /// The allowed frame rates. A frame of a hundred seconds is a slide, and no animation format can time a
+    /// thousandth of a second.
     pub const FPS: RangeInclusive<f64> = 0.01..=1000.0;
 
-    /// `frames` is how many frames to wait for, `None` for those that are there; `fps` frames a second; `loops` how
-    /// often the animation is repeated, 0 for ever.
+    /// Makes settings. `frames` is the expected number of frames, or `None` for the existing ones. `fps` is the frame
+    /// rate. `loops` is the number of repetitions, 0 for endless.
     ///
     /// # Errors
-    /// When `frames` is 0 or `fps` lies outside [`AnimationSettings::FPS`].
+    /// Fails if `frames` is 0 or `fps` is outside of [`AnimationSettings::FPS`].
     pub fn new(frames: Option<u64>, fps: f64, loops: u16) -> Result<Self, InvalidValue> {
         if frames == Some(0) {
             return Err(InvalidValue::Zero(Parameter::FrameCount));
@@ -64,17 +65,17 @@ impl AnimationSettings {
         Ok(Self { frames, fps, loops })
     }
 
-    /// How many frames to wait for; `None` for those that are there.
+    /// Returns the expected number of frames, or `None` for the existing ones.
     pub fn frames(&self) -> Option<u64> {
         self.frames
     }
 
-    /// Frames a second.
+    /// Returns the number of frames per second.
     pub fn fps(&self) -> f64 {
         self.fps
     }
 
-    /// How often the animation is repeated, 0 for ever.
+    /// Returns the number of repetitions, 0 for endless.
     pub fn loops(&self) -> u16 {
         self.loops
     }
@@ -106,16 +107,16 @@ impl From<AnimationSettings> for Fields {
     }
 }
 
-/// What the text of settings turned out to be.
+/// The result of parsing settings.
 #[derive(Clone, Debug)]
 pub struct ParsedSettings {
-    /// The settings; `None` exactly when there is an error.
+    /// The settings; `None` if and only if there is an error.
     pub settings: Option<AnimationSettings>,
     /// All errors in the order of the text.
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Parses the text of an `animation.json`; `name` is what diagnostics call it.
+/// Parses the text of an `animation.json`. `name` is its name in diagnostics.
 pub fn parse_settings(name: &str, bytes: &[u8]) -> ParsedSettings {
     let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     let mut report = Report::new(name, Limits::DESCRIBED);
@@ -176,7 +177,7 @@ fn settings(text: &str, report: &mut Report<'_>) -> Option<AnimationSettings> {
     if report.has_errors() { None } else { fields.try_into().ok() }
 }
 
-/// The whole number that `value` is, or what it should be.
+/// Returns the whole number in `value`, or a description of the allowed ones.
 fn whole(value: &RawValue, range: RangeInclusive<u64>) -> Result<u64, String> {
     let number = serde_json::from_str(value.get()).ok().filter(|number| range.contains(number));
     number.ok_or_else(|| match range.into_inner() {
@@ -185,7 +186,7 @@ fn whole(value: &RawValue, range: RangeInclusive<u64>) -> Result<u64, String> {
     })
 }
 
-/// The frame rate that `value` is, or what it should be.
+/// Returns the frame rate in `value`, or a description of the allowed ones.
 fn rate(value: &RawValue) -> Result<f64, String> {
     let number = serde_json::from_str(value.get()).ok().filter(|fps| AnimationSettings::FPS.contains(fps));
     let (least, most) = AnimationSettings::FPS.into_inner();
@@ -203,7 +204,7 @@ fn unknown(name: &str) -> Fault {
         .help(help)
 }
 
-/// Reports about `part`, which lies in `text`.
+/// Reports a fault about `part` of `text`.
 fn tell(text: &str, part: &RawValue, report: &mut Report<'_>, fault: impl FnOnce() -> Fault) {
     let offset = part.get().as_ptr().addr() - text.as_ptr().addr();
     let (line, start) = Line::around(text.as_bytes(), offset);
@@ -230,7 +231,7 @@ fn malformed(text: &str, error: &serde_json::Error, report: &mut Report<'_>) {
     });
 }
 
-/// The fields of a JSON object in the order of the text, and with their places in it.
+/// The fields of a JSON object in the order of the text, with their places.
 struct Entries<'a>(Vec<(&'a RawValue, &'a RawValue)>);
 
 impl<'de> Deserialize<'de> for Entries<'de> {
@@ -266,7 +267,7 @@ mod tests {
         assert_eq!(parsed.settings, expect, "{text}");
         assert_eq!(parsed.diagnostics.is_empty(), expect.is_some(), "{text}: {:?}", parsed.diagnostics);
         if expect.is_some() {
-            assert_eq!(serde_json::from_str(text).ok(), expect, "{text} means the same where no one is told");
+            assert_eq!(serde_json::from_str(text).ok(), expect, "{text} means the same without diagnostics");
         }
     }
 

@@ -1,7 +1,7 @@
-//! A part of a list that many frames share.
+//! A range of a list that many frames share.
 //!
-//! A script that adds one object a frame makes a thousand scenes whose lists begin alike. Each holds a range of the
-//! one list, so that a scene costs the same whether it has ten objects or a million. Knows nothing of scenes.
+//! A script that adds one object per frame makes a thousand scenes whose lists have common beginnings. Each holds a
+//! range of the single list, so a scene costs the same with ten objects or a million. Knows nothing of scenes.
 //!
 //! ```
 //! use rayfold_scene::SharedSlice;
@@ -14,25 +14,26 @@ use std::fmt;
 use std::ops::{Deref, Range};
 use std::sync::Arc;
 
-/// A range of a list that is shared; cloning it copies no item. Reads like a slice.
+/// A range of a shared list. Cloning copies no item. Dereferences to a slice.
 pub struct SharedSlice<T> {
     all: Arc<Vec<T>>,
-    /// Within `all`.
+    /// The range within `all`.
     range: Range<usize>,
 }
 
 impl<T> SharedSlice<T> {
-    /// The items of `range`, counted from the start of this one, sharing the same list.
+    /// Returns the items of `range`, counted from the start of this range, in the same list.
     ///
     /// # Panics
-    /// When the range does not lie within this one, as for slices.
+    /// Panics if the range is not within this one, as for slices.
     pub fn part(&self, range: Range<usize>) -> Self {
         assert!(range.start <= range.end && range.end <= self.len(), "range out of a shared slice");
         let start = self.range.start;
         Self { all: Arc::clone(&self.all), range: start + range.start..start + range.end }
     }
 
-    /// Whether both are the same items of the same list in memory: what was derived from one holds for the other.
+    /// Returns whether both are the same items of the same list in memory, so that data derived from one is
+    /// valid for the other.
     pub fn is_same(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.all, &other.all) && self.range == other.range
     }

@@ -1,6 +1,6 @@
-//! How messages show pieces of a text and counts.
+//! Formatting of text excerpts and counts for messages.
 
-/// A piece of the text for a message: in quotes, short, and with nothing in it that cannot be seen.
+/// Formats an excerpt for a message: in quotes, short, and without invisible characters.
 pub(crate) fn quoted(text: &str) -> String {
     const LONGEST: usize = 40;
     let end = text.char_indices().nth(LONGEST).map_or(text.len(), |(end, _)| end);
@@ -8,7 +8,7 @@ pub(crate) fn quoted(text: &str) -> String {
     format!("`{}{more}`", visible(&text[..end]))
 }
 
-/// The text with control characters and others that cannot be seen written as escapes.
+/// Escapes control characters and other invisible characters.
 pub(crate) fn visible(text: &str) -> String {
     let mut visible = String::with_capacity(text.len());
     for c in text.chars() {
@@ -20,7 +20,7 @@ pub(crate) fn visible(text: &str) -> String {
     visible
 }
 
-/// A count as people write it: 64,000,000.
+/// Formats a count with separators: 64,000,000.
 pub(crate) fn grouped(count: u64) -> String {
     let digits = count.to_string();
     let mut grouped = String::new();
@@ -33,9 +33,9 @@ pub(crate) fn grouped(count: u64) -> String {
     grouped
 }
 
-/// The word that was probably meant: a slip or two away, in any letter case.
+/// Returns the word that was probably meant: one with a similar spelling, in any letter case.
 pub(crate) fn nearest<'a>(word: &str, words: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    // Longer than that and it is no slip; the distance is quadratic in the length.
+    // A longer word is no typo, and the distance takes quadratic time.
     if word.len() > 40 {
         return None;
     }

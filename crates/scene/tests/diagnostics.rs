@@ -1,13 +1,13 @@
-//! What people read about a script with faults, word for word.
+//! The diagnostics of scripts with faults, word for word.
 //!
-//! After a deliberate change `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews what is expected.
+//! After a deliberate change, `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews the expected texts.
 
-mod told;
+mod diagnostic_text;
 
 use expect_test::expect;
 use rayfold_scene::Limits;
 
-use told::{check, check_limited};
+use diagnostic_text::{check, check_limited};
 
 #[test]
 fn a_misspelt_command() {
@@ -90,21 +90,21 @@ fn parameters_on_the_next_line() {
     check(
         "Screen 4 3\nSphere 1 0 0 -5 1 0 0\n 0 0 0\nTrace",
         expect![[r#"
-        error: `Sphere` takes 10 to 13 numbers, found 7
-         --> a.txt:2:22
-          |
-        2 | Sphere 1 0 0 -5 1 0 0
-          |                      ^ expected `rr` here
-          |
-          = help: write `Sphere R cx cy cz ar ag ab rr rg rb [sr sg sb]`
+            error: `Sphere` takes 10 to 13 numbers, found 7
+             --> a.txt:2:22
+              |
+            2 | Sphere 1 0 0 -5 1 0 0
+              |                      ^ expected `rr` here
+              |
+              = help: write `Sphere R cx cy cz ar ag ab rr rg rb [sr sg sb]`
 
-        error: unknown command `0`
-         --> a.txt:3:2
-          |
-        3 |  0 0 0
-          |  ^ expected a command
-          |
-          = help: a command and all its parameters stand on one line"#]],
+            error: unknown command `0`
+             --> a.txt:3:2
+              |
+            3 |  0 0 0
+              |  ^ expected a command
+              |
+              = help: a command and all its parameters must be on one line"#]],
     );
 }
 
@@ -142,7 +142,7 @@ fn surplus_parameters() {
             1 | Screen 4 3 Trace
               |            ^^^^^ expected the end of the line
               |
-              = help: every command stands on a line of its own
+              = help: each command needs a line of its own
 
             error: `Triangle` takes 15 to 18 numbers, found 19
              --> a.txt:2:51
@@ -345,7 +345,7 @@ fn a_gaze_along_the_view_up() {
 
 #[test]
 fn an_orbit_s_eye_above_the_target_but_for_rounding() {
-    // cos 90° as programs write it.
+    // The cosine of 90° as programs write it.
     for eye in ["3.06e-16 5 0", "0 -5 3.06e-16"] {
         let script = format!("Screen 4 3\nLook {eye} 0 0 0 40\nTrace");
         let parsed = rayfold_scene::parse("a.txt", script.as_bytes(), &rayfold_scene::Limits::default());
@@ -686,7 +686,7 @@ fn what_a_clear_removes_before_a_trace_has_no_effect() {
               |
               = help: `Trace` renders a frame of everything that stands before it
 
-            warning: the picture is squashed: a ball is no circle in it
+            warning: the pixels are not square: a sphere looks like an ellipse
              --> a.txt:3:29
               |
             3 | Camera 0 0 5 0 0 -1 0 1 0 1 -1 -1 1 1
@@ -724,24 +724,24 @@ fn a_comma_as_decimal_sign() {
     check(
         "Screen 4 3\nSphere 1,5 0 0 -5 1 0 0 0 0 0 # as 1.5\nTrace",
         expect![[r#"
-        warning: `1,5` is two numbers
-         --> a.txt:2:8
-          |
-        2 | Sphere 1,5 0 0 -5 1 0 0 0 0 0 # as 1.5
-          |        ^^^ expected `1.5`, or a blank behind the comma
-          |
-          = help: the decimal sign is a point, a comma separates numbers"#]],
+            warning: `1,5` is read as two numbers
+             --> a.txt:2:8
+              |
+            2 | Sphere 1,5 0 0 -5 1 0 0 0 0 0 # as 1.5
+              |        ^^^ expected `1.5`, or a space after the comma
+              |
+              = help: the decimal sign is a point, a comma separates numbers"#]],
     );
     check(
         "Screen 4 3\nSphere 1 -0,5 0 -5 1,5 0 0 0 0 0,25\nTrace",
         expect![[r#"
-        warning: `-0,5` is two numbers
-         --> a.txt:2:10
-          |
-        2 | Sphere 1 -0,5 0 -5 1,5 0 0 0 0 0,25
-          |          ^^^^ expected `-0.5`, or a blank behind the comma
-          |
-          = help: the decimal sign is a point, a comma separates numbers"#]],
+            warning: `-0,5` is read as two numbers
+             --> a.txt:2:10
+              |
+            2 | Sphere 1 -0,5 0 -5 1,5 0 0 0 0 0,25
+              |          ^^^^ expected `-0.5`, or a space after the comma
+              |
+              = help: the decimal sign is a point, a comma separates numbers"#]],
     );
 }
 

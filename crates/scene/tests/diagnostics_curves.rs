@@ -1,13 +1,13 @@
-//! What people read about curves, frames and settings with faults, word for word.
+//! The diagnostics of curves, frames and settings with faults, word for word.
 //!
-//! After a deliberate change `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews what is expected.
+//! After a deliberate change, `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews the expected texts.
 
-mod told;
+mod diagnostic_text;
 
 use expect_test::expect;
 use rayfold_scene::Limits;
 
-use told::{check, check_limited};
+use diagnostic_text::{check, check_limited};
 
 #[test]
 fn a_radius_that_is_negative_at_a_frame() {
@@ -91,7 +91,7 @@ fn an_eye_that_passes_over_the_target() {
     let rayfold_scene::Camera::Look(middle) = camera(1) else { panic!("a look") };
     let (right, up, _) = middle.basis();
     assert_eq!((right.to_array(), up.to_array()), ([1.0, 0.0, 0.0], [0.0, 0.0, -1.0]));
-    // Before and behind it y is up, as anywhere on the way.
+    // Before and after it, y is up, as elsewhere on the way.
     for (frame, side) in [(0, 1.0), (2, -1.0)] {
         let rayfold_scene::Camera::Look(look) = camera(frame) else { panic!("a look") };
         assert!((look.basis().1.x - side).abs() < 0.1, "{frame}");
@@ -152,7 +152,7 @@ fn brackets() {
              --> a.txt:2:8
               |
             2 | Sphere (1:0 25:3 0 0 -5 1 0 0 0 0 0
-              |        ^ expected a `)` behind this, on the same line
+              |        ^ expected a `)` after this, on the same line
 
             error: `)` is not a number
              --> a.txt:3:9
@@ -160,7 +160,7 @@ fn brackets() {
             3 | Sphere 1) 0 0 -5 1 0 0 0 0 0
               |         ^ expected `cx`, a number such as 2, -.5 or 1e-3
               |
-              = help: `)` stands in a curve only, as in `(1:0 25:3)`
+              = help: `)` is allowed only in a curve, as in `(1:0 25:3)`
 
             error: the curve has no key
              --> a.txt:4:8
@@ -168,7 +168,7 @@ fn brackets() {
             4 | Sphere () 0 0 -5 1 0 0 0 0 0
               |        ^^ expected frames and values of `R`, such as `1:0 25:3`
 
-            error: `(` fits nowhere
+            error: unexpected `(` in a curve
              --> a.txt:5:13
               |
             5 | Sphere (1:1 (2:2)) 0 0 -5 1 0 0 0 0
@@ -180,7 +180,7 @@ fn brackets() {
             5 | Sphere (1:1 (2:2)) 0 0 -5 1 0 0 0 0
               |                  ^ expected `cx`, a number such as 2, -.5 or 1e-3
               |
-              = help: `)` stands in a curve only, as in `(1:0 25:3)`
+              = help: `)` is allowed only in a curve, as in `(1:0 25:3)`
 
             error: `:` is not a number
              --> a.txt:6:9
@@ -188,7 +188,7 @@ fn brackets() {
             6 | Sphere 1:1 0 0 -5 1 0 0 0
               |         ^ expected `cx`, a number such as 2, -.5 or 1e-3
               |
-              = help: `:` stands in a curve only, as in `(1:0 25:3)`"#]],
+              = help: `:` is allowed only in a curve, as in `(1:0 25:3)`"#]],
     );
 }
 
@@ -197,7 +197,7 @@ fn modes() {
     check(
         "Screen 4 3\nSphere (smoth 1:1 2:2) 0 0 -5 1 0 0 0 0 0\nSphere (wild 1:1 2:2) 0 0 -5 1 0 0 0 0 0\nSphere (smooth step 1:1 2:2) 0 0 -5 1 0 0 0 0 0\nSphere (1:1 cycle 2:2) 0 0 -5 1 0 0 0 0 0\nSphere (cycle 1:1) 0 0 -5 1 0 0 0 0 0\nTrace",
         expect![[r#"
-            error: `smoth` is no mode of a curve
+            error: unknown curve mode `smoth`
              --> a.txt:2:9
               |
             2 | Sphere (smoth 1:1 2:2) 0 0 -5 1 0 0 0 0 0
@@ -205,7 +205,7 @@ fn modes() {
               |
               = help: did you mean `smooth`?
 
-            error: `wild` is no mode of a curve
+            error: unknown curve mode `wild`
              --> a.txt:3:9
               |
             3 | Sphere (wild 1:1 2:2) 0 0 -5 1 0 0 0 0 0
@@ -213,7 +213,7 @@ fn modes() {
               |
               = help: the modes are `linear`, `smooth`, `step`, `cycle`
 
-            error: `step` stands too late, or twice
+            error: `step` must come before the keys, and only once
              --> a.txt:4:16
               |
             4 | Sphere (smooth step 1:1 2:2) 0 0 -5 1 0 0 0 0 0
@@ -221,7 +221,7 @@ fn modes() {
               |
               = help: a curve starts with at most one of `linear`, `smooth`, `step`, and `cycle`
 
-            error: `cycle` stands too late, or twice
+            error: `cycle` must come before the keys, and only once
              --> a.txt:5:13
               |
             5 | Sphere (1:1 cycle 2:2) 0 0 -5 1 0 0 0 0 0
@@ -242,7 +242,7 @@ fn keys() {
     check(
         "Screen 4 3\nSphere (1:1 25:3 17:2) 0 0 -5 1 0 0 0 0 0\nSphere (1 1 2 2) 0 0 -5 1 0 0 0 0 0\nSphere (1:) 0 0 -5 1 0 0 0 0 0\nSphere (1:1e999) 0 0 -5 1 0 0 0 0 0\nSphere (.:1) 0 0 -5 1 0 0 0 0 0\nTrace",
         expect![[r#"
-            error: frame 17 does not come behind frame 25
+            error: frame 17 must be greater than frame 25
              --> a.txt:2:18
               |
             2 | Sphere (1:1 25:3 17:2) 0 0 -5 1 0 0 0 0 0
@@ -252,13 +252,13 @@ fn keys() {
              --> a.txt:3:9
               |
             3 | Sphere (1 1 2 2) 0 0 -5 1 0 0 0 0 0
-              |         ^ expected `:` and `R` behind this frame
+              |         ^ expected `:` and `R` after this frame
 
             error: a key lacks its value
              --> a.txt:4:9
               |
             4 | Sphere (1:) 0 0 -5 1 0 0 0 0 0
-              |         ^ expected `:` and `R` behind this frame
+              |         ^ expected `:` and `R` after this frame
 
             error: `1e999` is too large
              --> a.txt:5:11
@@ -283,7 +283,7 @@ fn a_curve_that_overflows() {
              --> a.txt:2:11
               |
             2 | Sphere 1 (1:-1e308 2:1e308) 0 -5 1 0 0 0 0 0
-              |           ^^^^^^^^^^^^^^^^ expected values that are nearer to each other, or frames that are not so near"#]],
+              |           ^^^^^^^^^^^^^^^^ expected values closer together, or keys further apart"#]],
     );
 }
 
@@ -322,7 +322,7 @@ fn curves_where_none_may_stand() {
             5 | Frames (1:4)
               |        ^^^^^ expected `a`, a number
 
-            error: `(1:0)` is no tone
+            error: unknown tone `(1:0)`
              --> a.txt:6:6
               |
             6 | Tone (1:0)
@@ -353,13 +353,13 @@ fn settings_out_of_their_range() {
             3 | Shutter 1.5
               |         ^^^ expected a number from 0 to 1
 
-            error: `gamma` is no tone
+            error: unknown tone `gamma`
              --> a.txt:4:6
               |
             4 | Tone gamma
               |      ^^^^^ expected plain or srgb
 
-            error: `rgb` is no tone
+            error: unknown tone `rgb`
              --> a.txt:5:6
               |
             5 | Tone rgb
@@ -391,7 +391,7 @@ fn settings_out_of_their_range() {
             8 | Frames 2.5
               |        ^^^ expected `a`, a whole number from 1
 
-            error: the first frame must not be behind the last
+            error: the first frame must not be greater than the last
              --> a.txt:9:8
               |
             9 | Frames 9 3
@@ -518,7 +518,7 @@ fn a_squashed_picture() {
     check(
         "Screen 640 480\nCamera 0 0 5 0 0 -1 0 1 0 1 -1 -1 1 1\nTrace\nTrace\nCamera 0 0 5 0 0 -1 0 1 0 1 -.4 -.3 .4 .3\nTrace",
         expect![[r#"
-            warning: the picture is squashed: a ball is no circle in it
+            warning: the pixels are not square: a sphere looks like an ellipse
              --> a.txt:2:29
               |
             2 | Camera 0 0 5 0 0 -1 0 1 0 1 -1 -1 1 1
@@ -568,17 +568,17 @@ fn more_frames_than_the_limit() {
 #[test]
 fn more_frames_than_can_be_looked_at() {
     let limits = Limits { max_frames: Some(usize::MAX), ..Limits::default() };
-    // The radii all but meet at every frame.
+    // The radii nearly meet at every frame.
     check_limited(
         "Screen 4 3\nTorus (cycle 0:1 .1:2 .3:1) (cycle 0:.9999999999999 .1:1.9999999999999 .3:.9999999999999) 0 0 -5 0 1 0 1 \
          0 0 0 0 0\nFrames 4000000000\nTrace",
         limits,
         expect![[r#"
-            error: too many frames to see whether this is in order in each of them
+            error: too many frames to check this line in every frame
              --> a.txt:2:7
               |
             2 | Torus (cycle 0:1 .1:2 .3:1) (cycle 0:.9999999999999 .1:1.9999999999999 .3:.9999999999999) 0 0 -5 0 1 0 1 0…
-              |       ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^ expected fewer frames, or curves that stay away from what is not allowed
+              |       ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^ expected fewer frames, or curves that stay well within the allowed range
               |
               = help: split the frames among several scripts"#]],
     );

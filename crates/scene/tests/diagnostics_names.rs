@@ -1,20 +1,20 @@
-//! What people read about materials and groups with faults, word for word.
+//! The diagnostics of materials and groups with faults, word for word.
 //!
-//! After a deliberate change `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews what is expected.
+//! After a deliberate change, `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews the expected texts.
 
-mod told;
+mod diagnostic_text;
 
 use expect_test::expect;
 use rayfold_scene::Limits;
 
-use told::{check, check_limited};
+use diagnostic_text::{check, check_limited};
 
 #[test]
 fn a_material_that_is_not_there() {
     check(
         "Screen 4 3\nMaterial red diffuse 1 0 0\nSphere 1 0 0 -5 rde\nSphere 1 0 0 -5 red\nSphere 1 0 0 -5 azure\nTrace",
         expect![[r#"
-            error: there is no material `rde`
+            error: unknown material `rde`
              --> a.txt:3:17
               |
             3 | Sphere 1 0 0 -5 rde
@@ -22,7 +22,7 @@ fn a_material_that_is_not_there() {
               |
               = help: did you mean `red`?
 
-            error: there is no material `azure`
+            error: unknown material `azure`
              --> a.txt:5:17
               |
             5 | Sphere 1 0 0 -5 azure
@@ -69,7 +69,7 @@ fn a_name_with_numbers_behind_it() {
             3 | Sphere 1 0 0 -5 red 1 1
               |                 ^^^ expected `ar`, a number such as 2, -.5 or 1e-3
               |
-              = help: the name of a material stands alone, in the place of all coefficients"#]],
+              = help: the name of a material replaces all coefficients"#]],
     );
 }
 
@@ -86,7 +86,7 @@ fn names_that_are_none() {
               |
               = help: write `Material NAME CLAUSE ...`
 
-            error: `1st` is no name
+            error: invalid name `1st`
              --> a.txt:3:10
               |
             3 | Material 1st diffuse 1 0 0
@@ -94,7 +94,7 @@ fn names_that_are_none() {
               |
               = help: a name is a letter or `_`, then letters, digits, `_` and `-`
 
-            error: `roté` is no name
+            error: invalid name `roté`
              --> a.txt:4:7
               |
             4 | Group roté
@@ -102,7 +102,7 @@ fn names_that_are_none() {
               |
               = help: a name is a letter or `_`, then letters, digits, `_` and `-`
 
-            error: `(1:2)` is no name
+            error: invalid name `(1:2)`
              --> a.txt:6:5
               |
             6 | Use (1:2)
@@ -125,7 +125,7 @@ fn clauses() {
     check(
         "Screen 4 3\nMaterial a\nMaterial b difuse 1 0 0 shine 1 1 1 9\nMaterial c colour 1 0 0\nMaterial d diffuse 1 0 0 diffuse 0 1 0\nMaterial e shine 1 1 diffuse 0 0 0\nMaterial f diffuse 1 x 1\nMaterial g shine 1 1 1 .5 glass 1 1 1 0\nMaterial h diffuse 1 0 0 1\nTrace",
         expect![[r#"
-            error: a material says something of its surface
+            error: this material has no clauses
              --> a.txt:2:11
               |
             2 | Material a
@@ -133,7 +133,7 @@ fn clauses() {
               |
               = help: the clauses are `ambient`, `diffuse`, `mirror`, `shine`, `glass`, `checker`, `stripes`, `noise`, `gradient`
 
-            error: `difuse` is no clause of a material
+            error: unknown material clause `difuse`
              --> a.txt:3:12
               |
             3 | Material b difuse 1 0 0 shine 1 1 1 9
@@ -141,7 +141,7 @@ fn clauses() {
               |
               = help: did you mean `diffuse`?
 
-            error: `colour` is no clause of a material
+            error: unknown material clause `colour`
              --> a.txt:4:12
               |
             4 | Material c colour 1 0 0
@@ -181,7 +181,7 @@ fn clauses() {
             8 | Material g shine 1 1 1 .5 glass 1 1 1 0
               |                                       ^ expected a number greater than 0
 
-            error: `1` is no clause of a material
+            error: unknown material clause `1`
              --> a.txt:9:26
               |
             9 | Material h diffuse 1 0 0 1
@@ -202,7 +202,7 @@ fn patterns() {
             4 | Material c checker 1 a stripes 1 a
               |                        ^^^^^^^ expected another clause
 
-            error: the material `b` has more than coefficients
+            error: the material `b` cannot be part of a pattern: it has clauses other than `ambient`, `diffuse` and `mirror`
              --> a.txt:5:22
               |
             5 | Material d checker 1 b
@@ -268,7 +268,7 @@ fn a_group_that_is_not_there() {
     check(
         "Screen 4 3\nGroup ball\nSphere 1 0 0 0 1 0 0 0 0 0\nEnd\nUse bal\nUse ball\nUse lamp\nTrace",
         expect![[r#"
-            error: there is no group `bal`
+            error: unknown group `bal`
              --> a.txt:5:5
               |
             5 | Use bal
@@ -276,7 +276,7 @@ fn a_group_that_is_not_there() {
               |
               = help: did you mean `ball`?
 
-            error: there is no group `lamp`
+            error: unknown group `lamp`
              --> a.txt:7:5
               |
             7 | Use lamp
@@ -323,7 +323,7 @@ fn an_end_without_a_group() {
     check(
         "Screen 4 3\nEnd\nTrace",
         expect![[r#"
-            error: there is no group that this could end
+            error: `End` without a `Group`
              --> a.txt:2:1
               |
             2 | End
@@ -340,7 +340,7 @@ fn a_group_without_an_end() {
              --> a.txt:3:1
               |
             3 | Group a
-              | ^^^^^ expected an `End` behind its objects"#]],
+              | ^^^^^ expected an `End` after its objects"#]],
     );
 }
 
@@ -349,7 +349,7 @@ fn what_may_not_stand_in_a_group() {
     check(
         "Screen 4 3\nGroup a\nSphere 1 0 0 0 1 0 0 0 0 0\nIlight 1 1 1 0 0 -1\nUse a\nTrace",
         expect![[r#"
-            error: `Ilight` cannot stand in a group
+            error: `Ilight` is not allowed in a group
              --> a.txt:4:1
               |
             4 | Ilight 1 1 1 0 0 -1
@@ -364,7 +364,7 @@ fn a_group_in_a_group() {
     check(
         "Screen 4 3\nGroup a\nGroup b\nEnd\nEnd\nUse a\nUse b\nTrace",
         expect![[r#"
-            error: `Group` cannot stand in a group
+            error: `Group` is not allowed in a group
              --> a.txt:3:1
               |
             3 | Group b
@@ -455,11 +455,11 @@ fn a_group_that_is_moved_too_far() {
     check(
         "Screen 4 3\nGroup a\nSphere 1 0 0 0 1 0 0 0 0 0\nEnd\nGroup b\nUse a 1e300 0 0 0 0 0 1e10\nEnd\nUse b 0 0 0 0 0 0 1e10\nUse b 0 0 0 0 0 0 .5\nTrace",
         expect![[r#"
-            error: this moves or scales the group further than numbers reach
+            error: the group's position or scale overflows
              --> a.txt:8:7
               |
             8 | Use b 0 0 0 0 0 0 1e10
-              |       ^^^^^^^^^^^^^^^^ expected less; 1.79e308 is the largest number"#]],
+              |       ^^^^^^^^^^^^^^^^ expected values up to 1.79e308"#]],
     );
 }
 

@@ -1,4 +1,4 @@
-//! `docs/language.md` tells the truth: its examples are parsed, its messages and limits are the real ones.
+//! Checks `docs/language.md`: its examples are parsed, and its messages and limits are those of the program.
 
 use rayfold_scene::{
     AnimationSettings, CommandEntry, Limits, ParameterEntry, language, parse, parse_settings,
@@ -6,7 +6,7 @@ use rayfold_scene::{
 
 const PAGE: &str = include_str!("../../../docs/language.md");
 
-/// The code block that starts with `start`.
+/// Returns the code block that starts with `start`.
 fn block(start: &str) -> &'static str {
     let mut blocks = PAGE.split("\n```").skip(1).step_by(2).filter_map(|block| block.split_once('\n'));
     let found = blocks.find(|(_, text)| text.starts_with(start));
@@ -27,7 +27,7 @@ fn the_message_is_what_is_told_about_the_example_misspelt() {
     assert_eq!(parsed.diagnostics[0].render(false), block("error: "));
 }
 
-/// The cells of the table under a heading, without its head.
+/// Returns the cells of the table under a heading, without its head.
 fn table(heading: &str) -> Vec<Vec<&'static str>> {
     let rows =
         PAGE.lines().skip_while(|line| *line != heading).skip_while(|line| !line.starts_with('|')).skip(2);
@@ -35,7 +35,7 @@ fn table(heading: &str) -> Vec<Vec<&'static str>> {
     rows.take_while(|line| line.starts_with('|')).map(cells).collect()
 }
 
-/// How the rows of a table write its commands.
+/// Returns the usages of commands in the rows of a table.
 fn usages(heading: &str) -> Vec<String> {
     table(heading)
         .iter()
@@ -59,7 +59,7 @@ fn every_command_and_clause_is_written_as_the_table_says() {
 fn every_parameter_is_told_with_what_it_counts_by_and_may_be() {
     let check = |heading: &str, entries: &[CommandEntry]| {
         let rows: Vec<_> = table(heading).iter().map(|row| row.join(" | ")).collect();
-        let told = |entry: &CommandEntry, p: &ParameterEntry| {
+        let row = |entry: &CommandEntry, p: &ParameterEntry| {
             let default = p.default.unwrap_or("must stand");
             format!(
                 "`{}` | `{}` | {} | {} | {} | {default}",
@@ -71,7 +71,7 @@ fn every_parameter_is_told_with_what_it_counts_by_and_may_be() {
             )
         };
         let parameters = entries.iter().flat_map(|entry| entry.parameters.iter().map(move |p| (entry, p)));
-        let expect: Vec<_> = parameters.map(|(entry, p)| told(entry, p)).collect();
+        let expect: Vec<_> = parameters.map(|(entry, p)| row(entry, p)).collect();
         assert_eq!(rows, expect, "the page should have\n| {} |", expect.join(" |\n| "));
     };
     check("## Parameters", &language().commands);

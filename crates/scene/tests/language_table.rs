@@ -1,8 +1,8 @@
-//! The table of commands tells the truth: what it says of each parameter is what the parser takes and refuses.
+//! Checks the table of commands: the parser accepts and refuses what the table says.
 
 use rayfold_scene::{Code, Command, Diagnostic, Field, Limits, Presence, Values, parse};
 
-/// A line of the command that is in order, with all of its numbers.
+/// Returns a valid line of the command with all of its numbers.
 fn sample(command: Command) -> &'static str {
     match command {
         Command::Screen => "Screen 4 3",
@@ -35,8 +35,8 @@ fn sample(command: Command) -> &'static str {
     }
 }
 
-/// What is wrong with a line that stands in a script which is otherwise in order.
-fn told(line: &str) -> Vec<Diagnostic> {
+/// Returns the errors of a line in a script that is otherwise valid.
+fn errors(line: &str) -> Vec<Diagnostic> {
     let (before, behind) = match line.split(' ').next() {
         Some("Group") => ("", "End\n"),
         Some("End") => ("Group ball\n", ""),
@@ -44,12 +44,12 @@ fn told(line: &str) -> Vec<Diagnostic> {
         _ => ("", ""),
     };
     let script = format!("Screen 4 3\n{before}{line}\n{behind}Trace\n");
-    let mut told = parse("a.txt", script.as_bytes(), &Limits::default()).diagnostics;
-    told.retain(|d| d.is_error() && d.code != Code::LimitExceeded);
-    told
+    let mut errors = parse("a.txt", script.as_bytes(), &Limits::default()).diagnostics;
+    errors.retain(|d| d.is_error() && d.code != Code::LimitExceeded);
+    errors
 }
 
-/// The sample with the numbers from `first` on replaced.
+/// Returns the sample with other numbers from `first` on.
 fn replaced(command: Command, first: usize, numbers: &[String]) -> String {
     let mut words: Vec<String> = sample(command).split(' ').map(String::from).collect();
     for (word, number) in words[1 + first..].iter_mut().zip(numbers) {
@@ -58,7 +58,7 @@ fn replaced(command: Command, first: usize, numbers: &[String]) -> String {
     words.join(" ")
 }
 
-/// Every parameter of every command, and its place among the numbers.
+/// Returns every parameter of every command, and the index of its first number.
 fn fields() -> impl Iterator<Item = (Command, usize, &'static Field)> {
     Command::ALL.iter().flat_map(|&command| {
         let mut first = 0;
@@ -71,7 +71,7 @@ fn fields() -> impl Iterator<Item = (Command, usize, &'static Field)> {
     })
 }
 
-/// Numbers that a parameter takes, and such that it refuses.
+/// Returns numbers that a parameter allows, and numbers that it refuses.
 fn edges(field: &Field) -> (Vec<Vec<String>>, Vec<Vec<String>>) {
     let alike = |number: &str| vec![number.to_owned(); field.names.len()];
     let along = |axis: usize, number: &str| {
@@ -113,7 +113,7 @@ fn edges(field: &Field) -> (Vec<Vec<String>>, Vec<Vec<String>>) {
 fn the_samples_are_in_order_and_whole() {
     for &command in Command::ALL {
         let line = sample(command);
-        assert_eq!(told(line), [], "{line}");
+        assert_eq!(errors(line), [], "{line}");
         if command != Command::Material {
             let form = command.form();
             let names = usize::from(form.subject.is_some());
@@ -128,17 +128,17 @@ fn parameters_take_and_refuse_what_the_table_says() {
     for (command, first, field) in fields() {
         let (taken, refused) = edges(field);
         for numbers in taken {
-            // No torus is as thin as that.
+            // No torus is that thin.
             if command == Command::Torus && field.names == ["R"] && numbers == ["5e-324"] {
                 continue;
             }
             let line = replaced(command, first, &numbers);
-            assert_eq!(told(&line), [], "{line}");
+            assert_eq!(errors(&line), [], "{line}");
         }
         for numbers in refused {
             refused_in_all += 1;
             let line = replaced(command, first, &numbers);
-            let [fault] = &told(&line)[..] else { panic!("one error: {line}") };
+            let [fault] = &errors(&line)[..] else { panic!("one error: {line}") };
             let marked = &fault.excerpt.text[fault.excerpt.marked.clone()];
             assert_eq!((fault.code, marked), (Code::InvalidValue, numbers.join(" ").as_str()), "{line}");
             assert_eq!(fault.excerpt.text, line);
@@ -156,7 +156,7 @@ fn optional_parameters_may_be_left_out_whole_or_number_by_number() {
         let names = usize::from(form.subject.is_some());
         for count in 0..=most {
             let faults: Vec<_> =
-                told(&words[..=names + count].join(" ")).into_iter().map(|d| d.code).collect();
+                errors(&words[..=names + count].join(" ")).into_iter().map(|d| d.code).collect();
             let mut end = 0;
             let is_taken = count >= least
                 && (count == 0

@@ -1,4 +1,4 @@
-//! What is written reads back as the same, and scripts mean what replaying them by hand gives.
+//! Written scripts read back as the same, and their frames equal those of a manual replay.
 //!
 //! A failure prints its seed as a line for a `.proptest-regressions` file.
 
@@ -18,7 +18,7 @@ fn script(text: &str) -> Script {
     parsed.script.unwrap_or_else(|| panic!("{text}\n{}", shown.join("\n")))
 }
 
-/// Any finite number, or one that people write.
+/// Any finite number, with a preference for typical ones.
 fn number() -> impl Strategy<Value = f64> {
     use prop::num::f64::{NEGATIVE, NORMAL, POSITIVE, SUBNORMAL, ZERO};
     prop_oneof![
@@ -32,7 +32,7 @@ fn vector() -> impl Strategy<Value = DVec3> {
     [number(), number(), number()].prop_map(DVec3::from)
 }
 
-/// Greater than 0.
+/// A number greater than 0.
 fn size() -> impl Strategy<Value = f64> {
     number().prop_map(f64::abs).prop_filter("greater than 0", |x| *x > 0.0)
 }
@@ -132,7 +132,7 @@ fn background() -> BoxedStrategy<Background> {
     .boxed()
 }
 
-/// What a picture is, beside its things.
+/// A setting of a scene.
 #[derive(Clone, Debug)]
 enum Setting {
     Samples(Samples),
@@ -185,7 +185,7 @@ fn screen() -> impl Strategy<Value = Screen> {
     (1..=8000u32, 1..=8000u32).prop_map(|(width, height)| Screen::new(width, height).unwrap())
 }
 
-/// A command and what it does to a scene.
+/// A command and its effect on a scene.
 #[derive(Clone, Debug)]
 enum Step {
     Screen(Screen),
@@ -212,7 +212,7 @@ fn step() -> BoxedStrategy<Step> {
     .boxed()
 }
 
-/// A scene of one thing as text: what must stand before its line, and the line.
+/// Writes a scene with one item: the lines that must come before it, and its line.
 fn lines(scene: &Scene) -> (String, String) {
     let text = scene.to_string();
     let mut lines: Vec<_> =
@@ -221,7 +221,7 @@ fn lines(scene: &Scene) -> (String, String) {
     (lines.join("\n"), last)
 }
 
-/// The steps as text, and the scenes that they trace, kept in the plainest way.
+/// Writes the steps as text, and the scenes that they trace, computed in the simplest way.
 fn replay(steps: &[Step]) -> (String, Vec<Scene>) {
     let empty = Scene::new(Screen::new(4, 3).unwrap(), Camera::Orthographic);
     let (mut scene, mut objects, mut lights) = (empty.clone(), Vec::new(), Vec::new());
@@ -245,14 +245,14 @@ fn replay(steps: &[Step]) -> (String, Vec<Scene>) {
             Step::Background(background) => {
                 scene.background = *background;
                 let (low, high) = background.colors();
-                let told = |c: DVec3| format!(" {:e},{:e},{:e}", c.x, c.y, c.z);
-                format!("BACKGROUND{}{}", told(low), high.map_or(String::new(), told))
+                let colour = |c: DVec3| format!(" {:e},{:e},{:e}", c.x, c.y, c.z);
+                format!("BACKGROUND{}{}", colour(low), high.map_or(String::new(), colour))
             }
             Step::Object(object) => {
                 objects.push(object.clone());
                 one.objects = vec![object.clone()].into();
                 let (materials, line) = lines(&one);
-                // Names of materials are given once.
+                // Names of materials must be unique.
                 named += 1;
                 let renamed = |text: String| {
                     text.replace("m1", &format!("a{named}_")).replace("m2", &format!("b{named}"))
@@ -298,7 +298,7 @@ proptest! {
         scene.objects = objects.into();
         scene.lights = lights.into();
         let frames: Vec<_> = script(&scene.to_string()).frames().collect();
-        // The texts of two numbers differ where their bits do; `==` takes 0 and -0 for the same.
+        // The texts of two numbers differ if their bits do, but `==` equates 0 and -0.
         prop_assert_eq!(format!("{frames:?}"), format!("{:?}", [&scene]));
         prop_assert_eq!(frames, [scene]);
     }

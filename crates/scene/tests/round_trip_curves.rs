@@ -1,5 +1,5 @@
-//! Scripts with curves, materials and groups, drawn at random from the table of the language, read back as the same,
-//! and each of their frames is a script of its own.
+//! Random scripts with curves, materials and groups, generated from the table of the language. They read back as the
+//! same, and each of their frames is a script of its own.
 //!
 //! A failure prints its seed as a line for a `.proptest-regressions` file.
 
@@ -10,21 +10,21 @@ use proptest::strategy::ValueTree as _;
 use proptest::test_runner::TestRunner;
 use rayfold_scene::{Clause, Command, Diagnostic, Form, Limits, Script, Values, parse};
 
-/// A number, or one that changes.
+/// A constant number or a curve.
 #[derive(Clone, Debug)]
 enum Number {
-    Still(f64),
-    Moving { words: &'static str, keys: Vec<(f64, f64)> },
+    Constant(f64),
+    Animated { words: &'static str, keys: Vec<(f64, f64)> },
 }
 
-/// A line, before it is known what of it its command takes.
+/// A random line, before it is fitted to its command.
 #[derive(Clone, Debug)]
 struct Draft {
     command: usize,
     numbers: Vec<Number>,
-    /// How many of the numbers that may be left out are.
+    /// The number of optional numbers that are omitted.
     left_out: usize,
-    /// Which name it refers to, if there is one.
+    /// The index of the name that it refers to, if it does.
     name: usize,
 }
 
@@ -41,10 +41,10 @@ fn number() -> impl Strategy<Value = Number> {
     let modes = ["", "linear ", "smooth ", "STEP ", "cycle ", "smooth Cycle ", "cycle step "];
     let keys = prop::collection::btree_map(-50..60i32, value(), 2..6);
     prop_oneof![
-        3 => value().prop_map(Number::Still),
+        3 => value().prop_map(Number::Constant),
         1 => (prop::sample::select(modes.to_vec()), keys).prop_map(|(words, keys)| {
             let keys = keys.into_iter().map(|(frame, value)| (f64::from(frame) / 4.0, value)).collect();
-            Number::Moving { words, keys }
+            Number::Animated { words, keys }
         }),
     ]
 }
@@ -54,7 +54,7 @@ fn draft() -> impl Strategy<Value = Draft> {
         .prop_map(|(command, numbers, left_out, name)| Draft { command, numbers, left_out, name })
 }
 
-/// The number that is nearest in kind to what a parameter takes.
+/// Converts a number to one that a parameter allows.
 fn fitting(values: Values, x: f64) -> f64 {
     let fraction = (x.abs() / 7.0).fract();
     match values {
@@ -83,22 +83,22 @@ fn numbers(form: &Form, draft: &Draft) -> String {
         let fit = |x: f64| fitting(field.values, x);
         text += " ";
         match (number, field.values) {
-            (Number::Still(x), Values::OneOf(words)) => text += words[fit(*x) as usize],
-            (Number::Moving { .. }, Values::OneOf(words)) => text += words[0],
-            (Number::Moving { words, keys }, _) if form.curves => {
+            (Number::Constant(x), Values::OneOf(words)) => text += words[fit(*x) as usize],
+            (Number::Animated { .. }, Values::OneOf(words)) => text += words[0],
+            (Number::Animated { words, keys }, _) if form.curves => {
                 let keys: Vec<_> = keys.iter().map(|(frame, x)| format!("{frame}:{:e}", fit(*x))).collect();
                 text += &format!("({words}{})", keys.join(" "));
             }
-            (Number::Moving { keys, .. }, _) => text += &fit(keys[0].1).to_string(),
-            (Number::Still(x), _) => text += &format!("{:e}", fit(*x)),
+            (Number::Animated { keys, .. }, _) => text += &fit(keys[0].1).to_string(),
+            (Number::Constant(x), _) => text += &format!("{:e}", fit(*x)),
         }
     }
     text
 }
 
-/// A script of these lines; those that may not stand where they do are left out.
+/// Makes a script of these lines. Lines that are not allowed in their place are left out.
 fn script(drafts: &[Draft]) -> String {
-    // Two plain materials, so that there is always one that objects and patterns can name.
+    // Two plain materials, so that objects and patterns always have one to name.
     let mut text = String::from("Screen 4 3\nMaterial m-0 diffuse 1 0 0\nMaterial m-1 ambient .1 .2 .3\n");
     let mut materials: Vec<_> = ["m-0", "m-1"].map(String::from).into();
     let (mut groups, mut is_open) = (Vec::new(), false);
@@ -170,12 +170,12 @@ fn read(text: &str) -> Result<Script, Vec<Diagnostic>> {
     parsed.script.ok_or(parsed.diagnostics)
 }
 
-/// As numbers: the texts of two numbers differ where their bits do; `==` takes 0 and -0 for the same.
+/// Formats numbers exactly: the texts of two numbers differ if their bits do, but `==` equates 0 and -0.
 fn bits(scene: &impl std::fmt::Debug) -> String {
     format!("{scene:?}")
 }
 
-/// What is tried below is everything: each command, clause and word is in scripts that are in order.
+/// The generator covers the language: each command, clause and word occurs in valid scripts.
 #[test]
 fn everything_of_the_language_is_drawn() {
     let mut runner = TestRunner::deterministic();
@@ -208,13 +208,13 @@ proptest! {
     fn scripts_with_curves_read_back(drafts in prop::collection::vec(draft(), 1..40)) {
         let text = script(&drafts);
         let read_first = read(&text);
-        if let Err(told) = &read_first {
-            // Conditions on several numbers, and on curves that grow too large, are left to chance.
-            let is_chance = told.iter().all(|d| {
+        if let Err(faults) = &read_first {
+            // Constraints on several numbers, and overflowing curves, are left to chance.
+            let is_chance = faults.iter().all(|d| {
                 let code = serde_json::to_string(&d.code).unwrap();
                 !d.is_error() || matches!(code.as_str(), "\"invalid-value\"" | "\"curve-overflow\"")
             });
-            prop_assert!(is_chance, "{text}\n{told:#?}");
+            prop_assert!(is_chance, "{text}\n{faults:#?}");
         }
         prop_assume!(read_first.is_ok());
         let first = read_first.unwrap();
@@ -228,9 +228,9 @@ proptest! {
             prop_assert_eq!(bits(&again.frame(k)), bits(&frame));
             let only = first.only(k).unwrap();
             prop_assert_eq!(bits(&only.frame(0)), bits(&frame), "{}\n{}", written, only);
-            let told = only.to_string();
-            let only_again = read(&told);
-            prop_assert_eq!(only_again.as_ref(), Ok(&only), "{}", told);
+            let text_of_one = only.to_string();
+            let only_again = read(&text_of_one);
+            prop_assert_eq!(only_again.as_ref(), Ok(&only), "{}", text_of_one);
         }
         prop_assert!(first.frames().count() == first.frame_count());
     }

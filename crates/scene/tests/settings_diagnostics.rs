@@ -1,6 +1,6 @@
-//! What people read about an `animation.json` with faults, word for word.
+//! The diagnostics of an `animation.json` with faults, word for word.
 //!
-//! After a deliberate change `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews what is expected.
+//! After a deliberate change, `UPDATE_EXPECT=1 cargo test -p rayfold-scene` renews the expected texts.
 
 use expect_test::{Expect, expect};
 use rayfold_scene::parse_settings;

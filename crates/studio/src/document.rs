@@ -1,22 +1,23 @@
-//! A script as lines, and its history: every change is a splice of lines and has an inverse.
+//! A script as lines, with its history. Every change is a splice of lines and has an inverse.
 //!
-//! Knows no file and no scene; a step may carry the pace of the animation, which is no line. Invariant: undoing all that was done gives the bytes that were there before.
+//! Knows no file and no scene. A step may also hold the frame rate of the animation, which is not part of a line.
+//! Invariant: undoing everything restores the original bytes.
 
 use std::collections::VecDeque;
 
 use crate::line::Line;
 
-/// Bytes of lines that the history holds; beyond it the oldest steps are forgotten.
+/// The size of the lines in the history in bytes. Beyond it the oldest steps are dropped.
 const HISTORY_BYTES: usize = 64 << 20;
 
-/// Some lines in place of others.
+/// A replacement of some lines by others.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Splice {
-    /// The first line that changes, from 0.
+    /// The index of the first line that changes, from 0.
     pub at: usize,
-    /// How many lines go.
+    /// The number of lines that are removed.
     pub removed: usize,
-    /// The lines that come in their place.
+    /// The lines that are inserted in their place.
     pub inserted: Vec<Line>,
 }
 
@@ -29,12 +30,12 @@ pub struct Document {
     held: usize,
 }
 
-/// What one undo takes back: the inverses of some splices, in the order in which these were made.
+/// A step that one undo reverts: the inverses of some splices, in the order in which they were made.
 #[derive(Clone, Debug)]
 struct Step {
     gesture: Option<u64>,
     inverses: Vec<Splice>,
-    /// The pace before it, if it has changed that.
+    /// The frame rate before the step, if the step changed it.
     fps: Option<f64>,
 }
 
@@ -52,33 +53,33 @@ impl Step {
 }
 
 impl Document {
-    /// Of a text, without a history.
+    /// Makes a document of a text, without a history.
     pub fn new(text: &[u8]) -> Self {
         Self { lines: Line::split(text), ..Self::default() }
     }
 
-    /// Its lines.
+    /// Returns the lines of the document.
     pub fn lines(&self) -> &[Line] {
         &self.lines
     }
 
-    /// Its text.
+    /// Returns the text of the document.
     pub fn bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.lines.iter().map(|line| line.bytes().len()).sum());
         self.lines.iter().for_each(|line| bytes.extend_from_slice(line.bytes()));
         bytes
     }
 
-    /// Makes a change, as a step of its own or as part of the step before, if that is of the same gesture (a drag, a
-    /// slider). Returns what was done: the splice is cut to the lines that there are, and a last line without an end
-    /// gets one before others follow it.
+    /// Makes a change. It is a step of its own, or part of the previous step if that has the same gesture (a drag, a
+    /// slider). Returns the change that was made: the splice is limited to the existing lines, and a last line
+    /// without an end gets one before others follow it.
     pub fn apply(&mut self, splice: Splice, gesture: Option<u64>) -> Splice {
         let splice = self.fitted(splice);
         let inverse = self.splice(&splice);
         self.held -= self.undone.drain(..).map(|step| step.size()).sum::<usize>();
         match self.done.back_mut() {
             Some(step) if gesture.is_some() && step.gesture == gesture => {
-                // The lines that a drag sets again and again are kept once, as they were at its start.
+                // Lines that a drag sets repeatedly are stored once, as they were at its start.
                 let in_place = |splice: &Splice| splice.inserted.len() == splice.removed;
                 let again = in_place(&inverse)
                     && step.inverses.iter().all(in_place)
@@ -99,7 +100,7 @@ impl Document {
         splice
     }
 
-    /// Makes a change exactly as it is given, line ends and all, as a step of its own: what a file holds.
+    /// Makes a change exactly as given, including line ends, as a step of its own. Used for the content of a file.
     pub fn replace(&mut self, splice: Splice) -> Vec<Splice> {
         if splice.removed == 0 && splice.inserted.is_empty() {
             return Vec::new();
@@ -110,13 +111,14 @@ impl Document {
         vec![splice]
     }
 
-    /// The pace of the animation was changed, as a step of its own; `before` held until now.
-    pub fn paced(&mut self, before: f64) {
+    /// Records a change of the animation's frame rate as a step of its own. `before` is the old frame rate.
+    pub fn frame_rate_changed(&mut self, before: f64) {
         self.held -= self.undone.drain(..).map(|step| step.size()).sum::<usize>();
         self.done.push_back(Step { gesture: None, inverses: Vec::new(), fps: Some(before) });
     }
 
-    /// Takes the last step back; the splices that this took, in their order. Where it has changed the pace, `fps` is exchanged.
+    /// Undoes the last step. Returns the splices in their order. If the step changed the frame rate, `fps` is
+    /// exchanged with the old one.
     pub fn undo(&mut self, fps: &mut f64) -> Vec<Splice> {
         let Some(step) = self.done.pop_back() else { return Vec::new() };
         let (splices, inverse) = self.take_back(step, fps);
@@ -124,7 +126,7 @@ impl Document {
         splices
     }
 
-    /// Makes again what was taken back last; as [`Document::undo`].
+    /// Redoes the step that was undone last, like [`Document::undo`].
     pub fn redo(&mut self, fps: &mut f64) -> Vec<Splice> {
         let Some(step) = self.undone.pop() else { return Vec::new() };
         let (splices, inverse) = self.take_back(step, fps);
@@ -132,12 +134,12 @@ impl Document {
         splices
     }
 
-    /// Whether there is something to undo.
+    /// Returns whether there is a step to undo.
     pub fn can_undo(&self) -> bool {
         !self.done.is_empty()
     }
 
-    /// Whether there is something to redo.
+    /// Returns whether there is a step to redo.
     pub fn can_redo(&self) -> bool {
         !self.undone.is_empty()
     }
@@ -146,8 +148,8 @@ impl Document {
         self.held -= step.size();
         let splices: Vec<_> = step.inverses.into_iter().rev().collect();
         let inverses = splices.iter().map(|splice| self.splice(splice)).collect();
-        let paced = step.fps.map(|before| std::mem::replace(fps, before));
-        let inverse = Step { gesture: None, inverses, fps: paced };
+        let frame_rate_changed = step.fps.map(|before| std::mem::replace(fps, before));
+        let inverse = Step { gesture: None, inverses, fps: frame_rate_changed };
         self.held += inverse.size();
         (splices, inverse)
     }
@@ -158,7 +160,7 @@ impl Document {
         let mut removed = removed.min(self.lines.len() - at);
         let end: &[u8] =
             if self.lines.first().is_some_and(|line| line.end() == b"\r\n") { b"\r\n" } else { b"\n" };
-        // The end of a text stays as it is.
+        // The end of the text stays unchanged.
         let endless = removed > 0
             && at + removed == self.lines.len()
             && self.lines.last().is_some_and(|line| line.end().is_empty());
@@ -176,7 +178,7 @@ impl Document {
         Splice { at, removed, inserted }
     }
 
-    /// Makes a change; its inverse.
+    /// Makes a change. Returns its inverse.
     fn splice(&mut self, splice: &Splice) -> Splice {
         let range = splice.at..splice.at + splice.removed;
         let removed = self.lines.splice(range, splice.inserted.iter().cloned()).collect();
@@ -240,7 +242,7 @@ mod tests {
         assert!(document.done.len() < 8 && document.held <= HISTORY_BYTES);
     }
 
-    /// A text with all kinds of lines and ends, and 10,000 random edits, undos and redos of it.
+    /// A text with all kinds of lines and line ends, and 10,000 random edits, undos and redos of it.
     #[test]
     fn ten_thousand_edits_and_undos_end_in_the_same_bytes() {
         let line = "[ -~\\t\u{e4}\u{20ac}]{0,12}(\n|\r\n)";
@@ -266,7 +268,7 @@ mod tests {
                     mirror.clone()
                 };
                 for (at, removed, inserted, gesture, what) in edits {
-                    let told = match what {
+                    let splices = match what {
                         0 => document.undo(&mut 10.0),
                         1 => document.redo(&mut 10.0),
                         _ => {
@@ -274,7 +276,11 @@ mod tests {
                             vec![document.apply(Splice { at, removed, inserted }, gesture)]
                         }
                     };
-                    prop_assert_eq!(&follow(&told)[..], document.lines(), "what is told is what was done");
+                    prop_assert_eq!(
+                        &follow(&splices)[..],
+                        document.lines(),
+                        "the returned splices are those that were made"
+                    );
                 }
                 let edited = document.bytes();
                 let mut steps = 0;

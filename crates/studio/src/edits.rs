@@ -1,12 +1,11 @@
-//! Edits of a script that are more than one number: new objects, copies, what is hidden, what falls down. Lines in,
-//! splices out.
+//! Edits of a script that affect more than one number: new objects, copies, hidden lines. Lines in, splices out.
 
 use glam::DVec3;
 use rayfold_scene::{Command, Kind, Parameter, Presence, parse_curve};
 
 use crate::document::Splice;
 use crate::line::{Line, written};
-use crate::stage::Stage;
+use crate::source_map::SourceMap;
 use crate::tables::{Role, fields, role};
 use crate::values::{Keying, Values, changed, tidy};
 use crate::view::Bounds;
@@ -21,18 +20,19 @@ const COLORS: [[f64; 3]; 6] = [
     [0.75, 0.75, 0.75],
 ];
 
-/// What a script needs before anything of it can be seen.
+/// The lines that a script needs before an object is visible.
 const SCREEN: &str = "Screen 960 540";
 const CAMERA: &str = "Camera 0 3 9  0 -0.28 -1  0 1 0  1  -0.8 -0.45  0.8 0.45";
 const BACKGROUND: &str = "Background 0.86 0.9 0.95";
 const SUN: &str = "Ilight 0.8 0.8 0.8  0.6 -1 -0.5   # sun";
 
-/// One line in place of another.
+/// Replaces one line by another.
 pub(crate) fn set(line: usize, to: Line) -> Splice {
     Splice { at: line, removed: 1, inserted: vec![to] }
 }
 
-/// A new line of a command: an object of about `size` that stands on `ground`, the `count`th in its script.
+/// Makes the line for a new object or light of about `size`, which stands on `ground` and is the
+/// `count`th in its script.
 pub(crate) fn new_line(command: Command, ground: DVec3, size: f64, count: usize) -> Line {
     let decimals = (2.0 - size.log10().floor()).clamp(0.0, 12.0) as usize;
     let round = |x: f64| format!("{x:.decimals$}").parse::<f64>().unwrap_or(x);
@@ -79,34 +79,39 @@ pub(crate) fn new_line(command: Command, ground: DVec3, size: f64, count: usize)
     Line::new(&text)
 }
 
-/// Adds a line of a frame, with all that is missing to see it; what is done, and where the line is then.
-pub(crate) fn add(lines: &[Line], stage: &Stage, line: Line) -> (Vec<Splice>, usize) {
+/// Adds a line to a frame, with all missing lines that make it visible. Returns the changes, and the new
+/// index of the line.
+pub(crate) fn add(lines: &[Line], source_map: &SourceMap, line: Line) -> (Vec<Splice>, usize) {
     let mut before = Vec::new();
-    if stage.screen.is_none() {
+    if source_map.screen.is_none() {
         before.push(Line::new(SCREEN));
     }
-    if stage.camera.is_none() && stage.objects.is_empty() && stage.trace.is_none() {
+    if source_map.camera.is_none() && source_map.objects.is_empty() && source_map.trace.is_none() {
         before.push(Line::new(CAMERA));
-        if stage.background.is_none() {
+        if source_map.background.is_none() {
             before.push(Line::new(BACKGROUND));
         }
     }
     let is_light = line.command().is_some_and(|command| role(command) == Role::Light);
-    if stage.lights.is_empty() && stage.objects.is_empty() && stage.trace.is_none() && !is_light {
+    if source_map.lights.is_empty()
+        && source_map.objects.is_empty()
+        && source_map.trace.is_none()
+        && !is_light
+    {
         before.push(Line::new(SUN));
     }
-    let at = stage.end(lines);
+    let at = source_map.end(lines);
     let place = at + before.len();
     let mut inserted = before;
     inserted.push(line);
-    if stage.trace.is_none() {
+    if source_map.trace.is_none() {
         inserted.push(Line::new(Command::Trace.name()));
     }
-    // A new line behind a last one without an end begins where that one gets its end.
+    // A new line after a last line without an end starts where that one gets its end.
     (vec![Splice { at, removed: 0, inserted }], place)
 }
 
-/// Lines go; from the last to the first.
+/// Removes lines, from the last to the first.
 pub(crate) fn remove(lines: &[usize]) -> Vec<Splice> {
     let mut lines = lines.to_vec();
     lines.sort_unstable();
@@ -114,7 +119,7 @@ pub(crate) fn remove(lines: &[usize]) -> Vec<Splice> {
     lines.into_iter().rev().map(|at| Splice { at, removed: 1, inserted: Vec::new() }).collect()
 }
 
-/// Lines again, each behind itself and a little aside; the lines of the copies.
+/// Copies lines, each after itself and a little aside. Returns the changes and the lines of the copies.
 pub(crate) fn duplicate(lines: &[Line], which: &[usize], aside: f64) -> (Vec<Splice>, Vec<usize>) {
     let mut which: Vec<_> = which.iter().copied().filter(|&line| line < lines.len()).collect();
     which.sort_unstable();
@@ -130,7 +135,7 @@ pub(crate) fn duplicate(lines: &[Line], which: &[usize], aside: f64) -> (Vec<Spl
     (which.iter().rev().map(|&at| copy(at)).collect(), copies)
 }
 
-/// A line with all its positions moved; those numbers that stay are not touched.
+/// Moves all positions of a line. Numbers that do not change are not rewritten.
 pub(crate) fn moved(line: &Line, by: DVec3, keying: Keying) -> Option<Line> {
     let values = Values::of(line, keying.time)?;
     values.positions().try_fold(line.clone(), |line, (first, position)| {
@@ -140,7 +145,7 @@ pub(crate) fn moved(line: &Line, by: DVec3, keying: Keying) -> Option<Line> {
     })
 }
 
-/// The command that a comment hides; its line without the sign.
+/// Returns the command line that is hidden in a comment.
 pub(crate) fn hidden(line: &Line) -> Option<Line> {
     let text = line.text();
     let inner = text.trim_start().strip_prefix('#')?;
@@ -164,7 +169,7 @@ pub(crate) fn hidden(line: &Line) -> Option<Line> {
     is_meant.then_some(inner)
 }
 
-/// Lines become comments; if all of them are hidden, commands again.
+/// Turns lines into comments. If all of them are hidden, turns them back into commands.
 pub(crate) fn hide(lines: &[Line], which: &[usize]) -> Vec<Splice> {
     let which = || which.iter().filter_map(|&at| Some((at, lines.get(at)?)));
     let back: Vec<_> = which().filter_map(|(at, line)| Some(set(at, hidden(line)?))).collect();
@@ -177,14 +182,14 @@ pub(crate) fn hide(lines: &[Line], which: &[usize]) -> Vec<Splice> {
         .collect()
 }
 
-/// A line changes places with the neighbour of its kind.
+/// Exchanges a line with its neighbour of the same kind.
 pub(crate) fn reorder(
     lines: &[Line],
-    stage: &Stage,
+    source_map: &SourceMap,
     line: usize,
     down: bool,
 ) -> Option<(Vec<Splice>, usize)> {
-    let row = [&stage.objects, &stage.lights].into_iter().find(|row| row.contains(&line))?;
+    let row = [&source_map.objects, &source_map.lights].into_iter().find(|row| row.contains(&line))?;
     let at = row.iter().position(|&other| other == line)?;
     let other = *if down { row.get(at + 1)? } else { row.get(at.checked_sub(1)?)? };
     let (first, second) = (line.min(other), line.max(other));
@@ -194,10 +199,10 @@ pub(crate) fn reorder(
     Some((vec![Splice { at: first, removed: last + 1, inserted }], other))
 }
 
-/// The `Trace` of a frame is so many frames.
-pub(crate) fn set_frames(lines: &[Line], stage: &Stage, count: u32) -> Vec<Splice> {
+/// Sets the number of frames of a frame's `Trace`.
+pub(crate) fn set_frames(lines: &[Line], source_map: &SourceMap, count: u32) -> Vec<Splice> {
     let number = |count: u32| f64::from(count);
-    let old = stage.frames.and_then(|at| Some((at, lines.get(at)?)));
+    let old = source_map.frames.and_then(|at| Some((at, lines.get(at)?)));
     if let Some((at, line)) = old {
         let words = line.words().map_or(0, |words| words.parameters.len());
         let changed = match Values::of(line, 1.0).and_then(|values| values.number(0)) {
@@ -207,18 +212,18 @@ pub(crate) fn set_frames(lines: &[Line], stage: &Stage, count: u32) -> Vec<Splic
         return changed.map(|line| set(at, line)).into_iter().collect();
     }
     let frames = |count: u32| Line::new(&format!("{} {count}", Command::Frames.name()));
-    let Some(trace) = stage.trace else {
+    let Some(trace) = source_map.trace else {
         let inserted = vec![frames(count)];
         return vec![Splice { at: lines.len(), removed: 0, inserted }];
     };
-    // Those that follow stay what they were.
+    // Later traces keep their frames.
     let follows = lines[trace + 1..].iter().any(|line| line.command() == Some(Command::Trace));
     let behind = Splice { at: trace + 1, removed: 0, inserted: vec![frames(1)] };
     let before = Splice { at: trace, removed: 0, inserted: vec![frames(count)] };
     if follows { vec![behind, before] } else { vec![before] }
 }
 
-/// Where the lamps and groups of some lines are.
+/// Returns the bounds of the positions of some lines' lamps and groups.
 pub(crate) fn places<'a>(lines: impl IntoIterator<Item = &'a Line>, time: f64) -> Option<Bounds> {
     let values = lines.into_iter().filter_map(|line| Values::of(line, time));
     Bounds::of(values.filter(|values| role(values.command) != Role::Camera).flat_map(|values| {
@@ -254,7 +259,7 @@ mod tests {
             for text in ["", "# mine", "Screen 4 3\r\nTrace\r\n", "Screen 4 3\nTrace"] {
                 let lines = Line::split(text.as_bytes());
                 let line = new_line(command, DVec3::new(1.0, 0.0, -2.0), 0.7, 3);
-                let (splices, at) = add(&lines, &Stage::of(&lines, 0, 1.0), line);
+                let (splices, at) = add(&lines, &SourceMap::of(&lines, 0, 1.0), line);
                 let text = after(text, splices);
                 check(&text);
                 assert_eq!(Line::split(text.as_bytes())[at].command(), Some(command), "{text}");
@@ -288,7 +293,7 @@ mod tests {
     fn a_trace_becomes_so_many_frames() {
         let set = |text: &str, frame, count| {
             let lines = Line::split(text.as_bytes());
-            after(text, set_frames(&lines, &Stage::of(&lines, frame, 1.0), count))
+            after(text, set_frames(&lines, &SourceMap::of(&lines, frame, 1.0), count))
         };
         assert_eq!(set("Screen 4 3\nTrace\n", 0, 50), "Screen 4 3\nFrames 50\nTrace\n");
         assert_eq!(set("Screen 4 3\nFrames 9 # all\nTrace\n", 4, 50), "Screen 4 3\nFrames 50 # all\nTrace\n");
@@ -311,9 +316,9 @@ mod tests {
             [Some(Command::Sphere), Some(Command::Cuboid)]
         );
         let lines = Line::split(TEXT.as_bytes());
-        let (splices, at) = reorder(&lines, &Stage::of(&lines, 0, 1.0), 1, true).unwrap();
+        let (splices, at) = reorder(&lines, &SourceMap::of(&lines, 0, 1.0), 1, true).unwrap();
         let text = after(TEXT, splices);
         assert_eq!((at, Line::split(text.as_bytes())[3].command()), (3, Some(Command::Sphere)));
-        assert!(reorder(&lines, &Stage::of(&lines, 0, 1.0), 1, false).is_none());
+        assert!(reorder(&lines, &SourceMap::of(&lines, 0, 1.0), 1, false).is_none());
     }
 }

@@ -1,52 +1,52 @@
-//! Why the studio could not do what it was asked.
+//! The errors of the studio.
 
 use std::io;
 use std::path::PathBuf;
 
-/// Why the studio could not do what it was asked.
+/// An error of the studio.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A file or folder cannot be read.
     #[error("cannot read {}", path.display())]
     Read {
-        /// Which.
+        /// The path of the file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] rayfold_files::Error),
-    /// A folder without a script.
+    /// The folder holds no script.
     #[error("the folder {} holds no scene scripts (*.txt)", path.display())]
     NoScripts {
-        /// Which.
+        /// The path of the folder.
         path: PathBuf,
     },
-    /// More text than is held in memory.
+    /// The files are larger than the studio holds in memory.
     #[error("{} and what is opened with it are larger than {limit} bytes, which is more than the studio holds", path.display())]
     TooLarge {
-        /// The file with which it became too much.
+        /// The file that exceeded the limit.
         path: PathBuf,
-        /// How much is held.
+        /// The limit in bytes.
         limit: u64,
     },
-    /// A name that a new script cannot have.
+    /// A new script cannot have this name.
     #[error("{name}: {problem}")]
     Name {
         /// The name, or its beginning.
         name: String,
-        /// What is wrong with it, and what would be right.
+        /// The problem, and a correction.
         problem: &'static str,
     },
-    /// What `animation.json` says is no settings.
+    /// The content of `animation.json` is invalid.
     #[error("{0}")]
     Settings(String),
-    /// No socket, no randomness.
+    /// There is no free port, or the system has no randomness.
     #[error("cannot start the server of the page")]
     Server(#[source] io::Error),
-    /// There is no page to show.
+    /// The page is not available.
     #[error("the page has not been built: {0}")]
     NoPage(String),
     /// The animation cannot be rendered.
@@ -54,8 +54,8 @@ pub enum Error {
     Output(String),
 }
 
-/// An error with all that it rests on, for people. What stores say of credentials is that they are missing or wrong,
-/// never which they are.
+/// Formats an error with its causes, for messages. A store's error about credentials says that they are missing or
+/// wrong, but does not contain them.
 pub(crate) fn words(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut source = error.source();

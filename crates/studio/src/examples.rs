@@ -1,9 +1,9 @@
-//! Scenes to begin with: those of `scenes/`, each as one script.
+//! Example scenes to start with: those of `scenes/`, each as one script.
 
-/// An example's name and its text.
+/// The name and the text of an example.
 type Example = (&'static str, &'static str);
 
-/// All of them: one script with curves where the animation is one, else the first of its frames.
+/// All examples: the script with curves if the animation has one, else the script of its first frame.
 const ALL: [Example; 10] = [
     ("hello", include_str!("../../../scenes/hello/frame01.txt")),
     ("marbles", include_str!("../../../scenes/marbles/marbles.txt")),
@@ -17,12 +17,12 @@ const ALL: [Example; 10] = [
     ("artisticsss", include_str!("../../../scenes/artisticsss/frame01.txt")),
 ];
 
-/// Their names.
+/// Returns the names of the examples.
 pub(crate) fn names() -> Vec<&'static str> {
     ALL.iter().map(|(name, _)| *name).collect()
 }
 
-/// The text of one.
+/// Returns the text of an example.
 pub(crate) fn text(name: &str) -> Option<&'static str> {
     ALL.iter().find(|(other, _)| *other == name).map(|(_, text)| *text)
 }

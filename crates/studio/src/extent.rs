@@ -1,13 +1,13 @@
-//! How far objects of the tracer reach in a direction, exactly: the support function of each shape.
+//! The exact extent of the tracer's objects in a direction: the support function of each shape.
 
 use glam::DVec3;
 use rayfold_scene::Object;
 
 use crate::view::Bounds;
 
-/// The greatest p·d over all points p of an object; `None` for one without an end.
+/// Returns the maximum of p·d over all points p of an object, or `None` if the object is unbounded.
 pub(crate) fn reach(object: &Object, d: DVec3) -> Option<f64> {
-    // A disc of radius 1 square to an axis.
+    // The support of a disc of radius 1 perpendicular to an axis.
     let across = |axis: DVec3| {
         let axis = axis.normalize_or_zero();
         (d - d.dot(axis) * axis).length()
@@ -43,7 +43,7 @@ pub(crate) fn reach(object: &Object, d: DVec3) -> Option<f64> {
     })
 }
 
-/// The box around some objects; `None` where there is none that ends.
+/// Returns the box around some objects, or `None` if none of them is bounded.
 pub(crate) fn bounds<'a>(objects: impl IntoIterator<Item = &'a Object>) -> Option<Bounds> {
     let of = |object: &Object| {
         let most = |d: DVec3| reach(object, d);
@@ -62,7 +62,7 @@ mod tests {
 
     use super::*;
 
-    /// The tracer's own hits, from all around, lie within the reach of each shape, and come close to it.
+    /// From all directions, the tracer's hits lie within the extent of each shape, and come close to it.
     #[test]
     fn what_is_hit_lies_within_reach() {
         let shapes = [

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use crate::error::Error;
 
-/// Bytes of all files together that are held.
+/// The largest size in bytes of all files of a project together.
 pub(crate) const TEXT: u64 = 256 << 20;
 
-/// The bytes of a file; `None` if it is not there.
+/// Returns the bytes of a file, or `None` if it does not exist.
 pub(crate) fn read(path: &Path) -> Result<Option<Vec<u8>>, Error> {
     let failed = |source| Error::Read { path: path.to_path_buf(), source };
     let file = match rayfold_files::open(path) {

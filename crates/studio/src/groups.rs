@@ -1,5 +1,5 @@
-//! Several lines become a group, and a `Use` of it takes their place: what is seen stays, and they move and turn as one. And
-//! back again.
+//! Grouping: several lines become a group, and a `Use` takes their place. The picture stays the same, and they move
+//! and turn as one. Ungrouping reverses that.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -11,27 +11,27 @@ use crate::document::Splice;
 use crate::edits::moved;
 use crate::extent::bounds;
 use crate::line::{Line, written};
-use crate::stage::Stage;
+use crate::source_map::SourceMap;
 use crate::values::{Keying, Values};
 
-/// Why some lines cannot be a group.
+/// The reason why some lines cannot be grouped or ungrouped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Refusal {
-    /// None of them is drawn by itself.
+    /// None of the lines is drawn on its own.
     NothingDrawn,
-    /// A `Trace` or a `Clear` stands between them.
+    /// A `Trace` or a `Clear` is between the lines.
     SeveralFrames,
-    /// Its lines cannot say how it stands.
+    /// The lines cannot express the rotation or scale of the group.
     Turned,
 }
 
 impl Refusal {
-    /// For people.
-    pub(crate) fn told(self) -> &'static str {
+    /// Returns the message for the user.
+    pub(crate) fn message(self) -> &'static str {
         match self {
             Self::NothingDrawn => "Only objects and groups of the picture can be grouped: select some first.",
             Self::SeveralFrames => {
-                "These cannot be a group: a `Trace` or a `Clear` stands between them in the script."
+                "These cannot be a group: a `Trace` or a `Clear` is between them in the script."
             }
             Self::Turned => {
                 "Only a `Use` of a group that is neither turned nor sized, and whose place has no keys, can be taken apart."
@@ -40,18 +40,19 @@ impl Refusal {
     }
 }
 
-/// Makes a group of lines; what is done, and the line of its `Use` then. The origin of the group is in the middle of what they
-/// draw, at its foot, so that it turns about that; where a pattern would slide it stays where it was.
+/// Makes a group of lines. Returns the changes, and the new index of the line of its `Use`. The origin of the group
+/// is at the foot of the middle of its objects, about which it turns. If a pattern would slide, the origin stays
+/// that of the world.
 ///
 /// # Errors
-/// When they cannot be one.
+/// Returns the reason if they cannot be a group.
 pub(crate) fn group(
     lines: &[Line],
-    stage: &Stage,
+    source_map: &SourceMap,
     scene: &Scene,
     which: &[usize],
 ) -> Result<(Vec<Splice>, usize), Refusal> {
-    let chosen: Vec<usize> = stage.objects.iter().copied().filter(|line| which.contains(line)).collect();
+    let chosen: Vec<usize> = source_map.objects.iter().copied().filter(|line| which.contains(line)).collect();
     let (Some(&first), Some(&last)) = (chosen.iter().min(), chosen.iter().max()) else {
         return Err(Refusal::NothingDrawn);
     };
@@ -59,7 +60,7 @@ pub(crate) fn group(
     if lines[first..=last].iter().any(ends) {
         return Err(Refusal::SeveralFrames);
     }
-    let pivot = pivot(stage, scene, &chosen);
+    let pivot = pivot(source_map, scene, &chosen);
     let name = free_name(lines);
     let mut inserted: Vec<Line> =
         (first..=last).filter(|at| !chosen.contains(at)).map(|at| lines[at].clone()).collect();
@@ -75,11 +76,11 @@ pub(crate) fn group(
     Ok((vec![Splice { at: first, removed: last + 1 - first, inserted }], place))
 }
 
-/// Takes a `Use` apart: the lines of its group take its place, where it has them. The group goes if nothing else uses it. What is
-/// done, and the lines that come.
+/// Takes a `Use` apart: the lines of its group replace it, moved to its position. Removes the group if no other line
+/// uses it. Returns the changes, and the new lines.
 ///
 /// # Errors
-/// When the lines alone cannot say how it stands.
+/// Returns the reason if the lines alone cannot express the group's placement.
 pub(crate) fn ungroup(lines: &[Line], at: usize) -> Result<(Vec<Splice>, Range<usize>), Refusal> {
     let found = lines.get(at).filter(|line| line.command() == Some(Command::Use));
     let (Some(line), Some(name)) = (found, found.and_then(Line::subject)) else {
@@ -109,10 +110,10 @@ pub(crate) fn ungroup(lines: &[Line], at: usize) -> Result<(Vec<Splice>, Range<u
     Ok((splices, place))
 }
 
-/// Where the group's origin comes to be.
-fn pivot(stage: &Stage, scene: &Scene, chosen: &[usize]) -> DVec3 {
+/// Returns the origin of a new group.
+fn pivot(source_map: &SourceMap, scene: &Scene, chosen: &[usize]) -> DVec3 {
     let own = || {
-        let of_line = |at: usize| stage.line_of(at).is_some_and(|line| chosen.contains(&line));
+        let of_line = |at: usize| source_map.line_of(at).is_some_and(|line| chosen.contains(&line));
         scene.objects.iter().enumerate().filter(move |(at, _)| of_line(*at)).map(|(_, object)| object)
     };
     let slides = |object: &Object| match object {
@@ -130,7 +131,7 @@ fn pivot(stage: &Stage, scene: &Scene, chosen: &[usize]) -> DVec3 {
     if pivot.is_finite() { pivot + 0.0 } else { DVec3::ZERO }
 }
 
-/// A name that no group has.
+/// Returns a name that no group has.
 fn free_name(lines: &[Line]) -> String {
     let is_group = |line: &&Line| line.command() == Some(Command::Group);
     let taken: HashSet<&str> = lines.iter().filter(is_group).filter_map(Line::subject).collect();
@@ -153,7 +154,7 @@ mod tests {
 
     fn grouped(text: &str, which: &[usize]) -> Result<(String, usize), Refusal> {
         let lines = Line::split(text.as_bytes());
-        let (splices, at) = group(&lines, &Stage::of(&lines, 0, 1.0), &scene(text), which)?;
+        let (splices, at) = group(&lines, &SourceMap::of(&lines, 0, 1.0), &scene(text), which)?;
         let mut document = Document::new(text.as_bytes());
         for splice in splices {
             document.apply(splice, None);
@@ -190,7 +191,7 @@ mod tests {
         assert_eq!(grouped(&text, &[0, 2]), Err(Refusal::NothingDrawn));
         let lines = Line::split(text.as_bytes());
         let last = rayfold_scene::parse("a", text.as_bytes(), &Default::default()).script.unwrap();
-        let found = group(&lines, &Stage::of(&lines, 1, 1.0), &last.frame(1).unwrap(), &[3, 5]);
+        let found = group(&lines, &SourceMap::of(&lines, 1, 1.0), &last.frame(1).unwrap(), &[3, 5]);
         assert_eq!(found, Err(Refusal::SeveralFrames));
     }
 

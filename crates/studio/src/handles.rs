@@ -1,9 +1,10 @@
-//! What can be dragged: an object by its body, along an axis, by its corners, its radius, a light by its direction; and
-//! which numbers of its line become what.
+//! The handles that can be dragged, and the numbers that a drag changes: an object by its body, along an axis, by its
+//! corners or its radius, and a light by its direction.
 //!
-//! It knows commands only by the kinds of their parameters: a position is a handle, a length is one at its distance
-//! from the first position, a direction is the tip of an arrow; angles and a scale are turned and pulled (`turning`). Invariant: a drag is computed from what stood when it
-//! began, so that going back to its start changes nothing.
+//! Knows commands only by the kinds of their parameters. A position is a handle. A length is a handle at that
+//! distance from the first position. A direction is the tip of an arrow. Angles and a scale have handles of
+//! their own (`rotate_handles`). Invariant: a drag is computed from the state at its start, so returning to
+//! the start changes nothing.
 
 use std::cell::Cell;
 
@@ -12,87 +13,88 @@ use rayfold_scene::{Command, Kind, Parameter};
 use serde::{Deserialize, Serialize};
 
 use crate::line::Line;
+use crate::rotate_handles;
 use crate::tables::{Role, fields, role};
-use crate::turning;
 use crate::values::{Keying, Values, changed};
 use crate::view::Projection;
 
-/// How long arrows are, in pixels of the picture.
+/// The length of an arrow in pixels of the picture.
 const ARROW: f64 = 72.0;
 
-/// Where the handle of a plane is along its two axes, in arrows.
+/// The position of a plane's handle along its two axes, in arrows.
 const PLANE: f64 = 0.35;
 
-/// A surface that is seen more slanted than this sine is not dragged along: a pixel would be miles.
+/// The sine of the smallest angle between the view direction and a plane at which the plane can be dragged along. At
+/// smaller angles, a pixel would be a huge distance.
 const SLANTED: f64 = 0.12;
 
-/// A grid's width that dragging snaps to, in pixels, at least.
+/// The smallest width of the snapping grid in pixels.
 const SNAP: f64 = 12.0;
 
-/// What is taken hold of.
+/// The kind of a handle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "what")]
-pub(crate) enum Grip {
-    /// All of the selected lines, along the ground.
+pub(crate) enum HandleKind {
+    /// All selected lines, along the ground.
     Body,
-    /// All of them, along an axis: 0 is x.
+    /// All selected lines, along an axis: 0 is x.
     Axis {
-        /// Which.
+        /// The index of the axis.
         axis: usize,
     },
-    /// All of them, along the plane across an axis: 0 is that of y and z.
+    /// All selected lines, along the plane across an axis: 0 is the plane of y and z.
     Plane {
-        /// Across which.
+        /// The index of the axis across the plane.
         axis: usize,
     },
     /// The position whose numbers begin here.
     Point {
-        /// Of the line's numbers, from 0.
+        /// The index in the line's numbers, from 0.
         first: usize,
     },
     /// The length that is this number.
     Length {
-        /// Of the line's numbers, from 0.
+        /// The index in the line's numbers, from 0.
         first: usize,
     },
     /// The direction whose numbers begin here.
     Direction {
-        /// Of the line's numbers, from 0.
+        /// The index in the line's numbers, from 0.
         first: usize,
     },
     /// One of the angles whose numbers begin here.
     Turn {
-        /// Of the line's numbers, from 0.
+        /// The index in the line's numbers, from 0.
         first: usize,
-        /// Which: 0 is about x.
+        /// The axis of the angle: 0 is x.
         axis: usize,
     },
     /// The scale that is this number.
     Scale {
-        /// Of the line's numbers, from 0.
+        /// The index in the line's numbers, from 0.
         first: usize,
     },
 }
 
-/// Something to take hold of, in the picture.
+/// A handle in the picture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Handle {
-    /// What it does.
-    pub(crate) grip: Grip,
-    /// Its line in the script, from 0.
+    /// The kind of the handle.
+    pub(crate) grip: HandleKind,
+    /// The index of its line in the script, from 0.
     pub(crate) line: usize,
-    /// For those who cannot see it.
+    /// A description for screen readers.
     pub(crate) label: String,
-    /// Where it is, in pixels.
+    /// The position in pixels.
     pub(crate) at: [f64; 2],
-    /// Where the line to it starts, in pixels.
+    /// The start of the line to the handle, in pixels.
     pub(crate) from: [f64; 2],
-    /// The way along which it goes, as the path of an SVG.
+    /// The path along which the handle moves, as an SVG path.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub(crate) way: String,
 }
 
-/// The handles of a line with these values; `around` is where lights without a place are shown.
+/// Returns the handles of a line with these values. `around` is the point where lights without a position are shown.
 pub(crate) fn handles(number: usize, values: &Values, projection: &Projection, around: DVec3) -> Vec<Handle> {
     let mut handles = Vec::new();
     let mut add = |grip, from: DVec3, to: DVec3, label: &str, way: String| {
@@ -111,7 +113,7 @@ pub(crate) fn handles(number: usize, values: &Values, projection: &Projection, a
         let arrow = arrow + values.reach();
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             add(
-                Grip::Axis { axis },
+                HandleKind::Axis { axis },
                 middle,
                 middle + arrow * DVec3::AXES[axis],
                 &format!("along {name}: place"),
@@ -120,10 +122,10 @@ pub(crate) fn handles(number: usize, values: &Values, projection: &Projection, a
         }
         let (_, _, w) = projection.axes();
         for (axis, names) in ["y and z", "x and z", "x and y"].into_iter().enumerate() {
-            // Seen edge on, a plane is a line.
+            // A plane that is seen edge on is a line.
             if w[axis].abs() > SLANTED {
                 let to = middle + PLANE * arrow * (DVec3::ONE - DVec3::AXES[axis]);
-                add(Grip::Plane { axis }, middle, to, &format!("along {names}: place"), straight());
+                add(HandleKind::Plane { axis }, middle, to, &format!("along {names}: place"), straight());
             }
         }
     }
@@ -133,37 +135,43 @@ pub(crate) fn handles(number: usize, values: &Values, projection: &Projection, a
         match field.kind {
             Kind::Position => {
                 if let (Some(position), true) = (values.vector(first), positions.len() > 1) {
-                    add(Grip::Point { first }, position, position, &label, straight());
+                    add(HandleKind::Point { first }, position, position, &label, straight());
                 }
             }
             Kind::Length if !positions.is_empty() => {
                 if let Some(length) = values.number(first) {
                     let at = anchor + length * toward(lengths, projection);
                     lengths += 1;
-                    add(Grip::Length { first }, anchor, at, &label, straight());
+                    add(HandleKind::Length { first }, anchor, at, &label, straight());
                 }
             }
             Kind::Direction => {
                 if let Some(direction) = values.vector(first).and_then(DVec3::try_normalize) {
                     let tip = anchor + arrow * facing(values.command) * direction;
-                    add(Grip::Direction { first }, anchor, tip, &label, straight());
+                    add(HandleKind::Direction { first }, anchor, tip, &label, straight());
                 }
             }
             Kind::Rotation => {
                 if let Some(degrees) = values.vector(first) {
                     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-                        let (_, reference) = turning::frame(degrees, axis);
-                        let radius = turning::RADIUS * arrow;
-                        let way = turning::circle(projection, anchor, degrees, axis, radius);
+                        let (_, reference) = rotate_handles::frame(degrees, axis);
+                        let radius = rotate_handles::RADIUS * arrow;
+                        let way = rotate_handles::circle(projection, anchor, degrees, axis, radius);
                         let label = format!("about {name}: {label}");
-                        add(Grip::Turn { first, axis }, anchor, anchor + radius * reference, &label, way);
+                        add(
+                            HandleKind::Turn { first, axis },
+                            anchor,
+                            anchor + radius * reference,
+                            &label,
+                            way,
+                        );
                     }
                 }
             }
             Kind::Plain if field.parameter == Parameter::Scale => {
                 let (right, up, _) = projection.axes();
-                let at = anchor + arrow * turning::SCALE * (right + up);
-                add(Grip::Scale { first }, anchor, at, &label, straight());
+                let at = anchor + arrow * rotate_handles::SCALE * (right + up);
+                add(HandleKind::Scale { first }, anchor, at, &label, straight());
             }
             Kind::Count(_)
             | Kind::Length
@@ -179,53 +187,53 @@ pub(crate) fn handles(number: usize, values: &Values, projection: &Projection, a
     handles
 }
 
-/// The middle of some positions.
+/// Returns the mean of some positions.
 fn middle(positions: &[(usize, DVec3)]) -> DVec3 {
     positions.iter().map(|(_, position)| position).sum::<DVec3>() / positions.len().max(1) as f64
 }
 
-/// Where the handle of a line's length number `index` lies.
+/// Returns the direction of the handle of a line's length number `index`.
 fn toward(index: usize, projection: &Projection) -> DVec3 {
     let (right, up, _) = projection.axes();
     if index == 0 { right } else { up }
 }
 
-/// A light is shown where it comes from.
+/// Returns -1 for a light, which is shown where it comes from, else 1.
 fn facing(command: Command) -> f64 {
     if role(command) == Role::Light { -1.0 } else { 1.0 }
 }
 
-/// A drag: what it began with.
+/// A drag with its start.
 #[derive(Clone, Debug)]
 pub(crate) struct Drag {
-    grip: Grip,
-    /// The lines, as they were.
+    grip: HandleKind,
+    /// The original lines.
     lines: Vec<(usize, Line, Values)>,
-    /// Where it was taken hold of, in the world.
+    /// The grabbed point in the world.
     grabbed: DVec3,
     keying: Keying,
-    /// How far it has turned, so that several turns are.
+    /// The degrees turned so far, so that a drag can make several turns.
     turned: Cell<f64>,
 }
 
-/// How a drag is to be taken.
+/// The modifiers of a drag.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub(crate) struct Manner {
-    /// Up and down instead of along the ground.
+pub(crate) struct DragOptions {
+    /// Move up and down instead of along the ground.
     #[serde(default)]
     pub(crate) upright: bool,
-    /// In steps of a grid.
+    /// Move in steps of a grid.
     #[serde(default)]
     pub(crate) snap: bool,
-    /// Numbers that change are moved for all frames.
+    /// Move curves as a whole, in all frames.
     #[serde(default)]
     pub(crate) whole: bool,
 }
 
 impl Drag {
-    /// Takes hold of some lines; `grabbed` is the point of an object that was hit, if one was.
+    /// Starts a drag of some lines. `grabbed` is the point of an object that was hit, if there is one.
     pub(crate) fn new(
-        grip: Grip,
+        grip: HandleKind,
         lines: Vec<(usize, Line)>,
         grabbed: Option<DVec3>,
         around: DVec3,
@@ -239,24 +247,27 @@ impl Drag {
         let anchor = values.positions().next().map_or(around, |(_, position)| position);
         let positions: Vec<_> = values.positions().collect();
         let grabbed = match grip {
-            Grip::Body => grabbed.unwrap_or(anchor),
-            Grip::Axis { .. } | Grip::Plane { .. } => middle(&positions),
-            Grip::Point { first } => values.vector(first)?,
-            Grip::Length { .. } | Grip::Direction { .. } | Grip::Turn { .. } | Grip::Scale { .. } => anchor,
+            HandleKind::Body => grabbed.unwrap_or(anchor),
+            HandleKind::Axis { .. } | HandleKind::Plane { .. } => middle(&positions),
+            HandleKind::Point { first } => values.vector(first)?,
+            HandleKind::Length { .. }
+            | HandleKind::Direction { .. }
+            | HandleKind::Turn { .. }
+            | HandleKind::Scale { .. } => anchor,
         };
         Some(Self { grip, lines, grabbed, keying, turned: Cell::new(0.0) })
     }
 
-    /// The lines as they become when the pointer goes from one point of the picture to another.
+    /// Returns the lines after the pointer has moved from one point of the picture to another.
     pub(crate) fn to(
         &self,
         projection: &Projection,
         from: DVec2,
         to: DVec2,
-        manner: Manner,
+        options: DragOptions,
     ) -> Vec<(usize, Line)> {
-        let step = step(projection.pixel_at(self.grabbed), manner.snap);
-        let keying = Keying { whole: manner.whole, ..self.keying };
+        let step = step(projection.pixel_at(self.grabbed), options.snap);
+        let keying = Keying { whole: options.whole, ..self.keying };
         let moved = |axes: [bool; 3], by: DVec3| {
             self.lines.iter().filter_map(move |(number, line, values)| {
                 let mut line = line.clone();
@@ -266,17 +277,17 @@ impl Drag {
                 Some((*number, line))
             })
         };
-        // Everything goes as the pointer does on a plane, along these axes.
+        // Everything follows the pointer on a plane, along these axes.
         let along = |normal: DVec3, axes| match between(projection, self.grabbed, normal, from, to) {
             Some(by) => moved(axes, by).collect(),
             None => self.start(),
         };
         match self.grip {
-            Grip::Body => {
-                let (normal, axes) = self.plane(projection, manner);
+            HandleKind::Body => {
+                let (normal, axes) = self.plane(projection, options);
                 along(normal, axes)
             }
-            Grip::Axis { axis } => {
+            HandleKind::Axis { axis } => {
                 let axis_way = DVec3::AXES[axis];
                 let (_, _, w) = projection.axes();
                 // The plane through the axis that faces the eye.
@@ -284,9 +295,9 @@ impl Drag {
                 let Some(normal) = normal.try_normalize() else { return self.start() };
                 along(normal, [0, 1, 2].map(|other| other == axis))
             }
-            Grip::Plane { axis } => along(DVec3::AXES[axis], [0, 1, 2].map(|other| other != axis)),
-            Grip::Point { first } => {
-                let (normal, axes) = self.plane(projection, manner);
+            HandleKind::Plane { axis } => along(DVec3::AXES[axis], [0, 1, 2].map(|other| other != axis)),
+            HandleKind::Point { first } => {
+                let (normal, axes) = self.plane(projection, options);
                 let Some(by) = between(projection, self.grabbed, normal, from, to) else {
                     return self.start();
                 };
@@ -295,7 +306,7 @@ impl Drag {
                     changed(line, first, &shifted(position, by, axes, step), keying)
                 })
             }
-            Grip::Length { first } => {
+            HandleKind::Length { first } => {
                 let (_, _, w) = projection.axes();
                 let at = |seen| meet(projection.ray(seen), self.grabbed, w).map(|p| p.distance(self.grabbed));
                 let (Some(before), Some(now)) = (at(from), at(to)) else { return self.start() };
@@ -307,7 +318,7 @@ impl Drag {
                     changed(line, first, &[rounded((length + now - before).max(step), step)], keying)
                 })
             }
-            Grip::Direction { first } => {
+            HandleKind::Direction { first } => {
                 let radius = ARROW * projection.pixel_at(self.grabbed);
                 if from == to {
                     return self.start();
@@ -317,24 +328,24 @@ impl Drag {
                     let tip = on_sphere(projection.ray(to), self.grabbed, radius) - self.grabbed;
                     let length = old.length();
                     let new = facing(values.command) * tip.normalize_or(DVec3::NEG_Y) * length;
-                    let step = self::step(length * 1e-2, manner.snap);
+                    let step = self::step(length * 1e-2, options.snap);
                     let new = new.to_array().map(|x| rounded(x, step));
                     if new == [0.0; 3] { None } else { changed(line, first, &new, keying) }
                 })
             }
-            Grip::Turn { first, axis } => self.first(|line, values| {
+            HandleKind::Turn { first, axis } => self.first(|line, values| {
                 let degrees = values.vector(first)?;
-                let (about, _) = turning::frame(degrees, axis);
-                let by = turning::angle(projection, self.grabbed, about, from, to)?;
-                let by = turning::nearest_turn(by, self.turned.get());
+                let (about, _) = rotate_handles::frame(degrees, axis);
+                let by = rotate_handles::angle(projection, self.grabbed, about, from, to)?;
+                let by = rotate_handles::nearest_turn(by, self.turned.get());
                 self.turned.set(by);
-                let by = rounded(by, if manner.snap { turning::SNAP } else { turning::STEP });
+                let by = rounded(by, if options.snap { rotate_handles::SNAP } else { rotate_handles::STEP });
                 if by == 0.0 {
                     return None;
                 }
-                changed(line, first + axis, &[exactly(degrees[axis], by, turning::STEP)], keying)
+                changed(line, first + axis, &[exactly(degrees[axis], by, rotate_handles::STEP)], keying)
             }),
-            Grip::Scale { first } => {
+            HandleKind::Scale { first } => {
                 let Some(center) = projection.point(self.grabbed) else { return self.start() };
                 let factor = to.distance(center) / from.distance(center);
                 if from == to || !factor.is_finite() {
@@ -342,7 +353,7 @@ impl Drag {
                 }
                 self.first(|line, values| {
                     let scale = values.number(first)?;
-                    let step = self::step(scale.abs() * 3e-2, manner.snap);
+                    let step = self::step(scale.abs() * 3e-2, options.snap);
                     changed(line, first, &[rounded((scale * factor).max(step), step)], keying)
                 })
             }
@@ -358,11 +369,11 @@ impl Drag {
         vec![(*number, change(line, values).unwrap_or_else(|| line.clone()))]
     }
 
-    /// The plane that a free drag goes along, and which coordinates it changes: the ground, or upright, or the picture's
-    /// own plane where the ground is seen edge on.
-    fn plane(&self, projection: &Projection, manner: Manner) -> (DVec3, [bool; 3]) {
+    /// Returns the plane of a free drag, and the coordinates that it changes: the ground, or an upright plane, or the
+    /// picture's own plane if the ground is seen edge on.
+    fn plane(&self, projection: &Projection, options: DragOptions) -> (DVec3, [bool; 3]) {
         let (_, _, w) = projection.axes();
-        if manner.upright {
+        if options.upright {
             let facing = DVec3::new(w.x, 0.0, w.z);
             return (facing.try_normalize().unwrap_or(DVec3::Z), [false, true, false]);
         }
@@ -373,21 +384,21 @@ impl Drag {
     }
 }
 
-/// How far the pointer goes along a plane.
+/// Returns the movement of the pointer along a plane.
 fn between(projection: &Projection, through: DVec3, normal: DVec3, from: DVec2, to: DVec2) -> Option<DVec3> {
     let start = meet(projection.ray(from), through, normal)?;
     let end = meet(projection.ray(to), through, normal)?;
     Some(end - start)
 }
 
-/// Where a ray meets a plane.
+/// Returns the intersection of a ray and a plane.
 fn meet((origin, direction): (DVec3, DVec3), through: DVec3, normal: DVec3) -> Option<DVec3> {
     let distance = (through - origin).dot(normal) / direction.dot(normal);
     let point = origin + distance * direction;
     (distance > 0.0 && point.is_finite()).then_some(point)
 }
 
-/// Where a ray meets a sphere, or comes nearest to it.
+/// Returns the intersection of a ray and a sphere, or the point of the sphere nearest to the ray.
 fn on_sphere((origin, direction): (DVec3, DVec3), center: DVec3, radius: f64) -> DVec3 {
     let along = (center - origin).dot(direction);
     let nearest = origin + along * direction;
@@ -395,21 +406,22 @@ fn on_sphere((origin, direction): (DVec3, DVec3), center: DVec3, radius: f64) ->
     if room > 0.0 { nearest - room.sqrt() * direction } else { nearest }
 }
 
-/// What numbers are rounded to where a pixel is so much: a tenth of it at least, in powers of ten.
+/// Returns the step to which numbers are rounded, given the extent of a pixel: the power of ten at or below half a
+/// pixel, or at or above the snapping grid.
 fn step(pixel: f64, snap: bool) -> f64 {
     let least = if snap { SNAP * pixel } else { 0.5 * pixel };
     let power = if snap { least.log10().ceil() } else { least.log10().floor() };
     if power.is_finite() { 10f64.powi(power.clamp(-12.0, 12.0) as i32) } else { 1e-3 }
 }
 
-/// A multiple of a power of ten, as its shortest decimal.
+/// Returns the multiple of a power of ten nearest to `x`, as its shortest decimal.
 fn rounded(x: f64, step: f64) -> f64 {
     let decimals = -step.log10().round();
     let x = (x / step).round() * step;
     if decimals > 0.0 { format!("{x:.*}", decimals as usize).parse().unwrap_or(x) } else { x.round() }
 }
 
-/// A position moved along some of the axes; those along which it does not move keep their numbers.
+/// Moves a position along some of the axes. The other coordinates keep their numbers.
 fn shifted(position: DVec3, by: DVec3, axes: [bool; 3], step: f64) -> [f64; 3] {
     let mut to = position.to_array();
     for axis in (0..3).filter(|&axis| axes[axis]) {
@@ -421,7 +433,7 @@ fn shifted(position: DVec3, by: DVec3, axes: [bool; 3], step: f64) -> [f64; 3] {
     to
 }
 
-/// The sum, without the noise of the last bits: as many decimals as the longer of the two has.
+/// Returns the sum without rounding noise: it has as many decimals as the longer of the two numbers.
 fn exactly(x: f64, way: f64, step: f64) -> f64 {
     let sum = x + way;
     let of = |x: f64| x.to_string().split_once('.').map_or(0, |(_, decimals)| decimals.len());
@@ -438,7 +450,7 @@ mod tests {
 
     const STILL: Keying = Keying { time: 1.0, first: 1.0, auto: false, whole: false };
 
-    /// The handles of a line at the first frame.
+    /// Returns the handles of a line at the first frame.
     fn handles(number: usize, line: &Line, projection: &Projection, around: DVec3) -> Vec<Handle> {
         super::handles(number, &Values::of(line, 1.0).unwrap(), projection, around)
     }
@@ -449,10 +461,10 @@ mod tests {
         Scene::new(Screen::new(300, 200).unwrap(), Camera::Pinhole(camera))
     }
 
-    fn drag(grip: Grip, text: &str, from: DVec2, by: DVec2, manner: Manner) -> String {
+    fn drag(grip: HandleKind, text: &str, from: DVec2, by: DVec2, options: DragOptions) -> String {
         let scene = scene();
         let drag = Drag::new(grip, vec![(0, Line::new(text))], None, DVec3::ZERO, STILL).unwrap();
-        drag.to(&Projection::new(&scene), from, from + by, manner)[0].1.text()
+        drag.to(&Projection::new(&scene), from, from + by, options)[0].1.text()
     }
 
     const BALL: &str = "Sphere 1  0 1 0  .1 .1 .1  1 1 1 # ball";
@@ -460,16 +472,16 @@ mod tests {
     #[test]
     fn going_back_to_the_start_changes_nothing() {
         let text = "Box -1.005 0 1e0  2 .50 -0 .1 .1 .1 1 1 1";
-        let grips = [Grip::Body, Grip::Axis { axis: 1 }, Grip::Point { first: 3 }];
+        let grips = [HandleKind::Body, HandleKind::Axis { axis: 1 }, HandleKind::Point { first: 3 }];
         for grip in grips {
-            assert_eq!(drag(grip, text, DVec2::new(120.0, 90.0), DVec2::ZERO, Manner::default()), text);
+            assert_eq!(drag(grip, text, DVec2::new(120.0, 90.0), DVec2::ZERO, DragOptions::default()), text);
         }
-        for grip in [Grip::Length { first: 0 }, Grip::Body] {
-            assert_eq!(drag(grip, BALL, DVec2::new(120.0, 90.0), DVec2::ZERO, Manner::default()), BALL);
+        for grip in [HandleKind::Length { first: 0 }, HandleKind::Body] {
+            assert_eq!(drag(grip, BALL, DVec2::new(120.0, 90.0), DVec2::ZERO, DragOptions::default()), BALL);
         }
         let sun = "Ilight 1 1 1  .3 -1 -.123456789";
-        let grip = Grip::Direction { first: 3 };
-        assert_eq!(drag(grip, sun, DVec2::new(120.0, 90.0), DVec2::ZERO, Manner::default()), sun);
+        let grip = HandleKind::Direction { first: 3 };
+        assert_eq!(drag(grip, sun, DVec2::new(120.0, 90.0), DVec2::ZERO, DragOptions::default()), sun);
     }
 
     #[test]
@@ -479,7 +491,7 @@ mod tests {
         let grabbed = DVec3::new(0.0, 1.0, 0.0);
         let to = DVec3::new(0.5, 1.0, -0.25);
         let (from, by) = (projection.point(grabbed).unwrap(), projection.point(to).unwrap());
-        let text = drag(Grip::Body, BALL, from, by - from, Manner::default());
+        let text = drag(HandleKind::Body, BALL, from, by - from, DragOptions::default());
         assert_eq!(text, "Sphere 1  0.5 1 -0.25  .1 .1 .1  1 1 1 # ball");
     }
 
@@ -487,13 +499,14 @@ mod tests {
     fn upright_and_axes_change_one_number() {
         let up = DVec2::new(13.0, -31.0);
         let upright = drag(
-            Grip::Body,
+            HandleKind::Body,
             BALL,
             DVec2::new(150.0, 80.0),
             up,
-            Manner { upright: true, ..Manner::default() },
+            DragOptions { upright: true, ..DragOptions::default() },
         );
-        let axis = drag(Grip::Axis { axis: 1 }, BALL, DVec2::new(150.0, 80.0), up, Manner::default());
+        let axis =
+            drag(HandleKind::Axis { axis: 1 }, BALL, DVec2::new(150.0, 80.0), up, DragOptions::default());
         for text in [upright, axis] {
             let y: f64 = text.split_whitespace().nth(3).unwrap().parse().unwrap();
             assert!(
@@ -508,11 +521,13 @@ mod tests {
         let scene = scene();
         let projection = Projection::new(&scene);
         let all = handles(0, &Line::new(BALL), &projection, DVec3::ZERO);
-        let planes: Vec<_> = all.iter().filter(|handle| matches!(handle.grip, Grip::Plane { .. })).collect();
+        let planes: Vec<_> =
+            all.iter().filter(|handle| matches!(handle.grip, HandleKind::Plane { .. })).collect();
         assert!((1..3).contains(&planes.len()), "{planes:?}");
         for handle in planes {
-            let Grip::Plane { axis } = handle.grip else { unreachable!() };
-            let text = drag(handle.grip, BALL, handle.at.into(), DVec2::new(17.0, -11.0), Manner::default());
+            let HandleKind::Plane { axis } = handle.grip else { unreachable!() };
+            let text =
+                drag(handle.grip, BALL, handle.at.into(), DVec2::new(17.0, -11.0), DragOptions::default());
             let place = text.split_whitespace().skip(2).take(3).map(|word| word.parse::<f64>().unwrap());
             let old = BALL.split_whitespace().skip(2).take(3).map(|word| word.parse::<f64>().unwrap());
             let moved: Vec<_> = place.zip(old).map(|(new, old)| new != old).collect();
@@ -526,17 +541,18 @@ mod tests {
         let projection = Projection::new(&scene);
         let of_radius = |text: &str| {
             let all = handles(0, &Line::new(text), &projection, DVec3::ZERO);
-            DVec2::from(all.iter().find(|h| h.grip == Grip::Length { first: 0 }).unwrap().at)
+            DVec2::from(all.iter().find(|h| h.grip == HandleKind::Length { first: 0 }).unwrap().at)
         };
         let (one, two) = (of_radius(BALL), of_radius(&BALL.replacen('1', "2", 1)));
-        let text = drag(Grip::Length { first: 0 }, BALL, one, two - one, Manner::default());
+        let text = drag(HandleKind::Length { first: 0 }, BALL, one, two - one, DragOptions::default());
         assert!(
             text.starts_with("Sphere 2 ")
                 || text.starts_with("Sphere 2.00")
                 || text.starts_with("Sphere 1.99"),
             "{text}"
         );
-        let text = drag(Grip::Length { first: 0 }, BALL, one, DVec2::new(-38.0, 0.0), Manner::default());
+        let text =
+            drag(HandleKind::Length { first: 0 }, BALL, one, DVec2::new(-38.0, 0.0), DragOptions::default());
         let radius: f64 = text.split_whitespace().nth(1).unwrap().parse().unwrap();
         assert!(radius > 0.0 && radius < 1.0, "{text}");
     }
@@ -551,8 +567,13 @@ mod tests {
             DVec2::from(all[0].at)
         };
         let (old, new) = (handle("Ilight 1 1 1  0 -2 0"), handle("Ilight 1 1 1  1.2 -1.6 0"));
-        let text =
-            drag(Grip::Direction { first: 3 }, "Ilight 1 1 1  0 -2 0", old, new - old, Manner::default());
+        let text = drag(
+            HandleKind::Direction { first: 3 },
+            "Ilight 1 1 1  0 -2 0",
+            old,
+            new - old,
+            DragOptions::default(),
+        );
         let numbers: Vec<f64> = text.split_whitespace().skip(4).map(|n| n.parse().unwrap()).collect();
         let off = DVec3::from_slice(&numbers).distance(DVec3::new(1.2, -1.6, 0.0));
         assert!(off < 0.1, "{text}");
@@ -564,7 +585,7 @@ mod tests {
         let projection = Projection::new(&scene);
         let table = "Use table  0 0 0  0 (1:10 9:20) 0";
         let all = handles(0, &Line::new(table), &projection, DVec3::ZERO);
-        let turn = all.iter().find(|handle| handle.grip == Grip::Turn { first: 3, axis: 1 }).unwrap();
+        let turn = all.iter().find(|handle| handle.grip == HandleKind::Turn { first: 3, axis: 1 }).unwrap();
         assert!(turn.way.starts_with('M'));
         let at = |degrees: f64| {
             let text = format!("Use table  0 0 0  0 {degrees} 0");
@@ -573,14 +594,14 @@ mod tests {
         };
         let by = at(47.0) - at(10.0);
         assert_eq!(
-            drag(turn.grip, table, at(10.0), by, Manner::default()),
+            drag(turn.grip, table, at(10.0), by, DragOptions::default()),
             "Use table  0 0 0  0 (1:47 9:20) 0"
         );
-        let snap = Manner { snap: true, ..Manner::default() };
+        let snap = DragOptions { snap: true, ..DragOptions::default() };
         assert_eq!(drag(turn.grip, table, at(10.0), by, snap), "Use table  0 0 0  0 (1:40 9:20) 0");
-        let scale = all.iter().find(|handle| handle.grip == Grip::Scale { first: 6 }).unwrap();
+        let scale = all.iter().find(|handle| handle.grip == HandleKind::Scale { first: 6 }).unwrap();
         let (from, to) = (DVec2::from(scale.from), DVec2::from(scale.at));
-        let text = drag(scale.grip, "Use table", to, to - from, Manner::default());
+        let text = drag(scale.grip, "Use table", to, to - from, DragOptions::default());
         assert_eq!(text, "Use table 0 0 0 0 0 0 2", "twice as far is twice as large");
     }
 
@@ -589,7 +610,7 @@ mod tests {
         let scene = scene();
         let projection = Projection::new(&scene);
         let line = vec![(0, Line::new("Use table"))];
-        let grip = Grip::Turn { first: 3, axis: 1 };
+        let grip = HandleKind::Turn { first: 3, axis: 1 };
         let drag = Drag::new(grip, line, None, DVec3::ZERO, STILL).unwrap();
         let at = |degrees: f64| {
             let (sin, cos) = degrees.to_radians().sin_cos();
@@ -597,7 +618,8 @@ mod tests {
         };
         let mut text = String::new();
         for step in 0..=45 {
-            text = drag.to(&projection, at(0.0), at(10.0 * f64::from(step)), Manner::default())[0].1.text();
+            text =
+                drag.to(&projection, at(0.0), at(10.0 * f64::from(step)), DragOptions::default())[0].1.text();
         }
         assert_eq!(text, "Use table 0 0 0 0 450 0");
     }
@@ -607,18 +629,18 @@ mod tests {
         let keying = Keying { time: 25.0, auto: true, ..STILL };
         let scene = scene();
         let line = vec![(0, Line::new(BALL))];
-        let drag = Drag::new(Grip::Axis { axis: 1 }, line, None, DVec3::ZERO, keying).unwrap();
-        let to = |by: f64, manner| {
+        let drag = Drag::new(HandleKind::Axis { axis: 1 }, line, None, DVec3::ZERO, keying).unwrap();
+        let to = |by: f64, options| {
             let from = DVec2::new(150.0, 80.0);
-            drag.to(&Projection::new(&scene), from, from + DVec2::new(0.0, by), manner)[0].1.text()
+            drag.to(&Projection::new(&scene), from, from + DVec2::new(0.0, by), options)[0].1.text()
         };
-        let text = to(-30.0, Manner::default());
+        let text = to(-30.0, DragOptions::default());
         assert!(
             text.starts_with("Sphere 1  0 (smooth 1:1 25:") && text.ends_with(") 0  .1 .1 .1  1 1 1 # ball"),
             "{text}"
         );
-        assert_eq!(to(0.0, Manner::default()), BALL, "back at the start there is none");
-        assert!(!to(-30.0, Manner { whole: true, ..Manner::default() }).contains('('));
+        assert_eq!(to(0.0, DragOptions::default()), BALL, "back at the start there is none");
+        assert!(!to(-30.0, DragOptions { whole: true, ..DragOptions::default() }).contains('('));
     }
 
     #[test]

@@ -1,15 +1,15 @@
-//! The studio: scenes in a browser, where the viewport is the renderer.
+//! The studio: an editor for scenes in a browser, whose viewport shows the renderer's pictures.
 //!
-//! The text is the truth: a document is the lines of a script, and whatever is done on the page rewrites numbers of one
-//! line, or adds, removes and moves lines; every other byte stays. The page shows what it is told and says what it
-//! wants; parsing, writing, picking, dragging and drawing are done here, by `scene` and `tracer`. What a command has
-//! for parameters the parser's own tables say.
+//! The script is the only copy of the scene: a document is the lines of a script. An edit on the page rewrites
+//! numbers of one line, or adds, removes and moves lines; every other byte stays. The page displays messages of the
+//! server and sends requests. Parsing, writing, picking, dragging and rendering happen here, in `scene` and `tracer`.
+//! The parser's tables define the parameters of a command.
 //!
-//! Start at [`Server`] (a page's connection) and `session` (what a page wants, and what follows). `document` and `line`
-//! are pure, `project` is all that touches files. `runs` are animations in a bucket, over any store.
+//! Start at [`Server`] (the connection of a page) and `session` (its requests and their effects). `document` and
+//! `line` are pure, and `project` does all file access. `runs` handles animations in a bucket, over any store.
 //!
-//! Invariants: it reads and writes what it was opened with and nothing else; it listens on loopback only; undoing
-//! everything gives the bytes that were there.
+//! Invariants: the studio reads and writes only what it was opened with; it listens on loopback only; undoing
+//! everything restores the original bytes.
 
 mod document;
 mod edits;
@@ -29,16 +29,16 @@ mod pictures;
 mod pipe;
 mod project;
 mod protocol;
-mod resting;
+mod rotate_handles;
 mod runs;
 mod server;
 mod session;
 mod settings;
 mod silhouette;
-mod stage;
+mod snap_to_ground;
+mod source_map;
 mod tables;
 mod tracks;
-mod turning;
 mod values;
 mod view;
 

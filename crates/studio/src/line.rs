@@ -1,75 +1,75 @@
-//! A line of a script as words and what stands between them, so that one word can be exchanged and every other byte
-//! stays.
+//! A line of a script as words and the bytes between them, so that one word can be replaced and
+//! every other byte stays.
 //!
-//! Says nothing about what is right: that does the parser. Invariants: the spans of a line lie in it, in order, and do
-//! not overlap; [`Line::with`] changes nothing outside the spans that it is given.
+//! Does not validate a line; the parser does. Invariants: the spans of a line lie within it, in order and without
+//! overlap. [`Line::with`] changes nothing outside the spans that it is given.
 
 use std::ops::Range;
 
 use rayfold_scene::Command;
 
-/// A line with its end: a line feed, with a carriage return or without, or nothing at the end of a text.
+/// A line with its end: a line feed, with or without a carriage return, or nothing at the end of a text.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Line(Vec<u8>);
 
-/// Where the words of a line are, in bytes of it.
+/// The positions of the words of a line, in bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Words {
-    /// The first word.
+    /// The command word.
     pub command: Range<usize>,
-    /// The name of a group or material that stands before the parameters.
+    /// The name of a group or material before the parameters.
     pub subject: Option<Range<usize>>,
-    /// The others; a curve in brackets is one.
+    /// The parameters. A curve in brackets is one.
     pub parameters: Vec<Range<usize>>,
-    /// From the sign that begins the comment to the end of the text.
+    /// The comment, from its sign to the end of the text.
     pub comment: Option<Range<usize>>,
 }
 
 impl Line {
-    /// The lines of a text; put together they are the text again.
+    /// Splits a text into lines. Their concatenation is the text.
     pub fn split(text: &[u8]) -> Vec<Self> {
         text.split_inclusive(|&byte| byte == b'\n').map(|line| Self(line.to_vec())).collect()
     }
 
-    /// Without an end: its document gives it one.
+    /// Makes a line without an end; its document adds one.
     pub fn new(text: &str) -> Self {
         Self(text.into())
     }
 
-    /// All of it.
+    /// Returns all bytes of the line.
     pub fn bytes(&self) -> &[u8] {
         &self.0
     }
 
-    /// What stands before the end, with U+FFFD for what is not UTF-8.
+    /// Returns the text before the line end, with U+FFFD for bytes that are not UTF-8.
     pub fn text(&self) -> String {
         String::from_utf8_lossy(self.body()).into_owned()
     }
 
-    /// `\n`, `\r\n` or nothing.
+    /// Returns the line end: `\n`, `\r\n` or nothing.
     pub fn end(&self) -> &[u8] {
         &self.0[self.body().len()..]
     }
 
-    /// What stands before the end.
+    /// Returns the bytes before the line end.
     fn body(&self) -> &[u8] {
         let line = self.0.strip_suffix(b"\n").unwrap_or(&self.0);
         line.strip_suffix(b"\r").unwrap_or(line)
     }
 
-    /// Another text with the end of this line.
+    /// Returns another text with the end of this line.
     #[must_use]
     pub fn with_text(&self, text: &str) -> Self {
         Self([text.as_bytes(), self.end()].concat())
     }
 
-    /// The same text with another end.
+    /// Returns the same text with another end.
     #[must_use]
     pub fn with_end(&self, end: &[u8]) -> Self {
         Self([self.body(), end].concat())
     }
 
-    /// The command, if its first word is one.
+    /// Returns the command, if the first word is one.
     pub fn command(&self) -> Option<Command> {
         let body = self.body();
         let body = body.strip_prefix(b"\xef\xbb\xbf").unwrap_or(body);
@@ -79,7 +79,7 @@ impl Line {
         Command::from_name(std::str::from_utf8(&word[..end.unwrap_or(word.len())]).ok()?)
     }
 
-    /// `None` for a line without a command.
+    /// Returns the positions of the words, or `None` for a line without a command.
     pub fn words(&self) -> Option<Words> {
         let body = self.body();
         let start = if body.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
@@ -110,29 +110,29 @@ impl Line {
         Some(Words { command, subject, parameters: words.collect(), comment })
     }
 
-    /// A word; nothing where it is not UTF-8.
+    /// Returns a word; empty if it is not UTF-8.
     pub fn word(&self, word: &Range<usize>) -> &str {
         std::str::from_utf8(&self.0[word.clone()]).unwrap_or_default()
     }
 
-    /// The name of a group or material that stands before its parameters.
+    /// Returns the name of a group or material before the parameters.
     pub fn subject(&self) -> Option<&str> {
         Some(self.word(&self.words()?.subject?))
     }
 
-    /// The number that a word is; `None` for a curve, a name, and what is none.
+    /// Returns the number of a word; `None` for a curve, a name, and anything else.
     pub fn number(&self, word: &Range<usize>) -> Option<f64> {
         self.word(word).parse().ok().filter(|number: &f64| number.is_finite())
     }
 
-    /// The name: what the comment at the end of a command's line says.
+    /// Returns the name of the line, which is the comment after a command.
     pub fn name(&self) -> Option<String> {
         let comment = self.words()?.comment?;
         let name = String::from_utf8_lossy(&self.0[comment]).trim_start_matches('#').trim().to_owned();
         (!name.is_empty()).then_some(name)
     }
 
-    /// The same with another name; an empty one is none. The rest of the line stays as it is.
+    /// Returns the line with another name; an empty one removes it. The rest of the line stays unchanged.
     #[must_use]
     pub fn named(&self, name: &str) -> Option<Self> {
         let words = self.words()?;
@@ -148,14 +148,15 @@ impl Line {
         })
     }
 
-    /// The same with numbers from parameter `first` on. Where the line has fewer they are added behind its last word.
+    /// Returns the line with numbers from parameter `first` on. If the line has fewer, they are added
+    /// after its last word.
     #[must_use]
     pub fn with_numbers(&self, first: usize, numbers: &[f64]) -> Option<Self> {
         let words = self.words()?;
         if numbers.is_empty() {
             return Some(self.clone());
         }
-        // What lies between the last word and the first new one may be left out only from the end: it is 0.
+        // Optional numbers between the last word and the first new one were omitted from the end: they are 0.
         let at = words.parameters.len().min(first)..first + numbers.len();
         let changes = at.filter_map(|at| {
             let value = at.checked_sub(first).and_then(|i| numbers.get(i)).copied().unwrap_or(0.0);
@@ -165,7 +166,8 @@ impl Line {
         self.with_words(&changes.collect::<Vec<_>>())
     }
 
-    /// The same with other words for some parameters, which are in order; those beyond the last are added behind it.
+    /// Returns the line with other words for some parameters, given in order. Those beyond the last
+    /// are added after it.
     #[must_use]
     pub fn with_words(&self, changes: &[(usize, String)]) -> Option<Self> {
         let words = self.words()?;
@@ -180,7 +182,7 @@ impl Line {
         Some(self.with(&changes))
     }
 
-    /// The same without the parameters from one on.
+    /// Returns the line without the parameters from `from` on.
     #[must_use]
     pub fn cut(&self, from: usize) -> Option<Self> {
         let words = self.words()?;
@@ -193,7 +195,7 @@ impl Line {
         Some(self.with(&[(before..words.last().end, String::new())]))
     }
 
-    /// The same with other bytes for some spans, which are in order.
+    /// Returns the line with other bytes for some spans, given in order.
     fn with(&self, changes: &[(Range<usize>, String)]) -> Self {
         let mut bytes = Vec::with_capacity(self.0.len() + 16);
         let mut at = 0;
@@ -208,13 +210,13 @@ impl Line {
 }
 
 impl Words {
-    /// The last of them, without the comment.
+    /// Returns the last word before the comment.
     fn last(&self) -> &Range<usize> {
         self.parameters.last().or(self.subject.as_ref()).unwrap_or(&self.command)
     }
 }
 
-/// The shortest decimal that reads back as this number.
+/// Returns the shortest decimal that parses to this number.
 pub(crate) fn written(number: f64) -> String {
     let number = number + 0.0;
     if number == 0.0 || (1e-5..1e16).contains(&number.abs()) {

@@ -1,4 +1,5 @@
-//! Materials: those to begin with, how one is given to objects, and a small sphere of each, drawn by the tracer.
+//! Materials: the starter materials, assigning one to objects, and pictures of a small sphere of each,
+//! drawn by the tracer.
 
 use std::collections::HashSet;
 
@@ -11,7 +12,8 @@ use crate::line::Line;
 use crate::output::frame_png;
 use crate::tables::{Role, role};
 
-/// A material to begin with: its name, and what `Material` says of it; one that its pattern names stands before it.
+/// A starter material: its name and the clauses of its `Material` line. The material that its pattern
+/// names comes before it.
 struct Preset {
     name: &'static str,
     says: &'static str,
@@ -51,26 +53,26 @@ const PRESETS: &[Preset] = &[
     },
 ];
 
-/// Pixels of a sphere's picture, a side.
+/// The width and height of a sphere's picture in pixels.
 pub(crate) const SIDE: u32 = 96;
 
-/// The scene of a sphere; the names of its own cannot meet those of a script that people read.
+/// The scene of a sphere. The names of its own materials cannot occur in a user's script.
 const STUDIO: &str = "Samples 8 1.5\nLook 0 1.35 4.1  0 0.98 0  34\nBackground 0.9 0.9 0.88  0.5 0.6 0.72\n\
                       Ilight 0.8 0.8 0.77  -0.6 -1 -0.7\nIlight 0.25 0.27 0.3  0.8 -0.4 -0.6\n\
                       Material studio-dark-tile ambient 0.3 0.3 0.3 diffuse 0.2 0.2 0.2\n\
                       Material studio-tile ambient 0.4 0.4 0.4 diffuse 0.3 0.3 0.3 checker 0.5 studio-dark-tile\n\
                       Plane 0 0 0  0 1 0  studio-tile\n";
 
-/// The names of the materials to begin with.
+/// Returns the names of the starter materials.
 pub(crate) fn presets() -> Vec<&'static str> {
     PRESETS.iter().map(|preset| preset.name).collect()
 }
 
-/// A sphere of the material that a line defines, as it is at a frame, as PNG; `None` where the line defines none that is in
-/// order.
+/// Renders a sphere of the material that a line defines, as of a frame, as PNG. Returns `None` if the line
+/// defines no valid material.
 ///
 /// # Errors
-/// When it cannot be drawn.
+/// Fails if the sphere cannot be rendered.
 pub(crate) fn sphere(lines: &[Line], at: usize, frame: u32) -> Result<Option<Vec<u8>>, Error> {
     let Some(name) = lines.get(at).filter(|line| is_material(line)).and_then(Line::subject) else {
         return Ok(None);
@@ -81,10 +83,10 @@ pub(crate) fn sphere(lines: &[Line], at: usize, frame: u32) -> Result<Option<Vec
     drawn(&texts.join("\n"), name, frame)
 }
 
-/// A sphere of a material to begin with.
+/// Renders a sphere of a starter material.
 ///
 /// # Errors
-/// When it cannot be drawn.
+/// Fails if the sphere cannot be rendered.
 pub(crate) fn preset_sphere(name: &str) -> Result<Option<Vec<u8>>, Error> {
     let Some(preset) = PRESETS.iter().find(|preset| preset.name == name) else { return Ok(None) };
     let lines: Vec<String> = definitions(preset).iter().map(|(_, line)| line.text()).collect();
@@ -103,7 +105,7 @@ fn drawn(materials: &str, name: &str, frame: u32) -> Result<Option<Vec<u8>>, Err
     }
 }
 
-/// Gives lines a material of the script, which stands before them.
+/// Assigns a material of the script to lines after its definition.
 pub(crate) fn give(lines: &[Line], which: &[usize], name: &str) -> Vec<Splice> {
     let defined = lines.iter().position(|line| is_material(line) && line.subject() == Some(name));
     let Some(defined) = defined else { return Vec::new() };
@@ -114,7 +116,7 @@ pub(crate) fn give(lines: &[Line], which: &[usize], name: &str) -> Vec<Splice> {
         .collect()
 }
 
-/// Gives lines a material to begin with, which comes in front of all that could have it, unless it is there.
+/// Assigns a starter material to lines. Inserts its definition before all lines that could use it, unless it exists.
 pub(crate) fn give_preset(lines: &[Line], which: &[usize], name: &str) -> Vec<Splice> {
     let Some(preset) = PRESETS.iter().find(|preset| preset.name == name) else { return Vec::new() };
     let wears = |line: &Line| {
@@ -153,7 +155,7 @@ fn definitions(preset: &Preset) -> Vec<(&'static str, Line)> {
     preset.other.into_iter().chain([own]).map(line).collect()
 }
 
-/// A line with the name of a material in the place of coefficients.
+/// Returns a line with the name of a material in place of coefficients.
 fn dressed(line: &Line, name: &str) -> Option<Line> {
     let at = line.command()?.form().surface()?;
     if line.words()?.parameters.len() < at {

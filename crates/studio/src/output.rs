@@ -1,4 +1,5 @@
-//! The GIF of what is open, made on a thread of its own; the same bytes as `rayfold render` makes of the files.
+//! The GIF of the open animation, rendered on a thread of its own. Its bytes equal those of `rayfold
+//! render` for the files.
 
 use std::io::{self, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,17 +19,17 @@ use crate::pipe::{frame_file, zip_of};
 use crate::project::Project;
 use crate::protocol::OutputState;
 
-/// Bytes of a GIF that are kept in memory, at most.
+/// The largest GIF in bytes that is kept in memory.
 const GIF: usize = 512 << 20;
 
-/// The GIF that was made last, and the one that is being made.
+/// The GIF that was rendered last, and the rendering in progress.
 #[derive(Debug, Default)]
 pub(crate) struct Outputs {
     gif: Mutex<Option<Arc<Vec<u8>>>>,
     running: Mutex<Option<Arc<AtomicBool>>>,
 }
 
-/// What is rendered: scripts in order, and their pace.
+/// The input of a rendering: scripts in order, and the frame rate.
 #[derive(Debug)]
 struct Job {
     scripts: Vec<Arc<Script>>,
@@ -50,21 +51,21 @@ impl Job {
         }
     }
 
-    fn run(&self, cancel: &AtomicBool, told: &impl Fn(OutputState)) -> Result<Vec<u8>, Error> {
+    fn run(&self, cancel: &AtomicBool, report: &impl Fn(OutputState)) -> Result<Vec<u8>, Error> {
         let of = self.scripts.iter().map(|script| script.frame_count()).sum();
         let failed = |error: &dyn std::error::Error| Error::Output(format!("cannot make the GIF: {error}"));
         let settings = Settings::new(self.settings.fps(), self.settings.loops());
         let mut gif = Bounded(Vec::new());
         let mut encoder = Encoder::new(&mut gif, settings).map_err(|error| failed(&error))?;
         let options = RenderOptions { cancel: Some(cancel), ..RenderOptions::default() };
-        told(OutputState::Running { done: 0, of });
+        report(OutputState::Running { done: 0, of });
         let frames =
             self.scripts.iter().flat_map(|script| (0..script.frame_count()).map(move |k| (script, k)));
         for (done, (script, k)) in frames.enumerate() {
             let Some(frame) = render_frame(script, k, &options) else { break };
             let frame = frame.map_err(|error| failed(&error))?;
             encoder.push(frame).map_err(|error| failed(&error))?;
-            told(OutputState::Running { done: done + 1, of });
+            report(OutputState::Running { done: done + 1, of });
         }
         encoder.finish().map_err(|error| failed(&error))?;
         Ok(gif.0)
@@ -72,8 +73,8 @@ impl Job {
 }
 
 impl Outputs {
-    /// Begins to make the GIF, unless one is being made; `told` hears how it stands.
-    pub(crate) fn start(self: &Arc<Self>, project: &Project, told: impl Fn(OutputState) + Send + 'static) {
+    /// Starts rendering the GIF unless a rendering is in progress. Reports the progress to `report`.
+    pub(crate) fn start(self: &Arc<Self>, project: &Project, report: impl Fn(OutputState) + Send + 'static) {
         let job = Job::of(project);
         let cancel = Arc::new(AtomicBool::new(false));
         {
@@ -85,9 +86,9 @@ impl Outputs {
         }
         let own = Arc::clone(self);
         let spawned = thread::Builder::new().name("output".into()).spawn(move || {
-            let made = job.and_then(|job| job.run(&cancel, &told));
+            let made = job.and_then(|job| job.run(&cancel, &report));
             *own.running.lock().unwrap_or_else(PoisonError::into_inner) = None;
-            told(match made {
+            report(match made {
                 _ if cancel.load(Ordering::Relaxed) => OutputState::Cancelled,
                 Err(error) => OutputState::Failed { why: error.to_string() },
                 Ok(gif) => {
@@ -102,32 +103,32 @@ impl Outputs {
         }
     }
 
-    /// Stops what is being made.
+    /// Cancels the rendering in progress.
     pub(crate) fn cancel(&self) {
         if let Some(cancel) = &*self.running.lock().unwrap_or_else(PoisonError::into_inner) {
             cancel.store(true, Ordering::Relaxed);
         }
     }
 
-    /// The GIF that was made last.
+    /// Returns the GIF that was rendered last.
     pub(crate) fn gif(&self) -> Option<Arc<Vec<u8>>> {
         self.gif.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
-/// A frame at the script's own size, as PNG; `None` where there is nothing to draw.
+/// Renders a frame at the script's own size, as PNG. Returns `None` if there is nothing to draw.
 ///
 /// # Errors
-/// When it cannot be drawn.
+/// Fails if the frame cannot be rendered.
 pub(crate) fn frame_png(script: &Script, frame: usize) -> Result<Option<Vec<u8>>, Error> {
     let Some(image) = render_frame(script, frame, &RenderOptions::default()) else { return Ok(None) };
     png(&image.map_err(|error| no_picture(&error))?).map(Some)
 }
 
-/// A picture as PNG.
+/// Encodes a picture as PNG.
 ///
 /// # Errors
-/// When it is beyond what the format can hold.
+/// Fails if the picture is beyond the limits of the format.
 pub(crate) fn png(image: &RgbImage) -> Result<Vec<u8>, Error> {
     let mut file = io::Cursor::new(Vec::new());
     image.write_to(&mut file, ImageFormat::Png).map_err(|error| no_picture(&error))?;
@@ -138,11 +139,11 @@ fn no_picture(error: &dyn std::error::Error) -> Error {
     Error::Output(format!("cannot make the picture: {error}"))
 }
 
-/// All frames at their scripts' own sizes, a PNG each, as a zip file that is sent while they are drawn: whoever stops
-/// reading stops the drawing, and lets go of the `permit` to draw.
+/// Renders all frames at their scripts' own sizes to a zip file of PNGs, which is sent while they are rendered. If
+/// the reader stops, the rendering stops and releases its `permit`.
 ///
 /// # Errors
-/// When a script has errors, or the system has no thread.
+/// Fails if a script has errors, or if the system cannot start a thread.
 pub(crate) fn frames_zip(project: &Project, permit: impl Send + 'static) -> Result<Body, Error> {
     let job = Job::of(project)?;
     let of: usize = job.scripts.iter().map(|script| script.frame_count()).sum();
@@ -160,10 +161,10 @@ pub(crate) fn frames_zip(project: &Project, permit: impl Send + 'static) -> Resu
     made.map_err(|error| Error::Output(format!("cannot make the zip file: {error}")))
 }
 
-/// All scripts, as they stand on the page, as a zip file.
+/// Returns all scripts, as they are on the page, as a zip file.
 ///
 /// # Errors
-/// When the file is beyond what the format can hold.
+/// Fails if the file is beyond the limits of the format.
 pub(crate) fn scripts_zip(project: &Project) -> Result<Vec<u8>, Error> {
     let mut zip = ZipWriter::new(io::Cursor::new(Vec::new()));
     let failed = |error: &dyn std::error::Error| Error::Output(format!("cannot make the zip file: {error}"));
@@ -174,7 +175,7 @@ pub(crate) fn scripts_zip(project: &Project) -> Result<Vec<u8>, Error> {
     Ok(zip.finish().map_err(|error| failed(&error))?.into_inner())
 }
 
-/// Bytes up to a limit.
+/// A buffer with a size limit.
 struct Bounded(Vec<u8>);
 
 impl Write for Bounded {

@@ -1,35 +1,37 @@
-//! Pictures as the page takes them: a header, and the part that differs from the picture before.
+//! Pictures in the form in which they are sent to the page: a header, and the part that differs
+//! from the previous picture.
 //!
-//! What is dragged changes some of a picture, and the browser takes longer to receive a whole one than the tracer to draw it.
-//! Invariant: a page that puts each part where its header says, and begins anew where the size is another, shows each picture
-//! to the last byte.
+//! A drag changes a part of the picture, and the browser takes longer to receive a whole picture than the tracer
+//! to draw it. Invariant: a page that puts each part where its header says, and starts anew if the size changes,
+//! shows each picture exactly.
 
 use std::time::Duration;
 
 use image::RgbImage;
 
-/// Bytes before the pixels: the picture's number, width, height, microseconds that it took, 1 for one that stays as it is or 0
-/// where a finer one follows; then left, top, width and height of the part whose pixels follow. Little-endian.
+/// The number of bytes before the pixels, which are little-endian numbers: the picture's number, width, height,
+/// rendering time in microseconds, and 1 if it is final or 0 if a finer one follows; then left, top, width and height
+/// of the part whose pixels follow.
 pub(crate) const HEADER: usize = 36;
 
-/// A picture that was drawn.
+/// A rendered picture.
 #[derive(Debug)]
 pub(crate) struct Picture {
-    /// What the page calls it.
+    /// The number by which the page knows it.
     pub(crate) number: u32,
     pub(crate) image: RgbImage,
     pub(crate) took: Duration,
-    /// It stays as it is.
+    /// No finer picture follows.
     pub(crate) is_final: bool,
 }
 
-/// Packs pictures that are shown one after the other, each of them.
+/// A packer of a sequence of pictures, all of which are shown.
 #[derive(Debug, Default)]
 pub(crate) struct Packer {
     before: RgbImage,
 }
 
-/// A part of a picture, in pixels.
+/// A rectangle of a picture, in pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Part {
     left: u32,
@@ -39,7 +41,8 @@ struct Part {
 }
 
 impl Packer {
-    /// The picture's header, and its part that differs from the picture before, four bytes a pixel: red, green, blue, 255.
+    /// Returns the header of a picture and the part that differs from the previous picture, with four bytes per
+    /// pixel: red, green, blue, 255.
     pub(crate) fn pack(&mut self, picture: Picture) -> Vec<u8> {
         let Picture { number, image, took, is_final } = picture;
         let part = differing(&self.before, &image);
@@ -59,7 +62,7 @@ impl Packer {
     }
 }
 
-/// The least part outside of which two pictures are equal: all of the second where their sizes differ.
+/// Returns the smallest part outside of which two pictures are equal: all of the second if their sizes differ.
 fn differing(before: &RgbImage, now: &RgbImage) -> Part {
     let (width, height) = now.dimensions();
     if before.dimensions() != (width, height) {
@@ -73,7 +76,7 @@ fn differing(before: &RgbImage, now: &RgbImage) -> Part {
     let (mut left, mut right) = (width as usize, 0);
     for (old, new) in pairs().skip(top).take(down) {
         let differ = |(a, b)| a != b;
-        // Only what lies outside of the part so far can widen it.
+        // Only pixels outside of the part so far can widen it.
         left = old[..left].iter().zip(&new[..left]).position(differ).unwrap_or(left);
         let more = old[right..].iter().zip(&new[right..]).rposition(differ);
         right = more.map_or(right, |more| right + more + 1);
@@ -81,7 +84,7 @@ fn differing(before: &RgbImage, now: &RgbImage) -> Part {
     Part { left: left as u32, top: top as u32, width: (right - left) as u32, height: down as u32 }
 }
 
-/// A picture's rows of pixels, from above.
+/// Returns the rows of pixels, from the top.
 fn rows(image: &RgbImage) -> impl DoubleEndedIterator<Item = &[[u8; 3]]> + ExactSizeIterator {
     image.as_raw().as_chunks::<3>().0.chunks_exact(image.width().max(1) as usize)
 }
@@ -92,12 +95,12 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// What a page shows.
+    /// The picture that a page shows.
     #[derive(Debug, Default)]
     pub(crate) struct Shown(pub(crate) RgbImage);
 
     impl Shown {
-        /// Puts the part where it belongs.
+        /// Puts the received part in its place.
         pub(crate) fn put(&mut self, packed: &[u8]) {
             let (head, pixels) = packed.split_at(HEADER);
             let head: Vec<u32> = head.as_chunks().0.iter().map(|&bytes| u32::from_le_bytes(bytes)).collect();
@@ -125,7 +128,7 @@ pub(crate) mod tests {
         println!("seed {seed}");
         let mut state = seed | 1;
         let mut below = |limit: u32| {
-            // Marsaglia, Xorshift RNGs (2003).
+            // The generator is from Marsaglia, Xorshift RNGs (2003).
             state ^= state << 13;
             state ^= state >> 7;
             state ^= state << 17;

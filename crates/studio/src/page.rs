@@ -1,5 +1,5 @@
-//! The page: part of the program where it had been built when the program was, else built once, with npm, where the
-//! program was built.
+//! The page: a part of the program if it was built before the program, else built once, with npm, in the folder where
+//! the program was built.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,29 +8,29 @@ use std::time::SystemTime;
 
 use crate::error::Error;
 
-/// Where the page's sources are, if the program runs where it was built.
+/// The folder of the page's sources, if the program runs where it was built.
 const SOURCES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/web");
 
-/// What the page is made of besides its packages.
+/// The inputs of the page besides its packages.
 const INPUTS: [&str; 6] =
     ["src", "index.html", "package.json", "package-lock.json", "tsconfig.json", "vite.config.ts"];
 
 /// The files of the page.
 #[derive(Clone, Debug)]
 pub struct Page {
-    /// `index.html`.
+    /// The content of `index.html`.
     pub html: Vec<u8>,
-    /// `studio.js`.
+    /// The content of `studio.js`.
     pub script: Vec<u8>,
-    /// `studio.css`.
+    /// The content of `studio.css`.
     pub style: Vec<u8>,
 }
 
 impl Page {
-    /// The page; `say` hears of it if it is being built, which takes a minute.
+    /// Returns the page. Calls `say` if it must be built first, which takes a minute.
     ///
     /// # Errors
-    /// When it is not there and cannot be built: what is missing.
+    /// Fails with the missing requirement if there is no page and it cannot be built.
     pub fn get(say: &mut dyn FnMut(&str)) -> Result<Self, Error> {
         let sources = Path::new(SOURCES);
         if sources.join("package-lock.json").exists() {
@@ -63,7 +63,7 @@ impl Page {
     }
 }
 
-/// Whether the page is older than what it is made of, or not there.
+/// Returns whether the built page is missing or older than its inputs.
 fn is_stale(sources: &Path) -> bool {
     let built =
         ["index.html", "studio.js", "studio.css"].map(|name| newest(&sources.join("dist").join(name)));
@@ -71,7 +71,7 @@ fn is_stale(sources: &Path) -> bool {
     INPUTS.iter().any(|input| newest(&sources.join(input)) > built) || built.is_none()
 }
 
-/// When a file, or one below a folder, was changed last.
+/// Returns the time of the last change of a file, or of any file in a folder.
 fn newest(path: &Path) -> Option<SystemTime> {
     let metadata = fs::metadata(path).ok()?;
     if metadata.is_file() {

@@ -1,10 +1,11 @@
-//! Drawing what the page asks for, on a thread of its own: the newest request wins.
+//! Rendering of the pictures that the page requests, on a thread of its own. The newest request wins.
 //!
-//! A request that waits is replaced by the next one. One that is being drawn at rest is given up for a newer one;
-//! while something moves it is drawn to the end, smaller where it would take too long, so that there always is a
-//! picture, and with one ray a pixel, whatever the script says. At rest what takes long begins with sketches: few pixels with
-//! one ray each, then more; a picture of several rays a pixel is shown after each pass over it. No more pictures are under way
-//! than the page keeps up with: one while something moves, since a picture that waits behind another is old when it is shown.
+//! A waiting request is replaced by the next one. At rest, a rendering is cancelled for a newer request. While
+//! something moves, a rendering is completed, in a smaller size if it would take too long, so that there is always a
+//! picture. It then has one ray per pixel, whatever the script says. At rest, a slow picture begins with sketches:
+//! few pixels with one ray each, then more. A picture with several rays per pixel is shown after each pass over it.
+//! The number of pictures on their way to the page is limited: to one while something moves, because a picture that
+//! waits behind another is outdated when it is shown.
 
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,50 +18,50 @@ use rayfold_tracer::{Drawing, Exposure, RenderError, RenderOptions};
 
 use crate::packing::{Packer, Picture};
 
-/// Pictures that the page has not shown yet, at most, while something moves.
+/// The largest number of pictures that the page has not shown yet while something moves.
 const MOVING_UNDER_WAY: u32 = 1;
 
-/// The same at rest, where sketches go before the picture that counts.
+/// The same limit at rest, where sketches precede the final picture.
 const RESTING_UNDER_WAY: u32 = 2;
 
-/// Seconds that a picture may take while something moves.
+/// The time limit for a picture while something moves, in seconds.
 const MOVING: f64 = 0.03;
 
-/// Seconds that one ray a pixel may take at rest before there are sketches.
+/// The time for one ray per pixel at rest, in seconds, above which sketches are drawn first.
 const PATIENCE: f64 = 0.1;
 
-/// The least share of width and height that is drawn while something moves, and that of the first sketch.
+/// The smallest share of width and height that is drawn while something moves, and that of the first sketch.
 const LEAST: f64 = 0.125;
 
-/// How much wider and higher the next sketch is.
+/// The factor by which the next sketch is wider and higher.
 const GROWTH: f64 = 2.0;
 
-/// A picture that is wanted.
+/// A request for a picture.
 #[derive(Clone, Debug)]
 pub(crate) struct Wanted {
-    /// What to draw; its screen is the size.
+    /// The scene to draw. Its screen is the size of the picture.
     pub(crate) scene: Scene,
-    /// What becomes of it while its shutter is open.
+    /// The motion of the scene while its shutter is open.
     pub(crate) motion: Option<Motion>,
-    /// Something is being dragged: better now than sharp.
+    /// Something is being dragged, so speed matters more than quality.
     pub(crate) moving: bool,
-    /// What the page calls it.
+    /// The number by which the page knows the picture.
     pub(crate) number: u32,
 }
 
-/// A frame of a script, to be asked for at other moments.
+/// A frame of a script that can be evaluated at other moments.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {
-    /// Where it is in.
+    /// The script of the frame.
     pub(crate) script: Arc<Script>,
-    /// Which it is, from 0.
+    /// The index of the frame, from 0.
     pub(crate) frame: usize,
-    /// One looks through the free camera, which does not move.
+    /// The view is that of the free camera, which does not move.
     pub(crate) is_free: bool,
 }
 
 impl Motion {
-    /// A scene of the frame, so many frames later.
+    /// Returns the scene this many frames after the frame.
     fn after(&self, scene: &Scene, frames: f64) -> Scene {
         match self.script.frame_after(self.frame, frames) {
             Some(then) if self.is_free => Scene { screen: scene.screen, camera: scene.camera, ..then },
@@ -70,7 +71,7 @@ impl Motion {
     }
 }
 
-/// Where pictures are ordered.
+/// A handle of the rendering thread.
 #[derive(Clone, Debug)]
 pub(crate) struct Painter(Arc<Shared>);
 
@@ -78,7 +79,7 @@ pub(crate) struct Painter(Arc<Shared>);
 struct Shared {
     desk: Mutex<Desk>,
     news: Condvar,
-    /// Ends the drawing that goes on.
+    /// Stops the rendering in progress.
     cancel: AtomicBool,
 }
 
@@ -87,16 +88,16 @@ struct Desk {
     wanted: Option<Wanted>,
     under_way: u32,
     closed: bool,
-    /// The picture that is being drawn may be given up.
+    /// The rendering in progress may be cancelled.
     at_rest: bool,
 }
 
 impl Painter {
-    /// Starts the thread, which ends when the painter is closed; `send` gets each picture as the page takes it, after the one
-    /// before, and says whether there is still somebody to take it.
+    /// Starts the thread, which ends when the painter is closed. `send` gets each packed picture in order, and
+    /// returns whether a receiver is left.
     ///
     /// # Errors
-    /// When the system has no thread.
+    /// Fails if the system cannot start a thread.
     pub(crate) fn start(send: impl Fn(Vec<u8>) -> bool + Send + 'static) -> std::io::Result<Self> {
         let shared =
             Arc::new(Shared { desk: Mutex::default(), news: Condvar::new(), cancel: AtomicBool::new(false) });
@@ -105,7 +106,7 @@ impl Painter {
         Ok(Self(shared))
     }
 
-    /// Orders a picture, instead of any that is waiting.
+    /// Requests a picture, in place of any that is waiting.
     pub(crate) fn want(&self, wanted: Wanted) {
         self.0.change(|desk| {
             if desk.at_rest {
@@ -115,12 +116,12 @@ impl Painter {
         });
     }
 
-    /// The page has shown one.
+    /// Records that the page has shown a picture.
     pub(crate) fn shown(&self) {
         self.0.change(|desk| desk.under_way = desk.under_way.saturating_sub(1));
     }
 
-    /// No more pictures.
+    /// Stops rendering and ends the thread.
     pub(crate) fn close(&self) {
         self.0.cancel.store(true, Ordering::Relaxed);
         self.0.change(|desk| desk.closed = true);
@@ -169,13 +170,13 @@ impl Shared {
                         return;
                     }
                 }
-                // Given up for a newer one, or beyond what can be drawn.
+                // The rendering was cancelled for a newer one, or the picture is beyond the limits.
                 Err(_) => self.change(|desk| desk.under_way = desk.under_way.saturating_sub(1)),
             }
         }
     }
 
-    /// Draws a picture as it is, after sketches of what takes long.
+    /// Renders a picture at full quality, after sketches if it is slow.
     fn at_rest(
         &self,
         wanted: &Wanted,
@@ -186,10 +187,10 @@ impl Shared {
         let scene = &wanted.scene;
         let is_sampled = scene.samples.most() > 1;
         let mut share = pace.share(scene, PATIENCE);
-        // With one ray a pixel a sketch of the whole size is the picture.
+        // With one ray per pixel, a sketch of the full size is the picture.
         while share < 1.0 || is_sampled {
             let sketch = self.sketch(wanted, share, pace)?;
-            // What the page cannot show in time is left out: a finer one follows.
+            // A sketch that the page cannot show in time is skipped: a finer one follows.
             if self.another() {
                 send(sketch);
             }
@@ -220,7 +221,7 @@ impl Shared {
         Ok(Picture { number: wanted.number, image, took: start.elapsed(), is_final: true })
     }
 
-    /// A picture with one ray a pixel, and with this share of its width and height.
+    /// Renders a picture with one ray per pixel, and with this share of its width and height.
     fn sketch(&self, wanted: &Wanted, share: f64, pace: &mut Pace) -> Result<Picture, RenderError> {
         let start = Instant::now();
         let whole = &wanted.scene;
@@ -235,7 +236,7 @@ impl Shared {
         Ok(Picture { number: wanted.number, image, took: start.elapsed(), is_final: false })
     }
 
-    /// Whether the page has room for a picture more; if so, that is under way.
+    /// Returns whether another picture may be sent to the page. If so, counts it.
     fn another(&self) -> bool {
         let mut is_free = false;
         self.change(|desk| {
@@ -246,12 +247,12 @@ impl Shared {
     }
 }
 
-/// How long pictures with one ray a pixel took last.
+/// The duration of the last renderings with one ray per pixel.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pace {
-    /// Seconds before the first pixel.
+    /// The seconds before the first pixel.
     preparing: f64,
-    /// Seconds a pixel, once one was drawn.
+    /// The seconds per pixel, once a picture was rendered.
     per_pixel: Option<f64>,
 }
 
@@ -264,20 +265,20 @@ impl Pace {
         self.per_pixel = Some(took.as_secs_f64() / screen.pixels() as f64);
     }
 
-    /// The share of width and height that is drawn in so many seconds. The pixels of an orthographic camera are world units, and
-    /// stay.
+    /// Returns the share of width and height that can be rendered in this many seconds. The pixels of an orthographic
+    /// camera are world units, so its size does not change.
     fn share(&self, scene: &Scene, seconds: f64) -> f64 {
         if matches!(scene.camera, Camera::Orthographic) {
             return 1.0;
         }
         let Some(per_pixel) = self.per_pixel else { return LEAST };
-        // Preparing takes as long for few pixels as for many.
+        // Preparing takes the same time for few pixels as for many.
         let left = (seconds - self.preparing).max(seconds / 3.0);
         (left / (per_pixel * scene.screen.pixels() as f64)).sqrt().clamp(LEAST, 1.0)
     }
 }
 
-/// A share of a size.
+/// Returns a share of a screen's size.
 fn smaller(screen: Screen, share: f64) -> Screen {
     let side = |side: u32| (f64::from(side) * share).round().max(1.0) as u32;
     Screen::new(side(screen.width()), side(screen.height())).unwrap_or(screen)
@@ -299,7 +300,7 @@ mod tests {
         Wanted { scene, motion: None, moving, number }
     }
 
-    /// A picture that may be drawn in any size.
+    /// Returns a request for a picture that may be rendered in any size.
     fn pinhole(number: u32, text: &str) -> Wanted {
         let text = format!("Screen 96 64\nLook 0 1 6  0 0 0  50\nIlight 1 1 1  1 -1 -1\n{text}\nTrace");
         let parsed = rayfold_scene::parse("a", text.as_bytes(), &Default::default());
@@ -312,7 +313,7 @@ mod tests {
         picture[16] == 1
     }
 
-    /// All pictures up to the one that stays.
+    /// Returns all pictures up to the final one.
     fn drawn(painter: &Painter, pictures: &mpsc::Receiver<Vec<u8>>, wanted: Wanted) -> Vec<Vec<u8>> {
         painter.want(wanted);
         let mut seen: Vec<Vec<u8>> = vec![];

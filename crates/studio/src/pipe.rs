@@ -1,5 +1,5 @@
-//! Files that are sent while they are made, so that their size does not matter: what is written comes out as the body of
-//! an answer. Whoever writes waits for whoever reads, and hears when nobody does any more.
+//! Files that are sent while they are made, so that their size does not matter: written bytes become the body of a
+//! response. The writer waits for the reader, and gets an error when the reader has gone.
 
 use std::io::{self, Write};
 use std::thread;
@@ -11,42 +11,42 @@ use tokio::sync::mpsc::{Receiver, Sender, channel};
 use zip::ZipWriter;
 use zip::write::{SimpleFileOptions, StreamWriter};
 
-/// Bytes that are sent at once.
+/// The number of bytes that are sent at a time.
 const PIECE: usize = 64 << 10;
 
-/// Pieces that wait to be read, at most.
+/// The largest number of pieces that wait to be read.
 const WAITING: usize = 16;
 
-/// Where a file is written to.
+/// The writing end of a pipe.
 #[derive(Debug)]
 pub(crate) struct Pipe {
     sender: Sender<io::Result<Bytes>>,
     gathered: Vec<u8>,
 }
 
-/// A zip file that is sent while it is made. Pictures are in it as they are: they are compressed.
+/// A zip file that is sent while it is made. Pictures are stored uncompressed, because PNG is compressed already.
 #[derive(Debug)]
 pub(crate) struct Zip(ZipWriter<StreamWriter<Pipe>>);
 
-/// A body, and what is written into it.
+/// Makes a body and the pipe that fills it.
 pub(crate) fn pipe() -> (Pipe, Body) {
     let (sender, receiver) = channel(WAITING);
     let next = async |mut receiver: Receiver<_>| receiver.recv().await.map(|piece| (piece, receiver));
     (Pipe { sender, gathered: Vec::new() }, Body::from_stream(stream::unfold(receiver, next)))
 }
 
-/// Has `work` write a zip file on a thread of its own; a failure breaks the answer off, so that it is not taken for a whole
-/// file.
+/// Runs `work` to write a zip file on a thread of its own. An error breaks the response, so that it is not taken
+/// for a whole file.
 ///
 /// # Errors
-/// When the system has no thread.
+/// Fails if the system cannot start a thread.
 pub(crate) fn zip_of(work: impl FnOnce(&mut Zip) -> io::Result<()> + Send + 'static) -> io::Result<Body> {
     let (pipe, body) = pipe();
     let failures = pipe.failures();
     thread::Builder::new().name("zip".into()).spawn(move || {
         let mut zip = Zip::new(pipe);
         if let Err(error) = work(&mut zip).and_then(|()| zip.finish()) {
-            // Whoever has left hears nothing any more.
+            // If this fails, the reader has gone.
             let _ = failures.blocking_send(Err(error));
         }
     })?;
@@ -58,38 +58,39 @@ impl Zip {
         Self(ZipWriter::new_stream(pipe))
     }
 
-    /// Adds a file.
+    /// Adds a file to the archive.
     ///
     /// # Errors
-    /// When nobody reads any more.
+    /// Fails if the reader has gone.
     pub(crate) fn add(&mut self, name: &str, bytes: &[u8]) -> io::Result<()> {
         let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
         self.0.start_file(name, options)?;
         self.0.write_all(bytes)
     }
 
-    /// Ends it.
+    /// Finishes the archive.
     ///
     /// # Errors
-    /// When nobody reads any more.
+    /// Fails if the reader has gone.
     pub(crate) fn finish(self) -> io::Result<()> {
         self.0.finish()?.into_inner().flush()
     }
 }
 
-/// What a frame's file is called in a zip file of so many, so that every program shows them in their order.
+/// Returns the name of a frame's file in a zip file of `of` frames. Its number is padded so that all programs
+/// sort the files correctly.
 pub(crate) fn frame_file(number: u64, of: u64) -> String {
     let digits = of.max(1).to_string().len();
     format!("frame{number:0digits$}.png")
 }
 
 impl Pipe {
-    /// Where a failure goes, which breaks the answer off.
+    /// Returns the sender for an error, which breaks the response.
     pub(crate) fn failures(&self) -> Sender<io::Result<Bytes>> {
         self.sender.clone()
     }
 
-    /// Sends what was gathered.
+    /// Sends the gathered bytes.
     fn send(&mut self) -> io::Result<()> {
         let piece = Bytes::from(std::mem::take(&mut self.gathered));
         self.sender.blocking_send(Ok(piece)).map_err(|_| io::ErrorKind::BrokenPipe.into())
@@ -143,10 +144,10 @@ mod tests {
 
     #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
     async fn whoever_writes_hears_that_nobody_reads() {
-        let (told, heard) = std::sync::mpsc::channel();
+        let (report, heard) = std::sync::mpsc::channel();
         let body = zip_of(move |zip| {
             let ended = (0..10_000).try_for_each(|_| zip.add("a", &[0; 1 << 16]));
-            told.send(ended.is_err()).unwrap();
+            report.send(ended.is_err()).unwrap();
             ended
         });
         drop(body);

@@ -1,7 +1,7 @@
-//! The scripts that are open, and their files.
+//! The open scripts and their files.
 //!
-//! Reads and writes what it was opened with and nothing else. A file is written whole or not at all, and never over
-//! what somebody else wrote meanwhile: then it is in [`Saved::Conflict`] until it is said whose text stays.
+//! Reads and writes only what it was opened with. A file is written whole or not at all, and never over a change by
+//! another program. In that case it is in [`Saved::Conflict`] until the user chooses a text.
 
 use std::cell::{OnceCell, RefCell};
 use std::path::{Path, PathBuf};
@@ -20,84 +20,84 @@ use crate::line::Line;
 use crate::settings::Settings;
 use crate::tracks::{Tracks, tracks};
 
-/// Bytes of a new script's name; file systems take 255, and a receipt in a bucket adds to it.
+/// The longest name of a new script in bytes. File systems allow 255, and a receipt in a bucket adds to it.
 const NAME: usize = 200;
 
-/// Faults of a script that are told one by one.
+/// The largest number of errors and warnings of a script that are listed.
 const DESCRIBED: usize = 200;
 
-/// A file is written when nothing was changed for so long.
+/// The time without changes after which a file is written.
 const REST: Duration = Duration::from_millis(400);
 
-/// What a script begins with that is not there yet.
+/// The initial text of a script that does not exist yet.
 const STARTER: &str = include_str!("starter.txt");
 
-/// Whether a file holds what is shown.
+/// Whether a file on disk has the shown content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Saved {
-    /// It does.
+    /// The file has the shown content.
     Yes,
-    /// It soon will.
+    /// The shown content will be written soon.
     Soon,
-    /// Somebody else changed it, and so did the page.
+    /// Another program changed the file, and so did the page.
     Conflict,
-    /// It cannot be written.
+    /// The file cannot be written.
     Failed,
 }
 
 /// A script and its file.
 #[derive(Debug)]
 pub struct Opened {
-    /// How it is called: its file name.
+    /// The name of the file.
     pub name: String,
     path: PathBuf,
-    /// Its lines.
+    /// The lines of the script.
     pub document: Document,
-    /// What the lines mean; what they meant last, where they have an error now.
+    /// The parsed script; the last valid one if the lines have an error now.
     pub script: Option<Arc<Script>>,
-    /// What is wrong with them.
+    /// The errors and warnings of the lines.
     pub diagnostics: Vec<Diagnostic>,
-    /// What the file held when it was last read or written; `None` if it was not there.
+    /// The content of the file when it was last read or written; `None` if it did not exist.
     on_disk: Option<Vec<u8>>,
     changed: Option<Instant>,
     saved: Saved,
-    /// Why it could not be written last.
+    /// The error of the last attempt to write the file.
     failure: String,
-    /// What was worked out of the lines, as long as they stay: the frame that was asked for last, with its index, and the numbers
-    /// that change.
+    /// Results computed from the lines, valid until they change: the frame that was requested last, with its index,
+    /// and the numbers that change.
     frame: RefCell<Option<(usize, Arc<Frame>)>>,
     tracks: OnceCell<Tracks>,
 }
 
-/// All that is open.
+/// The open scripts of an animation.
 #[derive(Debug)]
 pub struct Project {
-    /// How it is called: the folder's or the file's name.
+    /// The name of the folder or of the file.
     pub name: String,
-    /// In their order in the animation; never empty.
+    /// The scripts in the order of the animation; never empty.
     pub files: Vec<Opened>,
-    /// What in the folder looks like a part of the animation and is not read.
+    /// The files that look like a part of the animation but are not read.
     pub not_read: Vec<NotRead>,
     settings: Settings,
-    /// The folder, where one was opened.
+    /// The folder, if one was opened.
     folder: Option<PathBuf>,
 }
 
-/// A frame of the animation.
+/// A position in the animation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// Index of its file.
+    /// The index of its file.
     pub file: usize,
-    /// Index of its `Trace` in the file.
+    /// The index of its `Trace` in the file.
     pub frame: usize,
 }
 
 impl Project {
-    /// Opens a folder of scripts, or one script; a script that is not there yet begins with an example.
+    /// Opens a folder of scripts, or one script. A script that does not exist yet begins with an example.
     ///
     /// # Errors
-    /// When a file cannot be read, the folder has no script, or its `animation.json` is none.
+    /// Fails if a file cannot be read, the folder has no script, or its `animation.json` is invalid.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let name = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
         let name = name.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
@@ -132,36 +132,36 @@ impl Project {
         Ok(Self { name, files, not_read, settings, folder })
     }
 
-    /// What is said of the whole animation.
+    /// Returns the settings of the animation.
     pub fn settings(&self) -> AnimationSettings {
         self.settings.now()
     }
 
-    /// Sets the frames a second, as a step of a file that can be undone.
+    /// Sets the frame rate, as a step of a file that can be undone.
     ///
     /// # Errors
-    /// For a pace that an animation cannot have, and when `animation.json` cannot be written.
+    /// Fails if an animation cannot have the frame rate, or if `animation.json` cannot be written.
     pub fn set_fps(&mut self, file: usize, fps: f64) -> Result<(), Error> {
         let before = self.settings.now().fps();
         self.settings.set_fps(fps)?;
         if fps != before {
-            self.files[file].document.paced(before);
+            self.files[file].document.frame_rate_changed(before);
         }
         Ok(())
     }
 
-    /// Looks whether somebody else has written `animation.json`; whether another pace holds now.
+    /// Checks whether another program has written `animation.json`. Returns whether the frame rate has changed.
     ///
     /// # Errors
-    /// When it is none any more.
+    /// Fails if the file is no longer valid.
     pub fn look_at_settings(&mut self) -> Result<bool, Error> {
         self.settings.look()
     }
 
-    /// Takes the last step of a file back, or makes it again; what was done to its lines.
+    /// Undoes the last step of a file, or redoes it. Returns the changes of its lines.
     ///
     /// # Errors
-    /// When it has changed the pace, and `animation.json` cannot be written.
+    /// Fails if the step changes the frame rate and `animation.json` cannot be written.
     pub fn step(&mut self, file: usize, back: bool) -> Result<Vec<Splice>, Error> {
         let mut fps = self.settings.now().fps();
         let opened = &mut self.files[file];
@@ -175,15 +175,15 @@ impl Project {
         Ok(done)
     }
 
-    /// Whether scripts can be added: a folder was opened, and what was opened may be written.
+    /// Returns whether scripts can be added, that is, whether a folder was opened.
     pub fn can_create(&self) -> bool {
         self.folder.is_some()
     }
 
-    /// Adds a script to the folder, under a name that nothing has there; its index.
+    /// Adds a script to the folder under a new name. Returns its index.
     ///
     /// # Errors
-    /// Where no folder was opened, for a name that is none of a script, or taken, and when the file cannot be written.
+    /// Fails if no folder was opened, if the name is invalid or taken, or if the file cannot be written.
     pub fn create(&mut self, name: &str, text: &[u8]) -> Result<usize, Error> {
         let refused = |problem| Error::Name { name: name.chars().take(80).collect(), problem };
         let Some(folder) = &self.folder else {
@@ -211,12 +211,12 @@ impl Project {
         Ok(at)
     }
 
-    /// How many frames can be shown: those of all files, and one for a file that has none.
+    /// Returns the number of frames that can be shown: those of all files, and one for a file without any.
     pub fn frame_count(&self) -> usize {
         self.files.iter().map(Opened::frame_count).sum()
     }
 
-    /// Where a frame is, counted from 0; the last one beyond the end.
+    /// Returns the position of a frame, counted from 0. Beyond the end it is that of the last frame.
     pub fn place(&self, frame: usize) -> Place {
         let mut left = frame;
         for (file, opened) in self.files.iter().enumerate() {
@@ -229,27 +229,28 @@ impl Project {
         Place { file, frame: self.files[file].frame_count() - 1 }
     }
 
-    /// The first frame of a file.
+    /// Returns the index of the first frame of a file.
     pub fn first_frame(&self, file: usize) -> usize {
         self.files.iter().take(file).map(Opened::frame_count).sum()
     }
 
-    /// Writes what has rested for a while, or at once if `now`; whether anything has changed that is shown.
+    /// Writes files that have not changed for a while, or all at once if `now`. Returns whether
+    /// any displayed state changed.
     pub fn save(&mut self, now: bool) -> bool {
         let due = |changed: Instant| now || changed.elapsed() >= REST;
-        let mut told = false;
+        let mut changed = false;
         for file in &mut self.files {
             if file.changed.is_some_and(due) {
-                told |= file.save();
+                changed |= file.save();
             }
         }
-        told
+        changed
     }
 }
 
 impl Opened {
     fn open(name: String, path: PathBuf) -> Result<Self, Error> {
-        // So that a link keeps pointing to what is written.
+        // So a link keeps pointing to the file that is written.
         let path = path.canonicalize().unwrap_or(path);
         let on_disk = read(&path)?;
         let text = on_disk.clone().unwrap_or_else(|| STARTER.into());
@@ -270,12 +271,12 @@ impl Opened {
         Ok(file)
     }
 
-    /// How many frames can be shown.
+    /// Returns the number of frames that can be shown.
     pub fn frame_count(&self) -> usize {
         self.script.as_ref().map_or(1, |script| script.frame_count())
     }
 
-    /// Whether the file holds what is shown.
+    /// Returns whether the file on disk has the shown content.
     pub fn saved(&self) -> Saved {
         match self.saved {
             Saved::Yes if self.changed.is_some() => Saved::Soon,
@@ -283,19 +284,19 @@ impl Opened {
         }
     }
 
-    /// Whether its text can be rendered as it stands.
+    /// Returns whether the current text can be rendered.
     pub fn is_sound(&self) -> bool {
         self.script.is_some() && !self.diagnostics.iter().any(Diagnostic::is_error)
     }
 
-    /// Changes lines; what was done.
+    /// Changes lines. Returns the changes that were made.
     pub fn apply(&mut self, splices: Vec<Splice>, gesture: Option<u64>) -> Vec<Splice> {
         let done = splices.into_iter().map(|splice| self.document.apply(splice, gesture)).collect();
         self.touched();
         done
     }
 
-    /// Its text becomes another, as a step that can be undone; what was done to the lines.
+    /// Replaces the text, as a step that can be undone. Returns the changes of the lines.
     pub fn replace(&mut self, text: &[u8]) -> Vec<Splice> {
         let done = self.become_text(text);
         self.changed = Some(Instant::now());
@@ -318,7 +319,7 @@ impl Opened {
         self.tracks = OnceCell::new();
     }
 
-    /// A frame, counted from 0.
+    /// Returns a frame, counted from 0.
     pub(crate) fn frame(&self, frame: usize) -> Arc<Frame> {
         let mut kept = self.frame.borrow_mut();
         match &*kept {
@@ -331,17 +332,17 @@ impl Opened {
         }
     }
 
-    /// The numbers that change.
+    /// Returns the numbers that change.
     pub(crate) fn tracks(&self) -> &Tracks {
         self.tracks.get_or_init(|| tracks(self.document.lines()))
     }
 
-    /// Looks whether somebody else has written the file: their text is taken over as a step that can be undone, unless
-    /// there are changes that are not written yet, or the file has gone. What was done to the lines.
+    /// Checks whether another program has written the file. Its text is adopted as a step that can be undone, unless
+    /// there are unwritten changes or the file is gone. Returns the changes of the lines.
     pub fn look(&mut self) -> Option<Vec<Splice>> {
         let theirs = read(&self.path).ok()?;
         if theirs == self.on_disk {
-            // It had gone, and is there again.
+            // The file was gone and is there again.
             let is_back = self.saved == Saved::Conflict && self.changed.is_none();
             self.saved = if is_back { Saved::Yes } else { self.saved };
             return is_back.then(Vec::new);
@@ -356,7 +357,7 @@ impl Opened {
         Some(self.take_over(&text))
     }
 
-    /// Ends a conflict: with the text of the page, or with that of the file. What was done to the lines.
+    /// Resolves a conflict, with the text of the page or with that of the file. Returns the changes of the lines.
     pub fn resolve(&mut self, keep_mine: bool) -> Vec<Splice> {
         self.on_disk = read(&self.path).unwrap_or_default();
         self.saved = Saved::Yes;
@@ -368,14 +369,14 @@ impl Opened {
         self.take_over(&text)
     }
 
-    /// The lines become those that the file holds.
+    /// Adopts the text of the file.
     fn take_over(&mut self, text: &[u8]) -> Vec<Splice> {
         let done = self.become_text(text);
         (self.changed, self.saved) = (None, Saved::Yes);
         done
     }
 
-    /// The lines become those of a text, by one splice of what differs.
+    /// Replaces the lines by those of a text, with one splice of the part that differs.
     fn become_text(&mut self, text: &[u8]) -> Vec<Splice> {
         let new = Line::split(text);
         let old = self.document.lines();
@@ -390,19 +391,19 @@ impl Opened {
         done
     }
 
-    /// It could not be written, and will be tried again after a while.
+    /// Records that the file could not be written. It is tried again after a while.
     fn failed(&mut self, error: &Error) -> Saved {
         self.failure = words(error);
         self.changed = Some(Instant::now());
         Saved::Failed
     }
 
-    /// Why it could not be written, as long as that is so.
+    /// Returns the reason why the file cannot be written, as long as that is so.
     pub fn failure(&self) -> &str {
         if self.saved == Saved::Failed { &self.failure } else { "" }
     }
 
-    /// Writes the file, if nobody else has; whether it stands otherwise than before.
+    /// Writes the file, unless another program has. Returns whether its state has changed.
     fn save(&mut self) -> bool {
         let before = self.saved();
         if self.saved == Saved::Conflict {
@@ -480,8 +481,8 @@ mod tests {
         let (_folder, path, mut project) = one("a\nb\nc\n");
         assert!(project.files[0].look().is_none());
         fs::write(&path, "a\nx\ny\nc\n").unwrap();
-        let told = project.files[0].look().unwrap();
-        assert_eq!((told[0].at, told[0].removed, told[0].inserted.len()), (1, 1, 2));
+        let splices = project.files[0].look().unwrap();
+        assert_eq!((splices[0].at, splices[0].removed, splices[0].inserted.len()), (1, 1, 2));
         assert_eq!(project.files[0].document.bytes(), b"a\nx\ny\nc\n");
         assert_eq!(project.files[0].saved(), Saved::Yes);
         project.step(0, true).unwrap();
@@ -536,7 +537,7 @@ mod tests {
         let (_folder, path, mut project) = one("a\nb");
         project.files[0].apply(set(0, "mine"), None);
         fs::write(&path, "theirs").unwrap();
-        assert_eq!(project.files[0].look(), Some(Vec::new()), "the page is told of the conflict");
+        assert_eq!(project.files[0].look(), Some(Vec::new()), "the page learns of the conflict");
         project.files[0].resolve(false);
         assert_eq!(project.files[0].document.bytes(), b"theirs");
         assert!(!project.save(true));

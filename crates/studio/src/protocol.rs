@@ -1,146 +1,146 @@
-//! What page and server say to each other over the WebSocket: JSON both ways, and pictures (`pictures`) to the page.
+//! The messages between page and server over the WebSocket: JSON both ways, and pictures (`pictures`) to the page.
 //!
-//! Points of the picture are in its pixels; lines count from 0.
+//! Points of the picture are in its pixels. Lines are counted from 0.
 
 use serde::{Deserialize, Serialize};
 
-use crate::handles::{Grip, Handle, Manner};
+use crate::handles::{DragOptions, Handle, HandleKind};
 use crate::project::Saved;
 use crate::tables::{CommandTable, FieldTable, Role};
 use crate::tracks::{KeyPlace, Tracks};
 
-/// What the page asks for.
+/// A message of the page.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "kebab-case", rename_all_fields = "kebab-case", tag = "ask")]
-pub(crate) enum Ask {
-    /// The viewport has this size, in pixels of the screen.
+pub(crate) enum ClientMessage {
+    /// Set the size of the viewport, in pixels of the screen.
     Size { width: u32, height: u32 },
-    /// A picture has been shown.
+    /// Confirm that a picture has been shown.
     Shown,
     /// Show a frame, counted from 0; `moving` while it is played or scrubbed.
     Frame { frame: usize, moving: bool },
     /// Select lines.
     Select { lines: Vec<usize> },
-    /// What is under the pointer?
+    /// Report the object under the pointer.
     Hover { x: f64, y: f64 },
-    /// The pointer goes down: on a handle, on an object, or on nothing, which turns the camera.
-    Press { x: f64, y: f64, extend: bool, grip: Option<Grip>, line: Option<usize> },
-    /// It moves.
+    /// Press the pointer: on a handle, on an object, or on the background, which turns the camera.
+    Press { x: f64, y: f64, extend: bool, grip: Option<HandleKind>, line: Option<usize> },
+    /// Move the pressed pointer.
     Drag {
         x: f64,
         y: f64,
         #[serde(flatten)]
-        manner: Manner,
+        options: DragOptions,
     },
-    /// It goes up.
+    /// Release the pointer.
     Release,
-    /// Turn, move or approach; in heights of the picture.
+    /// Turn, pan or zoom the free camera; the distance is in heights of the picture.
     Navigate { how: Navigation, x: f64, y: f64 },
     /// Look through a camera.
-    Look { at: Standpoint },
-    /// What is looked through becomes the script's camera.
+    Look { at: ViewPreset },
+    /// Write the current view into the script as its camera.
     KeepCamera,
-    /// Numbers of a line, from number `first` on; those of one `gesture` are one step.
+    /// Set the numbers of a line from number `first` on. All changes with the same `gesture` are one step.
     Set { line: usize, first: usize, values: Vec<f64>, gesture: Option<u64> },
-    /// The text of a line, or of several in its place.
+    /// Replace the text of a line by one or several lines.
     Text { line: usize, text: String },
-    /// A new line in front of line `at`.
+    /// Insert a line before line `at`.
     Insert { at: usize, text: String },
-    /// Lines go.
+    /// Remove these lines from the file.
     Remove { lines: Vec<usize> },
-    /// Lines again, behind themselves.
+    /// Copy lines, each after itself.
     Duplicate { lines: Vec<usize> },
-    /// A line goes up or down by one object.
+    /// Move a line up or down by one object.
     Reorder { line: usize, down: bool },
-    /// A name: the comment at the end of a line.
+    /// Set a name, which is the comment at the end of a line.
     Rename { line: usize, name: String },
-    /// Lines become comments, or commands again.
+    /// Turn lines into comments, or comments back into commands.
     Hide { lines: Vec<usize> },
-    /// Objects fall onto what is below them.
+    /// Drop objects onto the objects below them.
     Drop { lines: Vec<usize> },
-    /// Objects stand on the height 0.
+    /// Put objects on the height 0.
     Ground { lines: Vec<usize> },
-    /// Lines cannot be taken hold of in the picture, or can again.
+    /// Lock lines against dragging in the picture, or unlock them.
     Lock { lines: Vec<usize> },
-    /// Lines become a group.
+    /// Make a group of lines.
     Group { lines: Vec<usize> },
-    /// The lines of its group take the place of a `Use`.
+    /// Replace a `Use` by the lines of its group.
     Ungroup { line: usize },
-    /// Objects get a material of the script.
+    /// Give objects a material of the script.
     Surface { lines: Vec<usize>, material: String },
-    /// Objects get a material to begin with.
+    /// Give objects a starter material.
     Preset { lines: Vec<usize>, preset: String },
-    /// What concerns keys and frames.
-    Time { wish: TimeWish },
-    /// Objects move by so many steps along the axes.
+    /// Edit keys and frames.
+    Time { wish: TimelineEdit },
+    /// Move objects by this many steps along the axes.
     Nudge { lines: Vec<usize>, by: [f64; 3] },
-    /// A new object or light; at a point of the picture, or in the middle.
+    /// Add an object or a light at a point of the picture, or in the middle.
     Add { command: String, at: Option<[f64; 2]> },
-    /// Take back.
+    /// Undo the last step.
     Undo,
-    /// Make again.
+    /// Redo the last undone step.
     Redo,
-    /// End a conflict with what others wrote.
+    /// Resolve a conflict with the file on disk.
     Resolve { keep_mine: bool },
-    /// A whole text, in place of the one that is shown, or as a new script of this name.
+    /// Load a whole text, in place of the shown one or as a new script of this name.
     Load { from: Source, new: Option<String> },
-    /// Make the GIF.
+    /// Start rendering the GIF.
     Render,
-    /// Stop making it.
+    /// Stop rendering the GIF.
     Cancel,
 }
 
-/// Where a whole text comes from.
+/// The source of a whole text.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "what")]
 pub(crate) enum Source {
-    /// Nothing is in it.
+    /// An empty text.
     Empty,
-    /// An example.
+    /// An example scene.
     Example { name: String },
-    /// The page sends it.
+    /// A text sent by the page.
     Text { text: String },
-    /// What is shown.
+    /// The text that is shown.
     Shown,
 }
 
-/// What is wished of keys and frames.
+/// An edit of the timeline.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "kebab-case", rename_all_fields = "kebab-case", tag = "do")]
-pub(crate) enum TimeWish {
-    /// Turns something on or off.
+pub(crate) enum TimelineEdit {
+    /// Turn an option on or off.
     Switch { what: Switch, on: bool },
-    /// Keys at the frame that is shown for the main numbers of lines; where all have one there, they go.
+    /// Set keys at the shown frame for the main numbers of lines. If all have a key there, remove them.
     Key { lines: Vec<usize> },
-    /// The same, for some numbers of a line.
+    /// Set or remove keys in the same way for some numbers of a line.
     Toggle { line: usize, numbers: Vec<usize> },
-    /// Takes hold of keys.
+    /// Start dragging these keys.
     Grab { keys: Vec<KeyPlace> },
-    /// Those that are held go so many frames from where they were.
+    /// Move the dragged keys by this many frames from their start.
     Move { by: f64 },
-    /// Keys go.
+    /// Remove these keys from their curves.
     Remove { keys: Vec<KeyPlace> },
-    /// Keys are remembered.
+    /// Copy these keys to the clipboard.
     Copy { keys: Vec<KeyPlace> },
-    /// What was copied, from the frame that is shown on.
+    /// Paste the copied keys, the first at the shown frame.
     Paste,
-    /// What happens between the keys of their tracks.
+    /// Set the interpolation of the tracks of these keys.
     Ease { keys: Vec<KeyPlace>, mode: String, cycle: bool },
-    /// How many frames a second are shown.
+    /// Set the number of frames per second.
     Pace { fps: f64 },
-    /// How many frames the `Trace` is that is shown.
+    /// Set the number of frames of the shown `Trace`.
     Frames { count: u32 },
 }
 
-/// What is on or off.
+/// An option of the timeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Switch {
-    /// Still numbers that are changed become curves.
+    /// Changing a constant number makes it a curve.
     AutoKey,
-    /// The way of what is selected.
+    /// The motion path of the selection is shown.
     Path,
-    /// What is selected at other frames.
+    /// The selection is outlined at other frames.
     Onion,
 }
 
@@ -148,273 +148,268 @@ pub(crate) enum Switch {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Navigation {
-    /// Around what is looked at.
+    /// Rotate around the target.
     Turn,
-    /// Sideways.
+    /// Move the camera sideways.
     Pan,
-    /// Nearer (y below 0) or farther.
+    /// Approach (y below 0) or recede.
     Zoom,
 }
 
-/// Where to look from.
+/// A camera to look through.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum Standpoint {
-    /// The script's camera.
+pub(crate) enum ViewPreset {
+    /// The camera of the script.
     Script,
-    /// A free one, from where one looks now.
+    /// A free camera, starting at the current view.
     Free,
-    /// From the front (along -z).
+    /// The view from the front (along -z).
     Front,
-    /// From the right (along -x).
+    /// The view from the right (along -x).
     Side,
-    /// From above.
+    /// The view from above.
     Top,
-    /// At what is selected.
+    /// The view of the selection.
     Selection,
 }
 
-/// What the page is told; what is left out has not changed.
+/// A message to the page. Omitted fields have not changed.
 #[derive(Clone, Debug, Default, Serialize)]
 #[serde(rename_all = "camelCase")]
-pub(crate) struct Tell {
-    /// Once, at the start.
+pub(crate) struct ServerMessage {
+    /// The tables of the commands, sent once at the start.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) tables: Option<Vec<CommandTable>>,
-    /// The names of the examples, once, at the start.
+    /// The names of the examples, sent once at the start.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) examples: Option<Vec<&'static str>>,
-    /// Whether scripts can be added, once, at the start.
+    /// Whether scripts can be added, sent once at the start.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) can_create: Option<bool>,
-    /// Once, at the start: the names of materials to begin with.
+    /// The names of the starter materials, sent once at the start.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) presets: Vec<&'static str>,
-    /// All files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) files: Option<Vec<FileState>>,
-    /// All lines of the file that is shown.
+    /// All lines of the shown file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) lines: Option<Vec<LineState>>,
-    /// Changes of these lines, in their order.
+    /// The changes of these lines, in order.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) splices: Vec<LinesChanged>,
-    /// How everything stands.
+    /// The state of the whole page.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) state: Option<State>,
-    /// What is under the pointer: its line, if it is an object.
+    /// The line of the object under the pointer, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) hovered: Option<Option<usize>>,
-    /// The outline of what is selected, as the path of an SVG.
+    /// The outline of the selection, as an SVG path.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) outline: Option<String>,
-    /// The outline of what is under the pointer.
+    /// The outline of the object under the pointer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) hover_outline: Option<String>,
-    /// What is selected, at other frames.
+    /// The outlines of the selection at other frames.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) ghosts: Option<Vec<Ghost>>,
     /// The numbers that change.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) tracks: Option<Tracks>,
-    /// How the GIF stands.
+    /// The state of the GIF.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) output: Option<OutputState>,
-    /// For people.
+    /// A message for the user.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) notice: Option<String>,
 }
 
-/// A file.
+/// The state of a file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct FileState {
-    /// Its name.
     pub(crate) name: String,
-    /// Its frames.
+    /// The number of its frames.
     pub(crate) frames: usize,
-    /// Whether it has an error.
+    /// Whether the file has an error.
     pub(crate) faulty: bool,
 }
 
-/// A line.
+/// The state of a line.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct LineState {
-    /// Without its end.
+    /// The text without the line end.
     pub(crate) text: String,
-    /// Its command's name; also of a command that is hidden in a comment.
+    /// The name of the command, also of one that is hidden in a comment.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) command: Option<&'static str>,
-    /// What the command is.
+    /// The role of the command.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) role: Option<Role>,
-    /// The comment at its end.
+    /// The comment at the end of the line.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) name: Option<String>,
-    /// The name of a group or material that stands before its numbers.
+    /// The name of a group or material before the numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) subject: Option<String>,
-    /// It is a comment now.
+    /// The command is hidden in a comment.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub(crate) hidden: bool,
 }
 
-/// Some lines in place of others.
+/// A replacement of some lines by others.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct LinesChanged {
-    /// The first.
+    /// The index of the first line.
     pub(crate) at: usize,
-    /// How many went.
+    /// The number of removed lines.
     pub(crate) removed: usize,
-    /// Those that came.
+    /// The inserted lines.
     pub(crate) lines: Vec<LineState>,
 }
 
-/// How everything stands.
+/// The state of the page.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct State {
-    /// How many wishes were heard when it stood so.
+    /// The number of messages that had been received.
     pub(crate) asked: u32,
-    /// The animation's name.
+    /// The name of the animation.
     pub(crate) title: String,
-    /// Frames a second.
+    /// The number of frames per second.
     pub(crate) fps: f64,
-    /// The frame that is shown, from 0.
+    /// The index of the shown frame, from 0.
     pub(crate) frame: usize,
-    /// How many there are.
+    /// The number of frames.
     pub(crate) frames: usize,
-    /// Its file, an index of `files`.
+    /// The file of the frame, as an index of `files`.
     pub(crate) file: usize,
-    /// Whether the file holds what is shown.
+    /// Whether the file on disk has the shown content.
     pub(crate) saved: Saved,
-    /// Why it cannot be written; empty where it can.
+    /// The reason why the file cannot be written; empty if it can.
     pub(crate) failure: String,
-    /// Whether there is something to undo.
     pub(crate) can_undo: bool,
-    /// Whether there is something to redo.
     pub(crate) can_redo: bool,
     /// The selected lines, the main one last.
     pub(crate) selection: Vec<usize>,
-    /// The main one's parameters.
+    /// The parameters of the main selected line.
     pub(crate) inspected: Option<Inspected>,
-    /// Faults of the file.
+    /// The errors and warnings of the file.
     pub(crate) faults: Vec<FaultState>,
-    /// What can be dragged.
+    /// The handles that can be dragged.
     pub(crate) handles: Vec<Handle>,
-    /// The ground's grid, as the path of an SVG.
+    /// The grid on the ground, as an SVG path.
     pub(crate) grid: String,
-    /// The way of what is selected, as the path of an SVG.
+    /// The motion path of the selection, as an SVG path.
     pub(crate) way: String,
-    /// Where its keys are, as dots of the path of an SVG.
+    /// The keys on the motion path, as dots of an SVG path.
     pub(crate) marks: String,
-    /// Lines that cannot be taken hold of in the picture.
+    /// The lines that cannot be dragged in the picture.
     pub(crate) locked: Vec<usize>,
-    /// Frames and keys.
+    /// The state of frames and keys.
     pub(crate) time: TimeState,
-    /// Whether one looks through a free camera.
+    /// Whether the view is that of a free camera.
     pub(crate) free: bool,
-    /// The picture that was ordered last: its number, width and height; none where there is nothing to draw.
+    /// Number, width and height of the picture that was requested last; `None` if there is nothing to draw.
     pub(crate) picture: Option<(u32, u32, u32)>,
 }
 
-/// A line's parameters.
+/// The parameters of a line.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct Inspected {
-    /// The line.
     pub(crate) line: usize,
-    /// Its command.
+    /// The name of the command.
     pub(crate) command: &'static str,
-    /// Its words as they are now; those that are no numbers are `null` here.
+    /// The current numbers of the parameters; `null` for a word that is no number.
     pub(crate) values: Vec<Option<f64>>,
-    /// Which of them change.
+    /// The parameters that are curves.
     pub(crate) curves: Vec<usize>,
-    /// Which of these have a key just here.
+    /// The curves that have a key at the shown frame.
     pub(crate) keyed: Vec<usize>,
-    /// Whether they may change.
+    /// Whether the parameters may be curves.
     pub(crate) can_key: bool,
-    /// The name that stands in the place of coefficients.
+    /// The name of a material in place of coefficients.
     pub(crate) material: Option<String>,
-    /// The name that stands before the numbers.
+    /// The name before the numbers.
     pub(crate) subject: String,
-    /// The parameters of a material, which each has others of.
+    /// The parameters of a material, which depend on its clauses.
     pub(crate) fields: Vec<FieldTable>,
 }
 
-/// Frames and keys.
+/// The state of frames and keys.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct TimeState {
-    /// The number of the frame that is shown: the time at which curves are read.
+    /// The number of the shown frame, at which curves are evaluated.
     pub(crate) number: f64,
-    /// The first number of its `Trace`.
+    /// The first frame number of its `Trace`.
     pub(crate) first: u32,
-    /// The last.
+    /// The last frame number of its `Trace`.
     pub(crate) last: u32,
-    /// Which of all frames has the first number, from 0.
+    /// The index of the first number among all frames, from 0.
     pub(crate) start: usize,
-    /// Whether still numbers that are changed become curves.
+    /// Whether changing a constant number makes it a curve.
     pub(crate) auto_key: bool,
-    /// Whether the way of what is selected is shown.
+    /// Whether the motion path of the selection is shown.
     pub(crate) path: bool,
-    /// Whether it is shown at other frames.
+    /// Whether the selection is outlined at other frames.
     pub(crate) onion: bool,
-    /// How many keys were copied.
+    /// The number of copied keys.
     pub(crate) copied: usize,
 }
 
-/// The outline of what is selected at another frame.
+/// The outline of the selection at another frame.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct Ghost {
-    /// As the path of an SVG.
+    /// The outline as an SVG path.
     pub(crate) path: String,
-    /// How many steps later, or, below 0, before.
+    /// The number of steps after the shown frame, or, below 0, before it.
     pub(crate) after: i32,
 }
 
-/// What is wrong with a line.
+/// An error or a warning of a line.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct FaultState {
-    /// The line.
+    /// The index of the line.
     pub(crate) line: usize,
-    /// Its first character, from 0.
+    /// The first character, from 0.
     pub(crate) column: usize,
-    /// How many characters.
+    /// The number of characters.
     pub(crate) length: usize,
-    /// Whether nothing is rendered for it.
+    /// Whether it prevents rendering.
     pub(crate) error: bool,
-    /// What is wrong.
+    /// The description of the problem.
     pub(crate) message: String,
-    /// What would be right.
+    /// The correction that would help.
     pub(crate) help: String,
 }
 
-/// How the GIF stands.
+/// The state of the GIF.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "is")]
 pub(crate) enum OutputState {
-    /// Being made.
+    /// The GIF is being rendered.
     Running {
-        /// Frames that are drawn.
+        /// The number of rendered frames.
         done: usize,
-        /// Of so many.
+        /// The number of all frames.
         of: usize,
     },
-    /// It can be fetched.
+    /// The GIF can be downloaded.
     Done {
-        /// Its size.
+        /// The size of the file.
         bytes: usize,
     },
-    /// It was cancelled.
+    /// The rendering was cancelled.
     Cancelled,
-    /// It cannot be made.
+    /// The GIF cannot be rendered.
     Failed {
-        /// Why.
+        /// The reason of the failure.
         why: String,
     },
 }

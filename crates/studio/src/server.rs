@@ -1,9 +1,8 @@
-//! The page's server: on loopback, for who knows the token in its address.
+//! The server of the page: on loopback, for clients that know the token in its address.
 //!
-//! Every request must name the host that it was made for and the token, and, where the browser says from which page it
-//! comes, be from this one: so neither another machine, another user's program without the address, nor another page
-//! of the same browser gets in. No path of a request reaches the file system. One page works at a time; a new one
-//! takes over.
+//! Every request must contain the right host and the token. If the browser sends the origin of a page, it must be
+//! this server. So other machines, programs of other users without the address, and other pages in the same browser
+//! are rejected. No path of a request reaches the file system. One page works at a time, and a new one replaces it.
 
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -29,30 +28,30 @@ use crate::output::{Outputs, frame_png, frames_zip, scripts_zip};
 use crate::page::Page;
 use crate::pictures::Painter;
 use crate::project::Project;
-use crate::protocol::{Ask, Tell};
+use crate::protocol::{ClientMessage, ServerMessage};
 use crate::runs::Cloud;
 use crate::session::{Answer, Output, Session};
 
-/// Bytes of what the page says at once: more than a line that is pasted.
+/// The largest message of the page in bytes: more than a pasted line.
 const MESSAGE: usize = 2 << 20;
 
-/// What waits to be sent to the page, at most; pictures are bounded further by the painter.
+/// The largest number of messages that wait to be sent to the page. The painter limits pictures further.
 const WAITING: usize = 64;
 
-/// Downloads for which frames are drawn at once, beside the viewport.
+/// The number of downloads for which frames are rendered at the same time, besides the viewport.
 const DRAWN: usize = 2;
 
-/// How often files are looked at and written.
+/// The interval at which files are checked and written.
 const TICK: Duration = Duration::from_millis(250);
 
-/// Bytes of the token, from the system's randomness.
+/// The length of the token in bytes of the system's randomness.
 const TOKEN: usize = 16;
 
-/// Nothing but this server: no other script, no style, no frame around it.
+/// Allows only content of this server: no other script or style, and no frame around it.
 const POLICY: &str = "default-src 'self'; connect-src 'self'; img-src 'self' data: blob:; object-src 'none'; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// A server that runs.
+/// A running server.
 #[derive(Debug)]
 pub struct Server {
     address: String,
@@ -68,17 +67,17 @@ struct Shared {
     page: Page,
     token: String,
     host: String,
-    /// Frames are drawn to be downloaded.
+    /// A permit to render frames for downloads.
     drawing: Arc<Semaphore>,
-    /// Ends the page that works now.
+    /// Ends the session of the current page.
     working: Mutex<Option<oneshot::Sender<()>>>,
 }
 
 impl Server {
-    /// Serves a project, and a bucket to submit it to, on this port or on any that is free if it is 0.
+    /// Serves a project, and a bucket to submit it to, on this port, or on any free one if it is 0.
     ///
     /// # Errors
-    /// When the port is taken or the system has no randomness.
+    /// Fails if the port is taken or the system has no randomness.
     pub async fn start(project: Project, page: Page, cloud: Cloud, port: u16) -> Result<Self, Error> {
         let mut random = [0; TOKEN];
         getrandom::fill(&mut random).map_err(|error| Error::Server(io::Error::other(error)))?;
@@ -123,12 +122,12 @@ impl Server {
         Ok(Self { address, shared, stop, task })
     }
 
-    /// Where the page is, with the token.
+    /// Returns the URL of the page, with the token.
     pub fn address(&self) -> &str {
         &self.address
     }
 
-    /// Writes what is not written yet and ends; the names of the files that could not be written.
+    /// Writes pending changes and stops. Returns the names of the files that could not be written.
     pub async fn stop(self) -> Vec<String> {
         let _ = self.stop.send(());
         let _ = self.task.await;
@@ -145,7 +144,7 @@ impl Shared {
         self.project.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The right to draw frames for a download.
+    /// Returns a permit to render frames for a download, if one is free.
     fn may_draw(&self) -> Option<OwnedSemaphorePermit> {
         Arc::clone(&self.drawing).try_acquire_owned().ok()
     }
@@ -157,14 +156,14 @@ impl Shared {
         let must_say = header(header::UPGRADE).is_some() || request.method() != Method::GET;
         let known_origin = match header(header::ORIGIN) {
             Some(from) => from == origin.as_bytes(),
-            // Browsers always say from where a socket is opened, or something is sent.
+            // Browsers always send the origin when a socket is opened or data is sent.
             None => !must_say,
         };
         header(header::HOST) == Some(self.host.as_bytes()) && known_origin && same(token, &self.token)
     }
 }
 
-/// Compares without telling by its time how much is right.
+/// Compares in constant time, which reveals nothing about the position of a difference.
 fn same(given: &str, token: &str) -> bool {
     given.len() == token.len() && given.bytes().zip(token.bytes()).fold(0, |off, (a, b)| off | (a ^ b)) == 0
 }
@@ -210,7 +209,7 @@ async fn scripts(State(shared): State<Arc<Shared>>) -> Response {
     zip.map_or_else(|error| failed(&error), |zip| file("application/zip", zip))
 }
 
-/// The script whose index among the files is the query, as it stands on the page.
+/// Returns the current text of a script. The query is its index among the files.
 async fn one_script(State(shared): State<Arc<Shared>>, request: Request) -> Response {
     let index: usize = request.uri().query().unwrap_or_default().parse().unwrap_or(0);
     let text = shared.project().files.get(index).map(|opened| opened.document.bytes());
@@ -229,7 +228,7 @@ async fn frames(State(shared): State<Arc<Shared>>) -> Response {
     )
 }
 
-/// The frame whose number, from 0, is the query.
+/// Returns the PNG of a frame. The query is its number, from 0.
 async fn frame(State(shared): State<Arc<Shared>>, request: Request) -> Response {
     let Some(_permit) = shared.may_draw() else { return busy() };
     let number = request.uri().query().unwrap_or_default().parse().unwrap_or(0);
@@ -242,7 +241,8 @@ async fn frame(State(shared): State<Arc<Shared>>, request: Request) -> Response 
     picture(png, "this frame has nothing to draw\n")
 }
 
-/// A sphere of a material: the query is the index of its file, its line and the number of the frame, joined by commas.
+/// Returns a sphere of a material. The query is the index of its file, its line and the number of the
+/// frame, joined by commas.
 async fn material(State(shared): State<Arc<Shared>>, request: Request) -> Response {
     let query = request.uri().query().unwrap_or_default();
     let mut numbers = query.split(',').map(|number| number.parse().unwrap_or(0usize));
@@ -259,11 +259,11 @@ async fn material(State(shared): State<Arc<Shared>>, request: Request) -> Respon
     picture(png, "this line defines no material\n")
 }
 
-/// A sphere of the material to begin with that the query names.
+/// Returns a sphere of the starter material that the query names.
 async fn preset(request: Request) -> Response {
     let name = request.uri().query().unwrap_or_default();
     let png = tokio::task::block_in_place(|| materials::preset_sphere(name));
-    picture(png, "there is no such material to begin with\n")
+    picture(png, "there is no such starter material\n")
 }
 
 fn picture(png: Result<Option<Vec<u8>>, Error>, missing: &'static str) -> Response {
@@ -298,10 +298,10 @@ async fn socket(State(shared): State<Arc<Shared>>, upgrade: WebSocketUpgrade) ->
         .on_upgrade(move |socket| work(shared, socket, left))
 }
 
-/// A page at work, until it closes or another takes over.
+/// Runs the session of a page, until it closes or another replaces it.
 async fn work(shared: Arc<Shared>, mut socket: WebSocket, mut left: oneshot::Receiver<()>) {
     let (pictures, mut drawn) = mpsc::channel::<Vec<u8>>(WAITING);
-    let (tellings, mut told) = mpsc::channel::<Tell>(WAITING);
+    let (tellings, mut messages) = mpsc::channel::<ServerMessage>(WAITING);
     let Ok(painter) = Painter::start(move |picture| pictures.blocking_send(picture).is_ok()) else { return };
     let (mut session, answer) = Session::open(&shared.project());
     let mut tick = tokio::time::interval(TICK);
@@ -322,8 +322,8 @@ async fn work(shared: Arc<Shared>, mut socket: WebSocket, mut left: oneshot::Rec
                     Some(Output::Render) => {
                         let tellings = tellings.clone();
                         shared.outputs.start(&shared.project(), move |output| {
-                            let tell = Tell { output: Some(output), ..Tell::default() };
-                            // A page that has left hears nothing any more.
+                            let tell = ServerMessage { output: Some(output), ..ServerMessage::default() };
+                            // If this fails, the page has gone.
                             let _ = tellings.blocking_send(tell);
                         });
                     }
@@ -336,7 +336,7 @@ async fn work(shared: Arc<Shared>, mut socket: WebSocket, mut left: oneshot::Rec
                     Some(picture) => Message::Binary(Bytes::from(picture)),
                     None => break,
                 },
-                tell = told.recv() => match tell {
+                tell = messages.recv() => match tell {
                     Some(tell) => text(&tell),
                     None => break,
                 },
@@ -369,7 +369,7 @@ async fn work(shared: Arc<Shared>, mut socket: WebSocket, mut left: oneshot::Rec
 }
 
 fn ask(shared: &Shared, session: &mut Session, message: &str) -> Answer {
-    match serde_json::from_str::<Ask>(message) {
+    match serde_json::from_str::<ClientMessage>(message) {
         Ok(ask) => tokio::task::block_in_place(|| session.ask(&mut shared.project(), ask)),
         Err(error) => Answer {
             tell: notice(&format!("the page said what is not understood: {error}")),
@@ -378,12 +378,12 @@ fn ask(shared: &Shared, session: &mut Session, message: &str) -> Answer {
     }
 }
 
-fn notice(text: &str) -> Tell {
-    Tell { notice: Some(text.into()), ..Tell::default() }
+fn notice(text: &str) -> ServerMessage {
+    ServerMessage { notice: Some(text.into()), ..ServerMessage::default() }
 }
 
-fn text(tell: &Tell) -> Message {
-    // Numbers, texts and lists of them always have a form in JSON.
+fn text(tell: &ServerMessage) -> Message {
+    // Numbers, texts and lists of them can always be written as JSON.
     Message::Text(serde_json::to_string(tell).unwrap_or_default().into())
 }
 
@@ -394,7 +394,7 @@ mod tests {
 
     use super::*;
 
-    /// The status of a request, written out as it goes over the wire.
+    /// Returns the status of a request that is written literally to the socket.
     async fn status(host: &str, path: &str, headers: &[(&str, &str)]) -> u16 {
         let mut stream = TcpStream::connect(host).await.unwrap();
         let mut text = format!("GET {path} HTTP/1.1\r\n");

@@ -1,15 +1,15 @@
-//! A page at work: what it looks at, what it has selected and what it drags; each of its wishes becomes changes of the
-//! project and what it is told of them.
+//! The editor session of one page: view, selection, drag. Turns each message of the page into edits of the
+//! project and a reply.
 //!
-//! Knows no socket and no thread: wishes come in, values go out, so that tests need neither.
+//! Knows no socket and no thread, so tests need neither.
 
 mod editing;
 mod held_keys;
 mod hold;
 mod loading;
-mod sight;
-mod telling;
+mod replies;
 mod time;
+mod viewport;
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -25,75 +25,75 @@ use crate::line::Line;
 use crate::materials;
 use crate::pictures::Wanted;
 use crate::project::{Place, Project};
-use crate::protocol::{Ask, FileState, Tell};
-use crate::resting;
+use crate::protocol::{ClientMessage, FileState, ServerMessage};
+use crate::snap_to_ground;
 use crate::tables::commands;
 use crate::tracks::{Copied, Tracks};
 use crate::values::changed;
 use crate::view::Orbit;
 use hold::Held;
 
-/// Bytes of a text that the page sends for a line.
+/// The largest text that the page may send for a line, in bytes.
 const TEXT: usize = 1 << 20;
 
-/// A page at work.
+/// The editor session of a page.
 #[derive(Debug)]
 pub(crate) struct Session {
     size: (u32, u32),
     frame: usize,
-    /// The free camera, if one looks through it.
+    /// The free camera, if it is in use.
     free: Option<Orbit>,
     selection: Vec<usize>,
     held: Option<Held>,
-    /// How many wishes were heard.
+    /// The number of messages received.
     asked: u32,
     gestures: u64,
     /// The line that is being typed in, and its gesture.
     typing: Option<(usize, u64)>,
     pictures: u32,
-    /// Lines that cannot be taken hold of in the picture, each with its file. They are kept as long as the page is open: the
-    /// script does not say it.
+    /// The lines that cannot be dragged in the picture, each with its file. They last as long as the page is open,
+    /// because the script does not contain them.
     locked: Vec<(usize, usize)>,
-    /// What is under the pointer.
+    /// The line of the object under the pointer.
     hovered: Option<usize>,
-    /// Whether still numbers become curves when they are changed.
+    /// Changing a constant number makes it a curve.
     auto_key: bool,
-    /// Whether the way of what is selected is shown.
+    /// The motion path of the selection is shown.
     path: bool,
-    /// Whether it is outlined where it is at other frames.
+    /// The selection is outlined at other frames.
     onion: bool,
     copied: Vec<Copied>,
-    /// What the page was told last.
+    /// The state that was sent to the page last.
     tracks: Option<Tracks>,
     files: Vec<FileState>,
     shown_file: usize,
-    /// What the server is to do about the GIF.
+    /// The action that the server is to take on the GIF.
     output: Option<Output>,
 }
 
-/// What the server is to do about the GIF.
+/// An action on the GIF.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Output {
-    /// Begin.
+    /// Start rendering the GIF.
     Render,
-    /// Stop.
+    /// Stop rendering the GIF.
     Cancel,
 }
 
-/// What follows from a wish.
+/// The result of a message.
 #[derive(Debug, Default)]
 pub(crate) struct Answer {
-    /// What the page is told.
-    pub(crate) tell: Tell,
-    /// The picture that it gets.
+    /// The reply to the page.
+    pub(crate) tell: ServerMessage,
+    /// The picture that the page gets.
     pub(crate) picture: Option<Wanted>,
     /// The page has shown a picture.
     pub(crate) shown: bool,
-    /// What to do about the GIF.
+    /// The action on the GIF.
     pub(crate) output: Option<Output>,
 }
 
-/// What a wish has changed.
+/// The effect of a message on the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Change {
     Nothing,
@@ -104,7 +104,7 @@ enum Change {
 }
 
 impl Session {
-    /// A page that has just opened, and what it is told first.
+    /// Makes the session of a page that has just opened, and its first reply.
     pub(crate) fn open(project: &Project) -> (Self, Answer) {
         let mut session = Self {
             size: (960, 540),
@@ -127,23 +127,23 @@ impl Session {
             shown_file: 0,
             output: None,
         };
-        let tell = Tell {
+        let tell = ServerMessage {
             tables: Some(commands()),
             examples: Some(examples::names()),
             can_create: Some(project.can_create()),
             presets: materials::presets(),
             lines: Some(session.lines(project)),
             notice: None,
-            ..Tell::default()
+            ..ServerMessage::default()
         };
         let answer = session.answer(project, tell, Change::Nothing);
         (session, answer)
     }
 
-    /// Does what the page asks for.
-    pub(crate) fn ask(&mut self, project: &mut Project, ask: Ask) -> Answer {
+    /// Handles a message of the page.
+    pub(crate) fn ask(&mut self, project: &mut Project, ask: ClientMessage) -> Answer {
         self.asked = self.asked.wrapping_add(1);
-        let mut tell = Tell::default();
+        let mut tell = ServerMessage::default();
         let change = self.run(project, ask, &mut tell);
         match change {
             None => Answer { shown: true, ..Answer::default() },
@@ -154,7 +154,7 @@ impl Session {
         }
     }
 
-    /// Looks whether others have written the file that is shown, and writes what has rested.
+    /// Adopts changes that other programs made to the shown file, and writes pending changes.
     pub(crate) fn tick(&mut self, project: &mut Project) -> Option<Answer> {
         let saved = project.save(false);
         let place = self.place(project);
@@ -163,14 +163,14 @@ impl Session {
         if looked.is_none() && !saved && matches!(pace, Ok(false)) {
             return None;
         }
-        let mut tell = Tell::default();
+        let mut tell = ServerMessage::default();
         if let Err(error) = pace {
             tell.notice = Some(words(&error));
         }
         let change = match looked {
             Some(splices) if !splices.is_empty() => {
                 tell.notice = Some(format!("{} was changed on the disk", project.files[place.file].name));
-                self.told(splices, &mut tell);
+                self.send_splices(splices, &mut tell);
                 Change::Still
             }
             _ => Change::Nothing,
@@ -178,18 +178,24 @@ impl Session {
         Some(self.answer(project, tell, change))
     }
 
-    /// `None` where there is nothing to tell.
-    fn run(&mut self, project: &mut Project, ask: Ask, tell: &mut Tell) -> Option<Change> {
-        if !matches!(ask, Ask::Shown | Ask::Size { .. } | Ask::Hover { .. } | Ask::Text { .. }) {
+    /// Handles a message. Returns `None` if there is nothing to reply.
+    fn run(&mut self, project: &mut Project, ask: ClientMessage, tell: &mut ServerMessage) -> Option<Change> {
+        if !matches!(
+            ask,
+            ClientMessage::Shown
+                | ClientMessage::Size { .. }
+                | ClientMessage::Hover { .. }
+                | ClientMessage::Text { .. }
+        ) {
             self.typing = None;
         }
         Some(match ask {
-            Ask::Shown => return None,
-            Ask::Size { width, height } => {
+            ClientMessage::Shown => return None,
+            ClientMessage::Size { width, height } => {
                 self.size = (width.max(1), height.max(1));
                 Change::Still
             }
-            Ask::Frame { frame, moving } => {
+            ClientMessage::Frame { frame, moving } => {
                 self.show(project, frame, tell);
                 if moving {
                     (tell.outline, tell.ghosts) = (Some(String::new()), Some(Vec::new()));
@@ -198,43 +204,43 @@ impl Session {
                 self.outline(project, tell);
                 Change::Still
             }
-            Ask::Select { lines } => {
+            ClientMessage::Select { lines } => {
                 self.select(project, lines);
                 self.outline(project, tell);
                 Change::Nothing
             }
-            Ask::Hover { x, y } => {
+            ClientMessage::Hover { x, y } => {
                 self.hover(project, x, y, tell);
                 Change::Nothing
             }
-            Ask::Press { x, y, extend, grip, line } => {
+            ClientMessage::Press { x, y, extend, grip, line } => {
                 self.press(project, DVec2::new(x, y), extend, grip.zip(line));
                 self.outline(project, tell);
                 Change::Nothing
             }
-            Ask::Drag { x, y, manner } => self.drag(project, DVec2::new(x, y), manner, tell),
-            Ask::Release => {
+            ClientMessage::Drag { x, y, options } => self.drag(project, DVec2::new(x, y), options, tell),
+            ClientMessage::Release => {
                 self.held = None;
                 self.outline(project, tell);
                 Change::Still
             }
-            Ask::Navigate { how, x, y } => {
+            ClientMessage::Navigate { how, x, y } => {
                 self.navigate(project, how, DVec2::new(x, y));
                 tell.outline = Some(String::new());
                 Change::Moving
             }
-            Ask::Look { at } => {
+            ClientMessage::Look { at } => {
                 self.look(project, at);
                 self.outline(project, tell);
                 Change::Still
             }
-            Ask::KeepCamera => self.keep_camera(project, tell),
-            Ask::Set { line, first, values, gesture } => {
+            ClientMessage::KeepCamera => self.keep_camera(project, tell),
+            ClientMessage::Set { line, first, values, gesture } => {
                 let keying = self.keying(project);
                 let to = self.line(project, line).and_then(|line| changed(line, first, &values, keying));
                 let is_fit = values.iter().all(|value| value.is_finite()) && first + values.len() <= 64;
                 match to {
-                    // The page's own gestures and the pointer's are not to meet.
+                    // The page's own gestures must differ from those of the pointer.
                     Some(to) if is_fit => {
                         self.edit(project, vec![edits::set(line, to)], gesture.map(|g| g << 1 | 1), tell);
                         if gesture.is_some() { Change::Moving } else { Change::Still }
@@ -242,7 +248,7 @@ impl Session {
                     _ => Change::Nothing,
                 }
             }
-            Ask::Text { line, text } => {
+            ClientMessage::Text { line, text } => {
                 let old = self.line(project, line).cloned().unwrap_or_default();
                 if text.len() <= TEXT && old.text() != text {
                     let mut inserted: Vec<_> = text.split('\n').map(Line::new).collect();
@@ -260,19 +266,19 @@ impl Session {
                 }
                 Change::Still
             }
-            Ask::Insert { at, text } => {
+            ClientMessage::Insert { at, text } => {
                 if text.len() <= TEXT {
                     let inserted = text.split('\n').map(Line::new).collect();
                     self.edit(project, vec![Splice { at, removed: 0, inserted }], None, tell);
                 }
                 Change::Still
             }
-            Ask::Remove { lines } => {
+            ClientMessage::Remove { lines } => {
                 self.edit(project, edits::remove(&lines), None, tell);
                 self.select(project, Vec::new());
                 Change::Still
             }
-            Ask::Duplicate { lines } => {
+            ClientMessage::Duplicate { lines } => {
                 let size = self.step(project) * 40.0;
                 let (splices, copies) = edits::duplicate(self.file_lines(project), &lines, size);
                 self.edit(project, splices, None, tell);
@@ -280,72 +286,72 @@ impl Session {
                 self.outline(project, tell);
                 Change::Still
             }
-            Ask::Reorder { line, down } => {
+            ClientMessage::Reorder { line, down } => {
                 let shown = self.shown(project);
                 if let Some((splices, at)) =
-                    edits::reorder(self.file_lines(project), &shown.stage, line, down)
+                    edits::reorder(self.file_lines(project), &shown.source_map, line, down)
                 {
                     self.edit(project, splices, None, tell);
                     self.select(project, vec![at]);
                 }
                 Change::Still
             }
-            Ask::Rename { line, name } => {
+            ClientMessage::Rename { line, name } => {
                 if let Some(to) = self.line(project, line).and_then(|line| line.named(&name)) {
                     self.edit(project, vec![edits::set(line, to)], None, tell);
                 }
                 Change::Nothing
             }
-            Ask::Hide { lines } => {
+            ClientMessage::Hide { lines } => {
                 let splices = edits::hide(self.file_lines(project), &lines);
                 self.edit(project, splices, None, tell);
                 self.outline(project, tell);
                 Change::Still
             }
-            Ask::Drop { lines } => {
+            ClientMessage::Drop { lines } => {
                 let shown = self.shown(project);
                 if let Some(scene) = self.sound_scene(project) {
                     let (of, keying) = (self.file_lines(project), self.keying(project));
-                    let splices = resting::drop_down(of, &shown.stage, &scene, &lines, keying);
+                    let splices = snap_to_ground::drop_down(of, &shown.source_map, &scene, &lines, keying);
                     self.edit(project, splices, None, tell);
                     self.outline(project, tell);
                 }
                 Change::Still
             }
-            Ask::Ground { lines } => {
+            ClientMessage::Ground { lines } => {
                 let shown = self.shown(project);
                 if let Some(scene) = self.sound_scene(project) {
                     let (of, keying) = (self.file_lines(project), self.keying(project));
-                    let splices = resting::to_ground(of, &shown.stage, &scene, &lines, keying);
+                    let splices = snap_to_ground::to_ground(of, &shown.source_map, &scene, &lines, keying);
                     self.edit(project, splices, None, tell);
                     self.outline(project, tell);
                 }
                 Change::Still
             }
-            Ask::Lock { lines } => {
+            ClientMessage::Lock { lines } => {
                 self.lock(project, &lines);
                 Change::Nothing
             }
-            Ask::Group { lines } => {
+            ClientMessage::Group { lines } => {
                 self.group(project, &lines, tell);
                 Change::Still
             }
-            Ask::Ungroup { line } => {
+            ClientMessage::Ungroup { line } => {
                 self.ungroup(project, line, tell);
                 Change::Still
             }
-            Ask::Surface { lines, material } => {
+            ClientMessage::Surface { lines, material } => {
                 let splices = materials::give(self.file_lines(project), &lines, &material);
                 self.edit(project, splices, None, tell);
                 Change::Still
             }
-            Ask::Preset { lines, preset } => {
+            ClientMessage::Preset { lines, preset } => {
                 let splices = materials::give_preset(self.file_lines(project), &lines, &preset);
                 self.edit(project, splices, None, tell);
                 Change::Still
             }
-            Ask::Time { wish } => self.time_wish(project, wish, tell),
-            Ask::Nudge { lines, by } => {
+            ClientMessage::Time { wish } => self.edit_timeline(project, wish, tell),
+            ClientMessage::Nudge { lines, by } => {
                 let by = DVec3::from(by) * self.step(project) * 10.0;
                 let keying = self.keying(project);
                 let splices = lines
@@ -358,32 +364,32 @@ impl Session {
                 self.outline(project, tell);
                 Change::Still
             }
-            Ask::Add { command, at } => {
+            ClientMessage::Add { command, at } => {
                 self.add(project, &command, at.map(DVec2::from), tell);
                 Change::Still
             }
-            Ask::Undo | Ask::Redo => {
+            ClientMessage::Undo | ClientMessage::Redo => {
                 let file = self.place(project).file;
-                match project.step(file, matches!(ask, Ask::Undo)) {
-                    Ok(splices) => self.told(splices, tell),
+                match project.step(file, matches!(ask, ClientMessage::Undo)) {
+                    Ok(splices) => self.send_splices(splices, tell),
                     Err(error) => tell.notice = Some(words(&error)),
                 }
                 self.select(project, self.selection.clone());
                 self.outline(project, tell);
                 Change::Still
             }
-            Ask::Resolve { keep_mine } => {
+            ClientMessage::Resolve { keep_mine } => {
                 let file = self.place(project).file;
                 let splices = project.files[file].resolve(keep_mine);
-                self.told(splices, tell);
+                self.send_splices(splices, tell);
                 Change::Still
             }
-            Ask::Load { from, new } => self.load(project, from, new.as_deref(), tell),
-            Ask::Render => {
+            ClientMessage::Load { from, new } => self.load(project, from, new.as_deref(), tell),
+            ClientMessage::Render => {
                 self.output = Some(Output::Render);
                 Change::Nothing
             }
-            Ask::Cancel => {
+            ClientMessage::Cancel => {
                 self.output = Some(Output::Cancel);
                 Change::Nothing
             }
@@ -402,7 +408,7 @@ impl Session {
         self.file_lines(project).get(at)
     }
 
-    /// The frame that is shown.
+    /// Returns the frame that is shown.
     fn shown(&self, project: &Project) -> Arc<Frame> {
         let place = self.place(project);
         project.files[place.file].frame(place.frame)
@@ -410,14 +416,14 @@ impl Session {
 
     fn select(&mut self, project: &Project, lines: Vec<usize>) {
         let count = self.file_lines(project).len();
-        // Of a line that is named twice the last place counts.
+        // If a line is named twice, the last position counts.
         let mut named = HashSet::new();
         let last = |line: &usize| *line < count && named.insert(*line);
         self.selection = lines.into_iter().rev().filter(last).collect();
         self.selection.reverse();
     }
 
-    fn show(&mut self, project: &Project, frame: usize, tell: &mut Tell) {
+    fn show(&mut self, project: &Project, frame: usize, tell: &mut ServerMessage) {
         self.frame = frame.min(project.frame_count() - 1);
         let file = self.place(project).file;
         if file != self.shown_file {

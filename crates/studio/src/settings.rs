@@ -1,7 +1,7 @@
-//! `animation.json`: the pace of what a folder holds.
+//! `animation.json`: the frame rate of a folder's animation.
 //!
-//! Only the number behind `fps` is changed; every other byte stays. The file is read at each change, so that what others have
-//! written meanwhile stays too. For one script there is no such file: its pace lasts as long as the program.
+//! Only the number of `fps` is changed; every other byte stays. The file is read before each change, so that changes
+//! by other programs stay, too. A single script has no such file: its frame rate lasts as long as the program.
 
 use std::path::{Path, PathBuf};
 
@@ -14,21 +14,21 @@ use crate::error::Error;
 use crate::files::read;
 use crate::line::written;
 
-/// What is said of the whole animation, and where.
+/// The settings of the animation, and their file.
 #[derive(Debug)]
 pub(crate) struct Settings {
-    /// Where it is kept; none for one script.
+    /// The path of the file; `None` for a single script.
     path: Option<PathBuf>,
-    /// What the file held when it was last read or written; none if it was not there.
+    /// The content of the file when it was last read or written; `None` if it did not exist.
     on_disk: Option<Vec<u8>>,
     now: AnimationSettings,
 }
 
 impl Settings {
-    /// Those of a folder, or of one script.
+    /// Reads the settings of a folder. A single script has the default settings.
     ///
     /// # Errors
-    /// When the file cannot be read, or says what is no settings.
+    /// Fails if the file cannot be read or is invalid.
     pub(crate) fn open(folder: Option<&Path>) -> Result<Self, Error> {
         let path = folder.map(|folder| folder.join(SETTINGS_FILE));
         let on_disk = path.as_deref().map(read).transpose()?.flatten();
@@ -40,10 +40,10 @@ impl Settings {
         self.now
     }
 
-    /// Sets the frames a second; what the file says otherwise stays.
+    /// Sets the frame rate. The rest of the file stays unchanged.
     ///
     /// # Errors
-    /// For a pace that an animation cannot have, and when the file cannot be read or written.
+    /// Fails if an animation cannot have the frame rate, or if the file cannot be read or written.
     pub(crate) fn set_fps(&mut self, fps: f64) -> Result<(), Error> {
         let held = match &self.path {
             Some(path) => read(path)?,
@@ -66,13 +66,13 @@ impl Settings {
         Ok(())
     }
 
-    /// Looks whether somebody else has written the file; whether something else holds now.
+    /// Checks whether another program has written the file. Returns whether the settings have changed.
     ///
     /// # Errors
-    /// When it says what is no settings; what held before holds on. That is told once.
+    /// Fails if the new file is invalid. The old settings stay in effect, and the error is reported once.
     pub(crate) fn look(&mut self) -> Result<bool, Error> {
         let Some(path) = &self.path else { return Ok(false) };
-        // A file that cannot be read just now is looked at again.
+        // A file that cannot be read now is checked again later.
         let Ok(theirs) = read(path) else { return Ok(false) };
         if theirs == self.on_disk {
             return Ok(false);
@@ -101,7 +101,7 @@ struct Pace<'a> {
     fps: Option<&'a RawValue>,
 }
 
-/// Settings with another pace: those that are in order, or none yet.
+/// Returns settings with another frame rate. The old settings must be valid or empty.
 fn with_fps(bytes: &[u8], fps: f64) -> Vec<u8> {
     let number = written(fps);
     let whole = std::str::from_utf8(bytes).unwrap_or_default();
@@ -112,7 +112,7 @@ fn with_fps(bytes: &[u8], fps: f64) -> Vec<u8> {
     let (at, removed, inserted) = match pace.fps {
         Some(value) => (value.get().as_ptr().addr() - whole.as_ptr().addr(), value.get().len(), number),
         None => {
-            // Behind the bracket, laid out as what follows it.
+            // After the bracket, with the whitespace of the next field.
             let open = text.find('{').unwrap_or_default() + 1;
             let rest = &text[open..];
             let blank = &rest[..rest.len() - rest.trim_start().len()];
@@ -142,10 +142,10 @@ mod tests {
             ),
             ("{\"f\\u0070s\": 1e1}", "{\"f\\u0070s\": 24.5}"),
         ] {
-            let told = String::from_utf8(with_fps(before.as_bytes(), 24.5)).unwrap();
-            assert_eq!(told, after);
+            let text = String::from_utf8(with_fps(before.as_bytes(), 24.5)).unwrap();
+            assert_eq!(text, after);
             let old = parse_settings("a", if before.is_empty() { b"{}" } else { before.as_bytes() });
-            let new = parse_settings("a", told.as_bytes()).settings.unwrap();
+            let new = parse_settings("a", text.as_bytes()).settings.unwrap();
             let old = old.settings.unwrap();
             assert_eq!((new.frames(), new.fps(), new.loops()), (old.frames(), 24.5, old.loops()));
         }
@@ -170,7 +170,7 @@ mod tests {
         assert_eq!(settings.now().fps(), 50.0);
         fs::write(&path, "{\"fps\": 0}").unwrap();
         assert!(settings.look().unwrap_err().to_string().contains("expected a number from 0.01 to 1000"));
-        assert_eq!((settings.look().unwrap(), settings.now().fps()), (false, 50.0), "told once");
+        assert_eq!((settings.look().unwrap(), settings.now().fps()), (false, 50.0), "reported once");
         assert!(settings.set_fps(30.0).is_err());
         assert_eq!(fs::read_to_string(&path).unwrap(), "{\"fps\": 0}");
         assert!(matches!(Settings::open(Some(folder.path())), Err(Error::Settings(_))));

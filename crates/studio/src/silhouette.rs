@@ -1,7 +1,7 @@
-//! Where objects are seen: the outline of some of them in a picture, from the tracer's own hits.
+//! Outlines of objects in a picture, from the tracer's own hits.
 //!
-//! Rays go only to where these objects can be, and of a scene with many objects only those are asked that such rays can meet,
-//! by the boxes around them: a script may have a hundred thousand.
+//! Rays are traced only where these objects can be. In a scene with many objects, rays are tested only against
+//! objects whose bounding boxes they can hit, because a script may have a hundred thousand.
 
 use std::fmt::Write;
 
@@ -12,22 +12,22 @@ use rayfold_tracer::{RenderError, RenderOptions, pixel_ray};
 
 use crate::view::{Bounds, Projection};
 
-/// Rays that an outline is made of, at most: a tenth of a second on one core for scenes of a few hundred objects.
+/// The largest number of rays for an outline: a tenth of a second on one core for scenes of a few hundred objects.
 const RAYS: f64 = 60_000.0;
 
-/// The same, for one that need not be exact.
+/// The largest number of rays for an outline that need not be exact.
 const FEW_RAYS: f64 = 15_000.0;
 
-/// Objects up to which all are asked, whatever lies in their way.
+/// Up to this number of objects, rays are tested against all of them.
 const FEW: usize = 256;
 
-/// By how much boxes are widened, in parts of their coordinates: far more than rounding makes of them.
+/// The relative widening of boxes: far more than rounding errors.
 const WIDER: f64 = 1e-9;
 
-/// Pixels around where objects end in a picture.
+/// The margin in pixels around the area of the objects in a picture.
 const MARGIN: f64 = 2.0;
 
-/// A scene as it is seen, and a box around each of its objects.
+/// A scene as it is seen, with a box around each of its objects.
 #[derive(Clone, Copy)]
 pub(crate) struct View<'a> {
     pub(crate) scene: &'a Scene,
@@ -35,10 +35,10 @@ pub(crate) struct View<'a> {
 }
 
 impl View<'_> {
-    /// What a pixel shows, column and row from the upper left.
+    /// Returns the object that a pixel shows. Column and row are counted from the upper left.
     ///
     /// # Errors
-    /// Those of the tracer.
+    /// Returns the errors of the tracer.
     pub(crate) fn pick(&self, column: f64, row: f64) -> Result<Option<Found>, RenderError> {
         let scene = self.scene;
         let (origin, direction) = pixel_ray(scene, column, f64::from(scene.screen.height()) - 1.0 - row);
@@ -46,18 +46,18 @@ impl View<'_> {
         Ok(found.into_iter().next().flatten())
     }
 
-    /// The edges of what is seen of some objects, as the path of an SVG in pixels of the picture.
+    /// Returns the edges of the visible parts of some objects, as an SVG path in pixels of the picture.
     ///
     /// # Errors
-    /// Those of the tracer.
+    /// Returns the errors of the tracer.
     pub(crate) fn outline(&self, is_in: impl Fn(usize) -> bool) -> Result<String, RenderError> {
         self.traced(RAYS, is_in)
     }
 
-    /// The same, in coarse steps.
+    /// Returns the edges in coarse steps.
     ///
     /// # Errors
-    /// Those of the tracer.
+    /// Returns the errors of the tracer.
     pub(crate) fn ghost(&self, is_in: impl Fn(usize) -> bool) -> Result<String, RenderError> {
         self.traced(FEW_RAYS, is_in)
     }
@@ -89,7 +89,7 @@ impl View<'_> {
         Ok(edges(&inside, columns, rows, low, stride))
     }
 
-    /// What rays meet first, where the objects whose boxes can be met are known.
+    /// Returns the nearest hit of each ray, testing only objects whose boxes can be hit.
     fn nearest(
         &self,
         rays: &[(DVec3, DVec3)],
@@ -109,14 +109,14 @@ impl View<'_> {
     }
 }
 
-/// The part of a picture in which a box can be seen; none if it cannot.
+/// Returns the part of a picture in which a box can be visible, or `None`.
 fn seen(scene: &Scene, bounds: Bounds, size: DVec2) -> Option<(DVec2, DVec2)> {
     let projection = Projection::new(scene);
     let corner = |at: u8| {
         let pick = |axis: usize| if at >> axis & 1 == 0 { bounds.low[axis] } else { bounds.high[axis] };
         projection.point(DVec3::new(pick(0), pick(1), pick(2))).filter(|point| point.is_finite())
     };
-    // What reaches behind the eye can be anywhere.
+    // A box that reaches behind the eye can be anywhere.
     let corners: Option<Vec<DVec2>> = (0..8).map(corner).collect();
     let (low, high) = match corners {
         Some(corners) => (
@@ -129,13 +129,13 @@ fn seen(scene: &Scene, bounds: Bounds, size: DVec2) -> Option<(DVec2, DVec2)> {
     (low.x < high.x && low.y < high.y).then_some((low, high))
 }
 
-/// A box with what rounding may have taken from it.
+/// Returns a box widened by more than the rounding errors.
 fn widened(bounds: &Bounds) -> (DVec3, DVec3) {
     let by = WIDER * bounds.low.abs().max(bounds.high.abs());
     (bounds.low - by, bounds.high + by)
 }
 
-/// Whether a ray can meet what is in a box.
+/// Returns whether a ray can hit anything in a box.
 fn meets(bounds: &Bounds, origin: DVec3, direction: DVec3) -> bool {
     let (low, high) = widened(bounds);
     let (mut enters, mut leaves) = (0.0_f64, f64::INFINITY);
@@ -153,7 +153,7 @@ fn meets(bounds: &Bounds, origin: DVec3, direction: DVec3) -> bool {
     enters <= leaves * (1.0 + WIDER)
 }
 
-/// A plane that has all rays on its one side.
+/// A plane that has all rays on one side.
 struct Side {
     normal: DVec3,
     height: f64,
@@ -163,12 +163,12 @@ impl Side {
     fn lets_in(&self, bounds: &Bounds) -> bool {
         let (low, high) = widened(bounds);
         let furthest = DVec3::select(self.normal.cmpgt(DVec3::ZERO), high, low).dot(self.normal);
-        // That of what has no end may be no number.
+        // For a box without end it may be NaN.
         furthest >= self.height || furthest.is_nan()
     }
 }
 
-/// The planes between four rays around all others, in their order around them.
+/// Returns the planes between four rays around all others. The four are given in their order around them.
 fn sides(ends: &[(DVec3, DVec3); 4]) -> [Side; 4] {
     let along = |(origin, direction): (DVec3, DVec3)| origin + direction;
     let inner = ends.iter().map(|&end| along(end)).sum::<DVec3>() / 4.0;
@@ -181,7 +181,7 @@ fn sides(ends: &[(DVec3, DVec3); 4]) -> [Side; 4] {
     })
 }
 
-/// The edges between cells that are inside and others: runs along rows, then along columns.
+/// Returns the edges between inside and outside cells: runs along rows, then along columns.
 fn edges(inside: &[bool], columns: usize, rows: usize, low: DVec2, stride: f64) -> String {
     let cell = |column: usize, row: usize| {
         column
@@ -209,7 +209,7 @@ fn edges(inside: &[bool], columns: usize, rows: usize, low: DVec2, stride: f64) 
                     DVec2::new(line as f64, start as f64)
                 };
                 let DVec2 { x, y } = low + stride * place;
-                // Writing to a text cannot fail.
+                // Writing to a string cannot fail.
                 let _ = write!(path, "M{x} {y}{}{length}", if flat { 'h' } else { 'v' });
             }
         }
@@ -260,8 +260,8 @@ mod tests {
         assert_eq!(view.outline(|_| false).unwrap(), "");
     }
 
-    /// Of many objects few are asked, which is not to be seen: every pixel shows what the picture shows, and outlines are
-    /// those of the picture.
+    /// With many objects, few are tested, without visible effect: every pixel shows the object of the picture, and
+    /// outlines are those of the picture.
     #[test]
     fn of_many_objects_a_pixel_shows_what_the_picture_shows() {
         let cameras =
@@ -311,13 +311,13 @@ mod tests {
             for object in seen {
                 let inside: Vec<_> = image.pixels().map(|pixel| shown(&pixel.0) == Some(object)).collect();
                 let expected = edges(&inside, 80, 48, DVec2::ZERO, 1.0);
-                let told = view.outline(|other| other == object).unwrap();
-                assert_eq!(pieces(&told), pieces(&expected), "{camera}: {object}");
+                let outline = view.outline(|other| other == object).unwrap();
+                assert_eq!(pieces(&outline), pieces(&expected), "{camera}: {object}");
             }
         }
     }
 
-    /// The parts of a path, whatever their order.
+    /// Returns the parts of a path as a set.
     fn pieces(path: &str) -> BTreeSet<&str> {
         path.split('M').skip(1).collect()
     }

@@ -1,60 +1,60 @@
-//! The commands of the language for the page, from the parser's own tables: a command that is added there appears in the
-//! palette and in the inspector without a form of its own.
+//! The commands of the language for the page, from the parser's tables. A new command appears in the palette and in
+//! the inspector without further code.
 
 use rayfold_scene::{Command, Field, Kind, Parameter, Presence};
 use serde::Serialize;
 
-/// What a command is to the page.
+/// The role of a command on the page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Role {
-    /// It can be seen.
+    /// The command adds a visible object.
     Object,
-    /// It lights what can be seen.
+    /// The command adds a light.
     Light,
-    /// It draws a group.
+    /// The command draws a group.
     Use,
-    /// It begins a group.
+    /// The command begins a group.
     Group,
-    /// It says how surfaces answer light.
+    /// The command defines a material.
     Material,
-    /// It is what is looked through.
+    /// The command sets the camera.
     Camera,
-    /// All else.
+    /// The command has any other role.
     Setting,
 }
 
-/// A command.
+/// The table of a command.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct CommandTable {
-    /// As scripts write it.
+    /// The name in scripts.
     pub(crate) name: &'static str,
-    /// What it is to the page.
+    /// The role on the page.
     pub(crate) role: Role,
-    /// Its parameters.
+    /// The parameters of the command.
     pub(crate) fields: Vec<FieldTable>,
 }
 
-/// A parameter of a command.
+/// The table of a parameter.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(crate) struct FieldTable {
-    /// What it is, such as `radius`.
+    /// The name of the parameter, such as `radius`.
     pub(crate) label: String,
     /// The names of its numbers.
     pub(crate) names: &'static [&'static str],
-    /// What they measure, such as `length`.
+    /// The measured quantity, such as `length`.
     pub(crate) kind: String,
-    /// What they count by, such as `world units`.
+    /// The unit, such as `world units`.
     pub(crate) unit: String,
-    /// Which values they may have, such as `greater than 0`.
+    /// The allowed values, such as `greater than 0`.
     pub(crate) values: String,
-    /// Whether it may be left out.
+    /// Whether the parameter is optional.
     pub(crate) optional: bool,
     /// The position of its first number among those of the command.
     pub(crate) first: usize,
 }
 
-/// All commands, in the order of the documentation.
+/// Returns all commands, in the order of the documentation.
 pub(crate) fn commands() -> Vec<CommandTable> {
     Command::ALL
         .iter()
@@ -66,7 +66,7 @@ pub(crate) fn commands() -> Vec<CommandTable> {
         .collect()
 }
 
-/// What a command is to the page; its parameters tell.
+/// Returns the role of a command, which follows from its parameters.
 pub(crate) fn role(command: Command) -> Role {
     let has = |parameter| command.form().fields.iter().any(|field| field.parameter == parameter);
     if command == Command::Use {
@@ -86,7 +86,7 @@ pub(crate) fn role(command: Command) -> Role {
     }
 }
 
-/// The parameters of a command, each with the position of its first number.
+/// Returns the parameters of a command, each with the position of its first number.
 pub(crate) fn fields(command: Command) -> impl Iterator<Item = (usize, &'static Field)> {
     command.form().fields.iter().scan(0, |next, field| {
         let first = *next;
@@ -95,13 +95,13 @@ pub(crate) fn fields(command: Command) -> impl Iterator<Item = (usize, &'static 
     })
 }
 
-/// Where the triples of a kind begin among the numbers of a command.
+/// Returns the positions of the first numbers of a kind's parameters.
 pub(crate) fn of_kind(command: Command, kind: Kind) -> impl Iterator<Item = usize> {
     fields(command).filter(move |(_, field)| field.kind == kind).map(|(first, _)| first)
 }
 
 impl FieldTable {
-    /// Of a parameter whose first number is `first`.
+    /// Makes the table of a parameter whose first number is `first`.
     pub(crate) fn new(first: usize, field: &Field) -> Self {
         let label = field.parameter.to_string();
         Self {

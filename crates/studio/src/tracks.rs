@@ -1,8 +1,8 @@
-//! The numbers of a script that change, each a track of keys, and what is done with keys.
+//! The numbers of a script that change, each a track of keys, and the edits of keys.
 //!
-//! Lines in, lines out: an edit of keys rewrites the words of the curves that it concerns. Evaluating and writing curves is
-//! `scene`'s. Invariant: a curve that is left with one key becomes a number; what is asked of keys that there are not
-//! changes nothing.
+//! Lines in, lines out: an edit of keys rewrites the words of the affected curves. `scene` evaluates and
+//! writes curves. Invariants: a curve that is left with one key becomes a number. An edit of keys that do
+//! not exist changes nothing.
 
 use std::collections::BTreeMap;
 
@@ -13,74 +13,74 @@ use crate::line::{Line, written};
 use crate::tables::{Role, fields, role};
 use crate::values::curve;
 
-/// Tracks that the page is told of.
+/// The largest number of tracks that are sent to the page.
 const TRACKS: usize = 300;
 
-/// Keys of all of these tracks.
+/// The largest number of keys of all these tracks.
 const KEYS: usize = 20_000;
 
 /// A number that changes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Track {
-    /// Its line, from 0.
+    /// The index of its line, from 0.
     pub(crate) line: usize,
-    /// Its place among the line's parameters, from 0.
+    /// The index among the line's parameters, from 0.
     pub(crate) number: usize,
-    /// What it is, such as `centre: cx`.
+    /// The name of the parameter, such as `centre: cx`.
     pub(crate) label: String,
-    /// Linear, smooth or step.
+    /// The interpolation: linear, smooth or step.
     pub(crate) mode: &'static str,
-    /// Whether it starts again at its last key.
+    /// Whether the curve restarts at its last key.
     pub(crate) cycle: bool,
-    /// Frames and values.
+    /// Frames and values of the keys.
     pub(crate) keys: Vec<(f64, f64)>,
 }
 
-/// All tracks of a script, up to what the page can show.
+/// All tracks of a script, up to the limit of the page.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct Tracks {
-    /// In the order of the text.
+    /// The tracks in the order of the text.
     pub(crate) tracks: Vec<Track>,
     /// Whether there are more.
     pub(crate) more: bool,
 }
 
-/// A key of a line.
+/// The position of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 pub(crate) struct KeyPlace {
-    /// Its line, from 0.
+    /// The index of its line, from 0.
     pub(crate) line: usize,
-    /// Its place among the line's parameters, from 0.
+    /// The index among the line's parameters, from 0.
     pub(crate) number: usize,
-    /// When it is.
+    /// The frame of the key.
     pub(crate) frame: f64,
 }
 
 /// A key that was copied.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Copied {
-    /// From where.
+    /// The position of the original key.
     pub(crate) place: KeyPlace,
-    /// Its value.
+    /// The value of the key.
     pub(crate) value: f64,
-    /// What its track does between keys.
+    /// The interpolation of its track.
     mode: Mode,
 }
 
-/// A parameter of a line: its place, its name, and what it is.
+/// A number of a line with its parameter.
 pub(crate) struct Slot {
-    /// Its place among the line's parameters.
+    /// The index among the line's parameters.
     pub(crate) number: usize,
-    /// Where its parameter begins.
+    /// The index of the first number of its parameter.
     pub(crate) first: usize,
-    /// What it is called.
+    /// The name of the number.
     pub(crate) name: &'static str,
-    /// Of what it is a part.
+    /// The parameter to which it belongs.
     pub(crate) field: &'static Field,
 }
 
-/// The numbers of a line, those of a material's clauses too.
+/// Returns the numbers of a line, including those of a material's clauses.
 pub(crate) fn slots(line: &Line) -> Vec<Slot> {
     let (Some(command), Some(words)) = (line.command(), line.words()) else { return Vec::new() };
     let of = |first: usize, field: &'static Field| {
@@ -105,11 +105,11 @@ pub(crate) fn slots(line: &Line) -> Vec<Slot> {
     slots
 }
 
-/// All tracks of some lines.
+/// Returns all tracks of some lines.
 pub(crate) fn tracks(lines: &[Line]) -> Tracks {
     let mut found = Tracks::default();
     let mut keys = 0;
-    // Most lines have no curve, which is quickly seen.
+    // Most lines have no curve, which this test finds quickly.
     for (at, line) in lines.iter().enumerate().filter(|(_, line)| line.bytes().contains(&b'(')) {
         let Some(words) = line.words() else { continue };
         for slot in slots(line) {
@@ -138,8 +138,8 @@ fn label(slot: &Slot) -> String {
     if slot.field.names.len() > 1 { format!("{field}: {}", slot.name) } else { field.to_owned() }
 }
 
-/// The numbers of a line that a key is set for where nothing else is said: those that change already, else where it is and
-/// how it is turned, else its direction.
+/// Returns the numbers of a line for which a key is set by default: those that are curves already, else its position
+/// and rotation, else its direction.
 pub(crate) fn main_numbers(line: &Line) -> Vec<usize> {
     let (Some(command), Some(words)) = (line.command(), line.words()) else { return Vec::new() };
     if !command.form().curves {
@@ -162,7 +162,8 @@ pub(crate) fn main_numbers(line: &Line) -> Vec<usize> {
     }
 }
 
-/// A line with keys at a frame, of the values that its numbers have there. Where all of them have one there, they go.
+/// Returns a line with keys at a frame, with the values of its numbers there. If all of them have a key there,
+/// the keys are removed.
 pub(crate) fn toggled(line: &Line, numbers: &[usize], frame: f64) -> Option<Line> {
     let (command, words) = (line.command()?, line.words()?);
     let mut numbers = numbers.to_vec();
@@ -178,7 +179,7 @@ pub(crate) fn toggled(line: &Line, numbers: &[usize], frame: f64) -> Option<Line
             numbers.iter().filter_map(|&at| curves_there(at)?.key_at(frame).map(|key| (at, key.frame)));
         return without(line, &keys.collect::<Vec<_>>());
     }
-    // What is left out has no place for a key: it comes with what holds then.
+    // An omitted number has no place for a key. It is written with its default first.
     let values = crate::values::Values::of(line, frame)?;
     let mut line = line.clone();
     for at in numbers.iter().copied().filter(|&at| at >= words.parameters.len()) {
@@ -198,7 +199,7 @@ pub(crate) fn toggled(line: &Line, numbers: &[usize], frame: f64) -> Option<Line
     line.with_words(&changes)
 }
 
-/// The lines that change where some keys go, a frame or more on; those that stand where they come to go.
+/// Returns the lines that change if some keys move by `by` frames. Keys at their new positions are replaced.
 pub(crate) fn moved(lines: &[Line], keys: &[KeyPlace], by: f64) -> Vec<(usize, Line)> {
     each(lines, keys, |curve, frames| {
         if by == 0.0 {
@@ -215,7 +216,7 @@ pub(crate) fn moved(lines: &[Line], keys: &[KeyPlace], by: f64) -> Vec<(usize, L
     })
 }
 
-/// The lines that change where some keys go.
+/// Returns the lines that change if some keys are removed.
 pub(crate) fn removed(lines: &[Line], keys: &[KeyPlace]) -> Vec<(usize, Line)> {
     each(lines, keys, |curve, frames| {
         let stay = curve.keys().iter().filter(|key| !frames.contains(&key.frame));
@@ -223,16 +224,16 @@ pub(crate) fn removed(lines: &[Line], keys: &[KeyPlace]) -> Vec<(usize, Line)> {
     })
 }
 
-/// The lines that change where the tracks of some keys go on otherwise between them.
+/// Returns the lines that change if the tracks of some keys get another interpolation.
 pub(crate) fn eased(lines: &[Line], keys: &[KeyPlace], mode: Mode, cycle: bool) -> Vec<(usize, Line)> {
     each(lines, keys, |curve, _| {
-        // A cycle takes two keys.
+        // A cycle needs two keys.
         let cycle = cycle && curve.keys().len() > 1;
         Curve::through(mode, cycle, curve.keys().to_vec()).map(|curve| curve.to_string())
     })
 }
 
-/// What some keys are.
+/// Returns the values of some keys.
 pub(crate) fn copied(lines: &[Line], keys: &[KeyPlace]) -> Vec<Copied> {
     let one = |place: &KeyPlace| {
         let line = lines.get(place.line)?;
@@ -243,8 +244,8 @@ pub(crate) fn copied(lines: &[Line], keys: &[KeyPlace]) -> Vec<Copied> {
     keys.iter().filter_map(one).collect()
 }
 
-/// The lines that change where copied keys are set, the first of them at a frame: in the tracks that they are from, or in
-/// those of another line of the same command, `onto`.
+/// Returns the lines that change if copied keys are pasted, the first of them at a frame. They go to their original
+/// tracks, or to those of another line of the same command, `onto`.
 pub(crate) fn pasted(
     lines: &[Line],
     copied: &[Copied],
@@ -282,15 +283,15 @@ pub(crate) fn pasted(
     changed.into_iter().collect()
 }
 
-/// A line without some keys, each a parameter and a frame.
+/// Returns a line without some keys, each given as a parameter and a frame.
 fn without(line: &Line, keys: &[(usize, f64)]) -> Option<Line> {
     let place = |&(number, frame): &(usize, f64)| KeyPlace { line: 0, number, frame };
     let keys: Vec<_> = keys.iter().map(place).collect();
     removed(std::slice::from_ref(line), &keys).into_iter().next().map(|(_, line)| line)
 }
 
-/// The lines with what `change` makes of the curves that some keys are of, given the frames of these; the keys' order is of no
-/// matter.
+/// Returns the lines with the result of `change` for the curves of some keys, given the frames of these
+/// keys in any order.
 fn each(
     lines: &[Line],
     keys: &[KeyPlace],
@@ -315,7 +316,7 @@ fn each(
     by_line.iter().filter_map(|(&at, tracks)| Some((at, one(at, tracks)?))).collect()
 }
 
-/// A curve with other keys, as it is written: a number where one is left, or none. `None` where it stays as it is.
+/// Returns the text of a curve with other keys: a number if one is left or none. Returns `None` if nothing changes.
 fn rewritten(curve: &Curve, keys: Vec<Key>) -> Option<String> {
     if keys == curve.keys() {
         return None;
@@ -352,10 +353,10 @@ mod tests {
     #[test]
     fn tracks_are_told_by_what_they_are() {
         let found = tracks(&lines(TEXT));
-        let told: Vec<_> =
+        let labels: Vec<_> =
             found.tracks.iter().map(|t| (t.line, t.number, t.label.as_str(), t.mode, t.cycle)).collect();
         assert_eq!(
-            told,
+            labels,
             [
                 (0, 1, "centre: cx", "linear", false),
                 (0, 3, "centre: cz", "smooth", true),

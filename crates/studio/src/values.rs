@@ -1,6 +1,6 @@
-//! The numbers of a line at a moment, and how a number that is changed is written: as a number, or as a key of a curve.
+//! The numbers of a line at a moment, and the writing of a changed number: as a number, or as a key of a curve.
 //!
-//! Knows commands only by the forms of their parameters. Invariant: a number that stays, stays as it was written.
+//! Knows commands only by the forms of their parameters. Invariant: an unchanged number keeps its notation.
 
 use glam::DVec3;
 use rayfold_scene::{Command, Curve, Field, Key, Kind, Mode, parse_curve};
@@ -8,38 +8,38 @@ use rayfold_scene::{Command, Curve, Field, Key, Kind, Mode, parse_curve};
 use crate::line::{Line, Words, written};
 use crate::tables::{fields, of_kind};
 
-/// The decimals to which a curve is moved as a whole.
+/// The precision to which a curve is moved as a whole, as the inverse of the step.
 const DECIMALS: f64 = 1e9;
 
-/// A line as numbers of its command, as they are at a moment.
+/// The numbers of a line at a moment.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Values {
-    /// Its command.
+    /// The command of the line.
     pub(crate) command: Command,
-    /// Those that are written; `None` for what is no number.
+    /// The written numbers; `None` for a word that is no number.
     numbers: Vec<Option<f64>>,
 }
 
-/// When a change is made, and whether it is for that moment alone.
+/// The moment of a change, and whether it is for that moment alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Keying {
     /// The frame that is shown.
     pub(crate) time: f64,
-    /// The first frame, at which a number that was still keeps its value.
+    /// The first frame, at which a number that was constant keeps its value.
     pub(crate) first: f64,
-    /// Whether numbers that are still become curves.
+    /// Whether constant numbers become curves.
     pub(crate) auto: bool,
     /// Whether curves move as a whole instead of getting a key.
     pub(crate) whole: bool,
 }
 
 impl Keying {
-    /// For all moments.
+    /// The keying that changes all moments.
     pub(crate) const ALWAYS: Self = Self { time: 1.0, first: 1.0, auto: false, whole: true };
 }
 
 impl Values {
-    /// `None` for a line without a command.
+    /// Returns `None` for a line without a command.
     pub(crate) fn of(line: &Line, time: f64) -> Option<Self> {
         let (command, words) = (line.command()?, line.words()?);
         let number = |at: usize| {
@@ -49,7 +49,7 @@ impl Values {
         Some(Self { command, numbers: (0..words.parameters.len()).map(number).collect() })
     }
 
-    /// A number of the line; for one that is left out what holds then, if that is a plain number.
+    /// Returns a number of the line. For an omitted one, returns the default, if that is a plain number.
     pub(crate) fn number(&self, at: usize) -> Option<f64> {
         match self.numbers.get(at) {
             Some(number) => *number,
@@ -57,33 +57,33 @@ impl Values {
         }
     }
 
-    /// The numbers that are written; `None` for what is none.
+    /// Returns the written numbers; `None` for a word that is no number.
     pub(crate) fn written(&self) -> &[Option<f64>] {
         &self.numbers
     }
 
-    /// Three numbers of the line.
+    /// Returns three numbers of the line as a vector.
     pub(crate) fn vector(&self, first: usize) -> Option<DVec3> {
         Some(DVec3::new(self.number(first)?, self.number(first + 1)?, self.number(first + 2)?))
     }
 
-    /// Its positions, each with where its numbers begin.
+    /// Returns the positions of the line, each with the index of its first number.
     pub(crate) fn positions(&self) -> impl Iterator<Item = (usize, DVec3)> {
         of_kind(self.command, Kind::Position).filter_map(|first| Some((first, self.vector(first)?)))
     }
 
-    /// The greatest of its lengths.
+    /// Returns the largest of the line's lengths.
     pub(crate) fn reach(&self) -> f64 {
         of_kind(self.command, Kind::Length).filter_map(|first| self.number(first)).fold(0.0, f64::max)
     }
 }
 
-/// The curve that stands for a parameter.
+/// Returns the curve of a parameter.
 pub(crate) fn curve(line: &Line, words: &Words, at: usize) -> Option<Curve> {
     parse_curve(line.word(words.parameters.get(at)?))
 }
 
-/// What holds for a number that is left out.
+/// Returns the default of an omitted number.
 fn default(command: Command, at: usize) -> Option<f64> {
     let (_, field) = field_of(command, at)?;
     field.presence.default()?.parse().ok()
@@ -93,8 +93,8 @@ fn field_of(command: Command, at: usize) -> Option<(usize, &'static Field)> {
     fields(command).find(|(first, field)| (*first..first + field.names.len()).contains(&at))
 }
 
-/// The line with other values for its numbers from `first` on. A parameter that was left out comes whole. `None` where a name
-/// stands in their place.
+/// Returns the line with other values for its numbers from `first` on. An omitted parameter is written whole. Returns
+/// `None` if a name is in their place.
 pub(crate) fn changed(line: &Line, first: usize, to: &[f64], keying: Keying) -> Option<Line> {
     let (command, words) = (line.command()?, line.words()?);
     let count = words.parameters.len();
@@ -102,7 +102,7 @@ pub(crate) fn changed(line: &Line, first: usize, to: &[f64], keying: Keying) -> 
         return Some(line.clone());
     }
     let mut end = first + to.len();
-    // Those before it, and the rest of its parameter.
+    // Includes the omitted numbers before it, and the rest of its parameter.
     let start = if count < end { count.min(first) } else { first };
     if count < end
         && let Some((first, field)) = field_of(command, end - 1)
@@ -135,7 +135,7 @@ pub(crate) fn changed(line: &Line, first: usize, to: &[f64], keying: Keying) -> 
     line.with_words(&changes)
 }
 
-/// A number that was still, as it is written with another value.
+/// Returns the text of a constant number with another value.
 fn begun(command: Command, old: f64, to: f64, keying: Keying) -> String {
     let key = |frame, value| Key { frame, value };
     let is_kept = old == to || !keying.auto || keying.whole || keying.time == keying.first;
@@ -146,7 +146,7 @@ fn begun(command: Command, old: f64, to: f64, keying: Keying) -> String {
     Curve::through(Mode::Smooth, false, keys).map_or_else(|| written(to), |curve| curve.to_string())
 }
 
-/// A curve with another value at the moment.
+/// Returns a curve with another value at the moment.
 fn moved(curve: &Curve, to: f64, keying: Keying) -> Option<Curve> {
     if !keying.whole {
         return curve.with_key(keying.time, to);
@@ -156,7 +156,7 @@ fn moved(curve: &Curve, to: f64, keying: Keying) -> Option<Curve> {
     Curve::through(curve.mode(), curve.is_cycle(), keys.collect())
 }
 
-/// Without the noise of the last bits.
+/// Rounds away the noise of the last bits.
 pub(crate) fn tidy(x: f64) -> f64 {
     let rounded = (x * DECIMALS).round() / DECIMALS;
     if rounded.is_finite() { rounded } else { x }

@@ -1,60 +1,61 @@
-//! What the viewport looks through: the script's camera or a free one; from the world to its picture and back.
+//! The camera of the viewport (the script's or a free one), and the projection from the world to
+//! its picture and back.
 //!
-//! Points of a picture are in its pixels, (0, 0) the upper left corner of the upper left one. A pinhole's pixel (i, j)
-//! is the ray of the language through its middle.
+//! Points of a picture are in its pixels, with (0, 0) at the upper left corner of the upper left one. A pinhole
+//! camera's pixel (i, j) is the ray of the language through its middle.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DVec2, DVec3};
 use rayfold_scene::{Camera, InvalidValue, Look, Pinhole, Scene};
 
-/// Nearest and farthest that the free camera may stand, in sizes of what is looked at.
+/// The nearest and farthest distance of the free camera, in sizes of the target.
 const NEAR_AND_FAR: (f64, f64) = (1e-3, 1e3);
 
-/// Radians that the free camera turns where the pointer crosses the picture's height.
+/// The radians by which the free camera rotates when the pointer crosses the picture's height.
 const TURN: f64 = PI;
 
-/// A camera that turns around what it looks at; it stands upright.
+/// An upright camera that rotates around its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Orbit {
-    /// What is looked at.
+    /// The point that the camera looks at.
     pub(crate) target: DVec3,
-    /// How far away it is.
+    /// The distance from the target.
     pub(crate) distance: f64,
     /// Radians to the right from looking along -z.
     pub(crate) yaw: f64,
     /// Radians from above; a quarter turn looks straight down.
     pub(crate) pitch: f64,
-    /// Half the vertical angle, in radians.
+    /// Half the vertical angle of view, in radians.
     pub(crate) half_fov: f64,
 }
 
-/// Where something lies that is looked at.
+/// A bounding box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Bounds {
-    /// Least coordinates.
+    /// The least coordinates.
     pub(crate) low: DVec3,
-    /// Greatest coordinates.
+    /// The greatest coordinates.
     pub(crate) high: DVec3,
 }
 
 impl Bounds {
-    /// Of points with a radius around each; `None` where there is none.
+    /// Returns the bounds of points with a radius around each, or `None` without points.
     pub(crate) fn of(points: impl IntoIterator<Item = (DVec3, f64)>) -> Option<Self> {
         points.into_iter().map(|(p, r)| Self { low: p - r, high: p + r }).reduce(Self::with)
     }
 
-    /// Around both.
+    /// Returns the bounds of both boxes.
     pub(crate) fn with(self, other: Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
-    /// Its middle.
+    /// Returns the middle of the box.
     pub(crate) fn center(&self) -> DVec3 {
         0.5 * self.low + 0.5 * self.high
     }
 
-    /// Half its diagonal, greater than 0.
+    /// Returns half the diagonal, or 1 for a single point.
     pub(crate) fn radius(&self) -> f64 {
         let radius = (0.5 * self.high - 0.5 * self.low).length();
         if radius > 0.0 { radius } else { 1.0 }
@@ -62,7 +63,7 @@ impl Bounds {
 }
 
 impl Orbit {
-    /// Looks at something, all of it in the picture, from a direction given by yaw and pitch.
+    /// Looks at all of `bounds` from a direction given by yaw and pitch.
     pub(crate) fn at(bounds: Bounds, yaw: f64, pitch: f64) -> Self {
         let half_fov = 0.35_f64;
         Self {
@@ -74,7 +75,7 @@ impl Orbit {
         }
     }
 
-    /// Goes on from a script's camera; `bounds` is the scene.
+    /// Starts at the view of a script's camera. `bounds` are those of the scene.
     pub(crate) fn from_camera(camera: &Camera, bounds: Bounds) -> Self {
         let Camera::Pinhole(pinhole) = camera else { return Self::at(bounds, 0.0, 0.0) };
         let (_, _, w) = pinhole.basis();
@@ -90,7 +91,7 @@ impl Orbit {
         }
     }
 
-    /// From the target to the eye, of length 1.
+    /// Returns the unit vector from the target to the eye.
     fn backward(&self) -> DVec3 {
         let (sin, cos) = self.pitch.sin_cos();
         DVec3::new(cos * self.yaw.sin(), sin, cos * self.yaw.cos())
@@ -101,7 +102,7 @@ impl Orbit {
         DVec3::new(-sin * self.yaw.sin(), cos, -sin * self.yaw.cos())
     }
 
-    /// From where it stands at something else.
+    /// Turns the camera to another target, from its present position.
     pub(crate) fn aimed(self, target: DVec3) -> Self {
         let back = self.eye() - target;
         let distance = back.length();
@@ -112,53 +113,53 @@ impl Orbit {
         Self { target, distance, yaw: back.x.atan2(back.z), pitch, ..self }
     }
 
-    /// Where it stands.
+    /// Returns the position of the camera.
     pub(crate) fn eye(&self) -> DVec3 {
         self.target + self.distance * self.backward()
     }
 
-    /// As a camera of the language, for a picture of this width in heights.
+    /// Converts to a camera of the language, for a picture whose width is `aspect` heights.
     ///
     /// # Errors
-    /// When its numbers are beyond what a camera can have.
+    /// Fails if its numbers are beyond the limits of a camera.
     pub(crate) fn camera(&self, aspect: f64) -> Result<Pinhole, InvalidValue> {
         let half = self.half_fov.tan();
         let corner = DVec2::new(half * aspect, half);
         Pinhole::new(self.eye(), -self.backward(), self.up(), 1.0, -corner, corner)
     }
 
-    /// Turns around the target; in heights of the picture.
+    /// Rotates around the target; the distance is in heights of the picture.
     pub(crate) fn turn(&mut self, moved: DVec2) {
         self.yaw = (self.yaw - TURN * moved.x) % (2.0 * PI);
         self.pitch = (self.pitch + TURN * moved.y).clamp(-FRAC_PI_2, FRAC_PI_2);
     }
 
-    /// Moves sideways, so that what is looked at follows the pointer; in heights of the picture.
+    /// Moves sideways, so that the target follows the pointer; the distance is in heights of the picture.
     pub(crate) fn pan(&mut self, moved: DVec2) {
         let height = 2.0 * self.distance * self.half_fov.tan();
         let right = self.up().cross(self.backward());
         self.target += height * (moved.y * self.up() - moved.x * right);
     }
 
-    /// Goes nearer or farther by a factor; `size` is that of the scene.
+    /// Multiplies the distance by a factor. `size` is that of the scene.
     pub(crate) fn zoom(&mut self, factor: f64, size: f64) {
         self.distance = (self.distance * factor).clamp(NEAR_AND_FAR.0 * size, NEAR_AND_FAR.1 * size);
     }
 }
 
-/// From the world to the picture of a scene and back.
+/// The projection from the world to the picture of a scene and back.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Projection<'a> {
     scene: &'a Scene,
 }
 
 impl<'a> Projection<'a> {
-    /// Of a scene, as it is drawn: its screen is the picture.
+    /// Makes the projection of a scene. Its screen is the size of the picture.
     pub(crate) fn new(scene: &'a Scene) -> Self {
         Self { scene }
     }
 
-    /// Where a point of the world is seen; `None` behind the eye.
+    /// Returns the position of a point in the picture, or `None` behind the eye.
     pub(crate) fn point(&self, point: DVec3) -> Option<DVec2> {
         let (width, height) = self.size();
         let (i, j) = match &self.scene.camera {
@@ -190,13 +191,13 @@ impl<'a> Projection<'a> {
         seen.is_finite().then_some(seen)
     }
 
-    /// The ray through a point of the picture: its origin, and its direction of length 1.
+    /// Returns the ray through a point of the picture: its origin and its unit direction.
     pub(crate) fn ray(&self, at: DVec2) -> (DVec3, DVec3) {
         let (_, height) = self.size();
         rayfold_tracer::pixel_ray(self.scene, at.x - 0.5, height - 0.5 - at.y)
     }
 
-    /// How much of the world a pixel spans at a point of it.
+    /// Returns the extent of a pixel in the world at the depth of a point.
     pub(crate) fn pixel_at(&self, point: DVec3) -> f64 {
         let (_, height) = self.size();
         match &self.scene.camera {
@@ -214,7 +215,7 @@ impl<'a> Projection<'a> {
         }
     }
 
-    /// Right, up and towards the eye, each of length 1.
+    /// Returns the unit vectors to the right, up and towards the eye.
     pub(crate) fn axes(&self) -> (DVec3, DVec3, DVec3) {
         match &self.scene.camera {
             Camera::Orthographic => (DVec3::X, DVec3::Y, DVec3::Z),
@@ -228,7 +229,7 @@ impl<'a> Projection<'a> {
     }
 }
 
-/// How much higher the upper edge of the view lies than its middle, at distance 1.
+/// Returns the height of the view's upper edge above its middle, at distance 1.
 fn slope(look: &Look) -> f64 {
     (0.5 * look.field_of_view().to_radians()).tan()
 }

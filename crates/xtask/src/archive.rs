@@ -1,6 +1,6 @@
-//! The zip file that Lambda takes: one executable named `bootstrap` at the top.
+//! The zip file for Lambda: one executable named `bootstrap` at the top.
 //!
-//! Invariant: the same program gives the same file. No clock, no owner, no order of a folder goes into it, and the
+//! Invariant: the same program gives the same file. The file depends on no clock, owner or folder order, and the
 //! compressor is the same on every machine.
 
 use std::io::{Cursor, Write};
@@ -8,12 +8,12 @@ use std::io::{Cursor, Write};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-/// What the `provided` runtimes start.
+/// The file that the `provided` runtimes start.
 const ENTRY: &str = "bootstrap";
 
-/// The zip file around `program`.
+/// Makes the zip file around `program`.
 pub(crate) fn zip(program: &[u8]) -> zip::result::ZipResult<Vec<u8>> {
-    // The format's zero: 1 January 1980.
+    // The zero time of the format: 1 January 1980.
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .compression_level(Some(9))

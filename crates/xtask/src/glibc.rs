@@ -1,8 +1,8 @@
-//! What a binary asks of the system's C library, read off the binary itself.
+//! The requirements of a binary on the system's C library, read from the binary itself.
 //!
-//! A program that was linked against a newer glibc than Lambda's starts nowhere, and nothing says so before it is
-//! deployed. The dynamic section says which libraries the loader must find, and the version table which versions of
-//! their symbols.
+//! A program that was linked against a newer glibc than Lambda's does not start there, and nothing reports it before
+//! it is deployed. The dynamic section lists the libraries that the loader must find, and the version table the
+//! versions of their symbols.
 
 use object::elf::FileHeader64;
 use object::read::elf::{Dyn, FileHeader, SectionHeader};
@@ -11,11 +11,11 @@ use object::{Endianness, elf};
 /// The C library of Amazon Linux 2023, which `provided.al2023` is.
 pub(crate) const AMAZON_LINUX_2023: Version = Version(2, 34);
 
-/// Libraries that come with every glibc, by the start of their names; the loader's own differs by architecture.
+/// The libraries that come with every glibc, by the start of their names. The loader's name differs by architecture.
 const OF_GLIBC: [&str; 6] =
     ["libc.so.6", "libm.so.6", "libdl.so.2", "libpthread.so.0", "librt.so.1", "ld-linux-"];
 
-/// A glibc version, as in `GLIBC_2.34`; a third part, which only ancient symbols have, does not count.
+/// A glibc version, as in `GLIBC_2.34`. A third number, which only ancient symbols have, is ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Version(pub(crate) u32, pub(crate) u32);
 
@@ -25,21 +25,21 @@ impl std::fmt::Display for Version {
     }
 }
 
-/// Why a binary would not start.
+/// The reason why a binary would not start.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub(crate) enum Error {
-    /// It cannot be read.
+    /// The file cannot be parsed.
     #[error("not a 64-bit ELF program")]
     Format(#[source] object::Error),
-    /// It was linked for a newer system.
+    /// The program was linked for a newer system.
     #[error("needs {0}, and Amazon Linux 2023 has glibc {AMAZON_LINUX_2023}")]
     TooNew(String),
-    /// It needs a library, or symbols, that are not of glibc.
-    #[error("needs {0}, which is no part of glibc")]
+    /// The program needs a library or symbols that are not part of glibc.
+    #[error("needs {0}, which is not part of glibc")]
     Foreign(String),
 }
 
-/// What the loader must find.
+/// The libraries and symbols that the loader must find.
 #[derive(Debug, Default)]
 pub(crate) struct Needs {
     /// Names of shared libraries: `libc.so.6`.
@@ -49,7 +49,7 @@ pub(crate) struct Needs {
 }
 
 impl Needs {
-    /// Of the program `bytes`.
+    /// Reads the requirements of the program `bytes`.
     ///
     /// # Errors
     /// [`Error::Format`].
@@ -57,10 +57,10 @@ impl Needs {
         read(bytes).map_err(Error::Format)
     }
 
-    /// The newest glibc that it needs, at most Amazon Linux 2023's; `None` if it needs none.
+    /// Returns the newest glibc that the program needs, at most Amazon Linux 2023's, or `None` if it needs none.
     ///
     /// # Errors
-    /// What would keep it from starting there.
+    /// Returns the reason if the program would not start there.
     pub(crate) fn newest(&self) -> Result<Option<Version>, Error> {
         if let Some(foreign) =
             self.libraries.iter().find(|name| !OF_GLIBC.iter().any(|own| name.starts_with(own)))

@@ -1,7 +1,7 @@
-//! `cargo xtask`: what needs more than Cargo, and no shell.
+//! `cargo xtask`: chores that need more than Cargo, without a shell.
 //!
-//! Knows how the function binaries become what Lambda runs, and nothing of what they do; and how the scripts in the page
-//! of the language become its pictures.
+//! Packages the function binaries for Lambda without knowing what they do, and draws the pictures of the language
+//! page from the scripts in it.
 
 use clap::{Parser, Subcommand};
 

@@ -1,8 +1,8 @@
-//! The scripts of `docs/language.md` that have a picture each.
+//! The scripts of `docs/language.md`, each of which has a picture.
 //!
-//! A block of code that starts with ```` ```scene NAME ```` is the script of `NAME`'s picture. One that sets the size of the
-//! image is whole; before any other the stage is put (the block `stage`: camera, light and floor), and a `Trace` behind it.
-//! Knows nothing of how a script is drawn.
+//! A code block that starts with ```` ```scene NAME ```` is the script of the picture `NAME`. A block that sets the
+//! size of the image is a whole script. Before any other, the stage (the block `stage`: camera, light and floor) is
+//! inserted, and a `Trace` after it. This module does not know how a script is drawn.
 //!
 //! ````text
 //! ```scene sphere
@@ -12,41 +12,41 @@
 
 use anyhow::{Context, ensure};
 
-/// The language's page, from the root of the repository.
+/// The language page, relative to the root of the repository.
 pub(crate) const PAGE: &str = "docs/language.md";
-/// Where its pictures are, from the root of the repository.
+/// The folder of its pictures, relative to the root of the repository.
 pub(crate) const PICTURES: &str = "docs/images/language";
 
-/// What examples that are not whole share.
+/// The name of the block that incomplete examples share.
 const STAGE: &str = "stage";
-/// Examples whose names start so show how a number changes, not a scene.
+/// The prefix of examples that show how a number changes rather than a scene.
 const CURVE: &str = "curve-";
 
 /// A script of the page.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Example {
-    /// Also its picture's, without the ending.
+    /// The name of the example, and of its picture without the ending.
     pub(crate) name: String,
-    /// A whole script.
+    /// The complete script.
     pub(crate) script: String,
 }
 
 impl Example {
-    /// Whether its picture is a plot of a number over the frames.
+    /// Returns whether its picture is a plot of a number over the frames.
     pub(crate) fn is_curve(&self) -> bool {
         self.name.starts_with(CURVE)
     }
 
-    /// The name of its picture's file.
+    /// Returns the file name of its picture.
     pub(crate) fn file(&self) -> String {
         format!("{}.{}", self.name, if self.is_curve() { "svg" } else { "png" })
     }
 }
 
-/// All examples of a page, in its order; the stage alone is none.
+/// Returns all examples of a page in its order, without the stage.
 ///
 /// # Errors
-/// When a name is there twice, or there is no stage for an example that needs it.
+/// Fails if a name occurs twice, or if an example needs a stage and there is none.
 pub(crate) fn examples(page: &str) -> anyhow::Result<Vec<Example>> {
     let blocks = blocks(page);
     let stage = blocks.iter().find(|(name, _)| *name == STAGE).map(|(_, text)| text.as_str());
@@ -65,7 +65,7 @@ pub(crate) fn examples(page: &str) -> anyhow::Result<Vec<Example>> {
     Ok(all)
 }
 
-/// The blocks of code that are scripts with a name.
+/// Returns the code blocks that are scripts with a name.
 fn blocks(page: &str) -> Vec<(&str, String)> {
     let mut lines = page.lines();
     let mut blocks = Vec::new();
@@ -88,7 +88,7 @@ mod tests {
 
     use super::*;
 
-    /// Bytes of a picture: larger ones make the page slow to read.
+    /// The largest size of a picture in bytes: larger ones make the page slow to read.
     const LARGEST: u64 = 100_000;
 
     fn root() -> &'static Path {
@@ -119,7 +119,7 @@ mod tests {
         let (_, examples) = page();
         for Example { name, script } in &examples {
             let parsed = parse(name, script.as_bytes(), &Limits::default());
-            // The stage has more materials than each example uses.
+            // The stage defines more materials than each example uses.
             let faults: Vec<_> = parsed
                 .diagnostics
                 .iter()

@@ -1,7 +1,7 @@
-//! From the sources to the zip files that Lambda runs.
+//! Builds the zip files for Lambda from the sources.
 //!
-//! Invariant: the same sources, lock file and Rust release give the same bytes, wherever the checkout, Cargo's home and
-//! the user's are. `--verify` builds a second time, from a copy elsewhere, and compares.
+//! Invariant: the same sources, lock file and Rust release give the same bytes, wherever the folders of the checkout,
+//! of Cargo and of the user are. `--verify` builds a second time, from a copy elsewhere, and compares.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,14 +14,14 @@ use crate::archive;
 use crate::glibc::{AMAZON_LINUX_2023, Needs};
 use crate::toolchain::{self, Toolchain, say};
 
-/// The package and the binaries in it that are functions.
+/// The package, and its binaries that are functions.
 const PACKAGE: &str = "rayfold-lambda";
 const FUNCTIONS: [&str; 2] = ["rayfold-render", "rayfold-assemble"];
 
-/// A package is read at each cold start, before the program runs.
+/// The largest size of a zip file. It is read at each cold start, before the program runs.
 const LARGEST_ZIP_MB: f64 = 8.0;
 
-/// What to build.
+/// The options of `cargo xtask package`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Instruction set to build for; another than this machine's needs `rustup target add`
@@ -32,7 +32,7 @@ pub(crate) struct Args {
     verify: bool,
 }
 
-/// As Lambda calls them.
+/// An instruction set, by Lambda's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Architecture {
     #[value(name = "x86_64")]
@@ -49,7 +49,7 @@ impl Architecture {
         }
     }
 
-    /// The Rust target.
+    /// Returns the Rust target triple.
     fn target(self) -> &'static str {
         match self {
             Self::X86_64 => "x86_64-unknown-linux-gnu",
@@ -76,7 +76,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The zip file of each function, built from the checkout at `root` into `target`.
+/// Returns the zip file of each function, built from the checkout at `root` into `target`.
 fn build(
     toolchain: &Toolchain,
     root: &Path,
@@ -116,18 +116,18 @@ fn build(
         .collect()
 }
 
-/// Names of folders go into panic messages; these take them out.
+/// Returns the compiler flags that remove folder names from panic messages.
 fn remapped(root: &Path) -> anyhow::Result<Vec<String>> {
     let home = std::env::home_dir().context("no home folder")?;
     let cargo = std::env::var_os("CARGO_HOME").map_or_else(|| home.join(".cargo"), PathBuf::from);
     let rustup = std::env::var_os("RUSTUP_HOME").map_or_else(|| home.join(".rustup"), PathBuf::from);
-    // Of several that match, the last counts.
+    // If several match, the last one applies.
     Ok([(rustup.as_path(), "/rustup"), (cargo.as_path(), "/cargo"), (root, "/rayfold")]
         .map(|(from, to)| format!("--remap-path-prefix={}={to}", from.display()))
         .to_vec())
 }
 
-/// Builds what Git knows of `root` again in another folder.
+/// Builds the files that Git tracks in `root` again in another folder, and compares the results.
 fn verify(
     toolchain: &Toolchain,
     root: &Path,
@@ -154,7 +154,7 @@ fn copy_sources(root: &Path, copy: &Path) -> anyhow::Result<()> {
     ensure!(listing.status.success(), "git ls-files: {}", listing.status);
     for name in String::from_utf8(listing.stdout)?.split_terminator('\0') {
         let (from, to) = (root.join(name), copy.join(name));
-        // Deleted, and not yet committed.
+        // The file is deleted, but the deletion is not committed yet.
         if !from.exists() {
             continue;
         }
@@ -164,7 +164,7 @@ fn copy_sources(root: &Path, copy: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The checkout, two folders above this crate.
+/// Returns the checkout, two folders above this crate.
 fn root() -> anyhow::Result<PathBuf> {
     let own = Path::new(env!("CARGO_MANIFEST_DIR"));
     match own.ancestors().nth(2) {

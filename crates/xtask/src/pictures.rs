@@ -1,7 +1,7 @@
-//! `cargo xtask pictures`: the pictures of the language's page, drawn from the scripts in it.
+//! `cargo xtask pictures`: draws the pictures of the language page from the scripts in it.
 //!
-//! Drawn by the program `rayfold` of this checkout, so that this one builds without a renderer. A picture is written only
-//! where it differs, so that an unchanged page changes no file.
+//! The `rayfold` program of this checkout draws them, so xtask builds without a renderer. A picture is written only
+//! if it differs, so an unchanged page changes no file.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use crate::manual::{Example, PAGE, PICTURES, examples};
 use crate::plot;
 use crate::toolchain::say;
 
-/// What to draw.
+/// The options of `cargo xtask pictures`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Names of the pictures to draw; all of them, and none that is left over, when not given
@@ -25,10 +25,10 @@ pub(crate) struct Args {
     rayfold: Option<PathBuf>,
 }
 
-/// Draws and writes what differs.
+/// Draws all pictures and writes those that differ.
 ///
 /// # Errors
-/// When a script is faulty, a name is none, or a file cannot be written.
+/// Fails if a script has an error, a name is unknown, or a file cannot be written.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let page = fs::read_to_string(root.join(PAGE)).context(PAGE)?;
@@ -52,7 +52,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The bytes of its file.
+/// Returns the bytes of the picture's file.
 fn draw(example: &Example, rayfold: Option<&Path>) -> anyhow::Result<Vec<u8>> {
     let script = script(example)?;
     if example.is_curve() {
@@ -71,7 +71,7 @@ fn draw(example: &Example, rayfold: Option<&Path>) -> anyhow::Result<Vec<u8>> {
     .status()
     .context("rayfold could not be run")?;
     ensure!(status.success(), "it could not be drawn");
-    // Of an animation its frames side by side.
+    // The frames of an animation are placed side by side.
     let frame = |k: usize| Ok(image::open(folder.path().join(format!("{k}.png")))?.into_rgb8());
     let frames: Vec<RgbImage> = (1..=script.frame_count()).map(frame).collect::<anyhow::Result<_>>()?;
     let mut png = std::io::Cursor::new(Vec::new());
@@ -79,7 +79,7 @@ fn draw(example: &Example, rayfold: Option<&Path>) -> anyhow::Result<Vec<u8>> {
     Ok(png.into_inner())
 }
 
-/// The program of this checkout.
+/// Returns the command that runs the program of this checkout.
 fn cargo_run() -> Command {
     let mut command = Command::new(env!("CARGO"));
     command.args(["run", "--quiet", "--package", "rayfold", "--"]);
@@ -92,7 +92,7 @@ fn script(example: &Example) -> anyhow::Result<Script> {
     parsed.script.with_context(faults)
 }
 
-/// Pictures of one height, from left to right.
+/// Joins pictures of the same height from left to right.
 fn side_by_side(pictures: &[RgbImage]) -> anyhow::Result<RgbImage> {
     let height = pictures.first().context("a script has a frame")?.height();
     let mut strip = RgbImage::new(pictures.iter().map(RgbImage::width).sum(), height);
@@ -104,7 +104,7 @@ fn side_by_side(pictures: &[RgbImage]) -> anyhow::Result<RgbImage> {
     Ok(strip)
 }
 
-/// Writes a file unless it is as it should be.
+/// Writes a file unless it has this content already.
 fn write(path: &PathBuf, bytes: &[u8]) -> anyhow::Result<()> {
     if fs::read(path).is_ok_and(|there| there == bytes) {
         return Ok(());
@@ -114,7 +114,7 @@ fn write(path: &PathBuf, bytes: &[u8]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Removes pictures that no script draws any more.
+/// Removes pictures that belong to no script.
 fn remove_others(folder: &Path, examples: &[Example]) -> anyhow::Result<()> {
     for entry in fs::read_dir(folder).context(PICTURES)? {
         let entry = entry?;
@@ -132,7 +132,7 @@ mod tests {
 
     use super::*;
 
-    /// Levels that rounding may make of a pixel on another machine.
+    /// The difference in levels that rounding may cause on another machine.
     const TOLERANCE: u8 = 1;
 
     #[test]

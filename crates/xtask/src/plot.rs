@@ -1,16 +1,16 @@
-//! A number that changes, as a plot: the height of a script's first ball over its frames.
+//! A plot of a number that changes: the height of a script's first ball over its frames.
 
 use anyhow::{Context, bail};
 use plotters::prelude::*;
 use rayfold_scene::{Object, Script};
 
-/// Of a plot, in pixels.
+/// The size of a plot in pixels.
 const SIZE: (u32, u32) = (420, 150);
-/// How often a frame the line is read.
+/// The number of points of the line per frame.
 const STEPS: u32 = 10;
 const LINE: RGBColor = RGBColor(200, 60, 30);
 
-/// Frame numbers to the right, the height of the first ball upwards; a dot is a frame.
+/// Plots the frame numbers to the right and the height of the first ball upwards. Each dot is a frame.
 pub(crate) fn svg(script: &Script) -> anyhow::Result<String> {
     let first = script.frame_number(0).context("a script has a frame")?;
     let last = script.frame_number(script.frame_count() - 1).context("and a last one")?;
@@ -64,6 +64,6 @@ fn height(script: &Script, time: f64) -> anyhow::Result<f64> {
     });
     match ball {
         Some(y) => Ok(y),
-        None => bail!("what is plotted is the height of a ball, and there is none"),
+        None => bail!("the script has no ball whose height could be plotted"),
     }
 }

@@ -1,6 +1,7 @@
 //! The linker: zig, which can link against a glibc older than the machine's, driven by cargo-zigbuild.
 //!
-//! Both are pinned, as other versions may give other bytes, and kept in the user's cache apart from anything else.
+//! Both are pinned, because other versions may give other bytes, and kept in a folder of their own
+//! in the user's cache.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -17,7 +18,7 @@ pub(crate) struct Toolchain {
 }
 
 impl Toolchain {
-    /// Those of the cache, installed first if they are missing.
+    /// Returns the tools of the cache. Installs them first if they are missing.
     pub(crate) fn get() -> anyhow::Result<Self> {
         let folder = cache()?.join(format!("zig-{ZIG}-zigbuild-{CARGO_ZIGBUILD}"));
         let binaries = folder.join("bin");
@@ -31,27 +32,27 @@ impl Toolchain {
         Ok(Self { binaries })
     }
 
-    /// `cargo zigbuild`.
+    /// Returns the command `cargo zigbuild`.
     pub(crate) fn cargo_zigbuild(&self) -> anyhow::Result<Command> {
         let mut path = vec![self.binaries.clone()];
         path.extend(env::split_paths(&env::var_os("PATH").unwrap_or_default()));
         let mut command = Command::new(self.binaries.join("cargo-zigbuild"));
         command.arg("zigbuild").env("PATH", env::join_paths(path)?);
-        // Another zig or python on the PATH would be taken before the one beside cargo-zigbuild.
+        // Otherwise another zig or python on the PATH would be used.
         command.env("CARGO_ZIGBUILD_PYTHON_PATH", self.binaries.join("python"));
         command.env_remove("CARGO_ZIGBUILD_ZIG_PATH");
         Ok(command)
     }
 }
 
-/// Into a folder beside it first: what is there is whole.
+/// Installs the tools. Deletes an incomplete installation first.
 fn install(folder: &Path) -> anyhow::Result<()> {
     let parent = folder.parent().context("the cache has no parent")?;
     std::fs::create_dir_all(parent)?;
     if folder.exists() {
         std::fs::remove_dir_all(folder)?;
     }
-    // A virtual environment cannot be moved, so its marker, cargo-zigbuild, is what comes last.
+    // A virtual environment cannot be moved. So its marker, cargo-zigbuild, is installed last.
     run(Command::new("python3").args(["-m", "venv"]).arg(folder))?;
     let pip = folder.join("bin/pip");
     for package in [format!("ziglang=={ZIG}"), format!("cargo-zigbuild=={CARGO_ZIGBUILD}")] {
@@ -69,14 +70,14 @@ fn cache() -> anyhow::Result<PathBuf> {
     }
 }
 
-/// Runs to the end, and fails as the command does.
+/// Runs a command to its end. Fails if the command fails.
 pub(crate) fn run(command: &mut Command) -> anyhow::Result<()> {
     let status = command.status().with_context(|| format!("cannot run {:?}", command.get_program()))?;
     ensure!(status.success(), "{:?}: {status}", command.get_program());
     Ok(())
 }
 
-/// A line for people.
+/// Prints a line for the user.
 #[expect(clippy::print_stderr, reason = "this is a program's own output")]
 pub(crate) fn say(line: &str) {
     eprintln!("{line}");

@@ -1,8 +1,8 @@
 //! The store as a process of its own, for conformance tests and for killing it in the middle.
 //!
-//! The root key is taken from `AWS_ACCESS_KEY_ID` and `AWS_SECRET_ACCESS_KEY`. The address is printed as the first line
-//! of standard output when requests are answered; SIGINT or SIGTERM ends it in order. `rayfold-bucket check` reads a folder and
-//! lists what is damaged in it.
+//! Reads the owner's key from `AWS_ACCESS_KEY_ID` and `AWS_SECRET_ACCESS_KEY`. Prints the address as the first line
+//! of standard output once it serves requests. SIGINT or SIGTERM stops it in order. `rayfold-bucket check` reads a
+//! folder and lists its damage.
 
 use std::io::Write;
 use std::net::SocketAddr;
@@ -19,19 +19,19 @@ use rayfold_bucket::{Credentials, Damage, Options, Server, Webhook};
 struct Args {
     #[command(subcommand)]
     command: Option<Command>,
-    /// The folder, made when missing
+    /// Folder of the store, which is created if missing
     #[arg(long, required = true)]
     data: Option<PathBuf>,
-    /// Where to listen; port 0 is any free one
+    /// Address to listen on; port 0 selects any free one
     #[arg(long, default_value = "127.0.0.1:0")]
     address: SocketAddr,
-    /// What the buckets' location is
+    /// Region of the buckets
     #[arg(long, env = "AWS_REGION", default_value = "us-east-1")]
     region: String,
-    /// Where events go, `http://…`
+    /// URL to which events are sent, `http://…`
     #[arg(long, requires = "webhook_token")]
     webhook: Option<String>,
-    /// Sent with each event as `Authorization: Bearer <token>`
+    /// Token sent with each event as `Authorization: Bearer <token>`
     #[arg(long, env = "RAYFOLD_BUCKET_WEBHOOK_TOKEN", hide_env_values = true)]
     webhook_token: Option<String>,
     #[arg(long, env = "AWS_ACCESS_KEY_ID", hide = true, required = true)]
@@ -42,14 +42,14 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Reads all of a store that does not run, compares it with its checksums, and lists what is damaged
+    /// Check all of a stopped store against its checksums, and list the damage
     ///
-    /// Ends with 1 when something is damaged and was not repaired.
+    /// Exits with 1 if something is damaged and was not repaired.
     Check {
-        /// The folder
+        /// Folder of the store
         #[arg(long)]
         data: PathBuf,
-        /// Move what is damaged to a folder `set-aside-N` in the store's, and keep the rest usable
+        /// Move damaged files and rows to a folder `set-aside-N` inside the store, so that the rest stays usable
         #[arg(long)]
         repair: bool,
     },

@@ -1,5 +1,5 @@
-//! A body that is checked while it is read: that of an XML operation against its digests and its elements, a form's by its
-//! fields. What is wrong ends the body with an error, so that the operation never runs.
+//! A body that is checked while it is read. The body of an XML operation is checked against its digests and elements,
+//! and a form by its fields. An error ends the body, so that the operation never runs.
 
 use std::pin::Pin;
 use std::sync::{Arc, Mutex};
@@ -17,7 +17,7 @@ use super::xml;
 use crate::answer::{invalid_request, wrong_checksum, wrong_md5};
 use crate::checksum::{Algorithm, Digests, bytes_of};
 
-/// Why a body was refused, for the answer: `s3s` tells of a body's error in words of its own.
+/// The reason why a body was refused, for the response. `s3s` reports a body's error in its own words.
 #[derive(Clone, Default)]
 pub(super) struct Verdict(Arc<Mutex<Option<S3Error>>>);
 
@@ -33,7 +33,7 @@ impl Verdict {
     }
 }
 
-/// What is to be checked.
+/// The check of a body.
 enum Check {
     Xml {
         known: &'static [&'static str],
@@ -44,7 +44,7 @@ enum Check {
     Form(Fields),
 }
 
-/// See the module.
+/// The check of an operation's body, see the module.
 pub(super) struct Guard {
     operation: &'static Operation,
     check: Check,
@@ -52,10 +52,10 @@ pub(super) struct Guard {
 }
 
 impl Guard {
-    /// The guard of an operation's body, if it needs one.
+    /// Returns the guard of an operation's body if it needs one.
     ///
     /// # Errors
-    /// `InvalidDigest` and `InvalidRequest` for digests that cannot be, or that are missing where S3 demands one.
+    /// `InvalidDigest` and `InvalidRequest` for digests that are invalid, or missing although S3 requires one.
     pub(super) fn new(
         operation: &'static Operation,
         headers: &HeaderMap,
@@ -81,7 +81,7 @@ impl Guard {
                         "Missing required header for this request: Content-MD5 OR x-amz-checksum-*",
                     ));
                 }
-                // Those of a completion are of the object.
+                // The checksum headers of a completion are those of the object.
                 let checksum = checksum.filter(|_| operation.name != "CompleteMultipartUpload");
                 Check::Xml { known, md5, checksum, bytes: Vec::new() }
             }
@@ -89,7 +89,7 @@ impl Guard {
         Ok(Some(Self { operation, check, verdict }))
     }
 
-    /// The body, checked.
+    /// Returns the body with the check.
     pub(super) fn around(self, body: Body) -> Body {
         Body::http_body_unsync(Guarded { body, guard: Some(self) })
     }
@@ -158,7 +158,7 @@ impl hyper::body::Body for Guarded {
         }
     }
 
-    /// Not before the end was checked.
+    /// Returns `false` until the end has been checked.
     fn is_end_stream(&self) -> bool {
         self.guard.is_none() && self.body.is_end_stream()
     }

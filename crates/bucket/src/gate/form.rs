@@ -1,4 +1,4 @@
-//! The fields of a browser's form, by the heads of its parts. `s3s` passes over those that it does not know.
+//! The fields of a browser's form, parsed from the heads of its parts. `s3s` ignores fields that it does not know.
 
 use s3s::{S3Error, S3Result};
 
@@ -7,10 +7,10 @@ use super::values::{check_value, unknown_field};
 use crate::answer::not_implemented;
 use crate::checksum::Algorithm;
 
-/// What may come before the file.
-const MOST_BYTES: usize = 1024 * 1024;
+/// The largest number of bytes before the file.
+const MAX_BYTES: usize = 1024 * 1024;
 
-/// Fields that are kept, compared, or of the form itself.
+/// The fields that are stored or compared, or that belong to the form itself.
 const KNOWN: [&str; 26] = [
     "bucket",
     "cache-control",
@@ -40,7 +40,7 @@ const KNOWN: [&str; 26] = [
     "acl",
 ];
 
-/// What a form says before its file, as far as it has come.
+/// The beginning of a form, before its file, as far as it has been received.
 #[derive(Default)]
 pub(super) struct Fields {
     bytes: Vec<u8>,
@@ -48,7 +48,7 @@ pub(super) struct Fields {
 }
 
 impl Fields {
-    /// Takes bytes in; checks the fields when those of the file begin.
+    /// Takes bytes. Checks the fields when the file begins.
     pub(super) fn take(&mut self, operation: &Operation, bytes: &[u8]) -> S3Result<()> {
         if self.is_done {
             return Ok(());
@@ -56,7 +56,7 @@ impl Fields {
         self.bytes.extend_from_slice(bytes);
         let text = String::from_utf8_lossy(&self.bytes);
         let Some(fields) = fields(&text) else {
-            return if self.bytes.len() > MOST_BYTES { Err(too_long()) } else { Ok(()) };
+            return if self.bytes.len() > MAX_BYTES { Err(too_long()) } else { Ok(()) };
         };
         for (name, value) in fields {
             check(operation, &name.to_ascii_lowercase(), value)?;
@@ -85,7 +85,7 @@ fn check(operation: &Operation, name: &str, value: &str) -> S3Result<()> {
     if name == "content-md5" { Ok(()) } else { check_value(operation, name, value) }
 }
 
-/// Names and values of the fields before the file, once that has begun.
+/// Returns the names and values of the fields before the file, or `None` until the file begins.
 fn fields(text: &str) -> Option<Vec<(&str, &str)>> {
     let (boundary, _) = text.trim_start_matches("\r\n").split_once("\r\n")?;
     let mut fields = Vec::new();
@@ -103,7 +103,7 @@ fn fields(text: &str) -> Option<Vec<(&str, &str)>> {
     None
 }
 
-/// `name` of `form-data; name="key"; filename="a"`.
+/// Returns a parameter such as `name` of `form-data; name="key"; filename="a"`.
 fn parameter<'a>(line: &'a str, name: &str) -> Option<&'a str> {
     let mut parts = line.split(';').map(str::trim).filter_map(|part| part.split_once('='));
     parts.find(|(given, _)| given.eq_ignore_ascii_case(name)).map(|(_, value)| value.trim_matches('"'))

@@ -1,6 +1,6 @@
-//! The operations that are there, with all that may stand in their requests.
+//! The table of supported operations, with everything that their requests may contain.
 
-/// What an operation is about.
+/// The kind of resource of an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum On {
     Root,
@@ -9,7 +9,7 @@ pub(super) enum On {
 }
 
 impl On {
-    /// In words.
+    /// Returns the kind in words.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Root => "the store",
@@ -23,32 +23,34 @@ impl On {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Payload {
     None,
-    /// An object's, or a part's.
+    /// The bytes of an object or of a part.
     Bytes,
-    /// XML with these elements below its root.
+    /// XML with these elements under its root.
     Xml(&'static [&'static str]),
     /// A browser's form with a file.
     Form,
 }
 
-/// One operation of S3.
+/// An operation of S3.
 #[derive(Debug)]
 pub(super) struct Operation {
     pub(super) name: &'static str,
     pub(super) method: &'static str,
     pub(super) on: On,
-    /// The parameters, and headers (`x-amz-…`), that tell it from others of its method.
+    /// The parameters and headers (`x-amz-…`) that distinguish it from other operations of its method.
     pub(super) chosen_by: &'static [&'static str],
-    /// Further parameters of the query.
+    /// The other parameters of the query that are allowed.
     pub(super) query: &'static [&'static str],
-    /// Further headers: of those that change what a request means ([`super::values::matters`]) no other is taken.
+    /// The other headers that are allowed. Any header that changes the meaning of a request
+    /// ([`super::values::matters`]) must be listed.
     pub(super) headers: &'static [&'static str],
     pub(super) payload: Payload,
-    /// S3 demands a digest of the body. (Its model says so of access lists as well; clients send those without.)
+    /// Whether S3 requires a digest of the body. (Its model also requires one for access lists, but
+    /// clients send those without.)
     pub(super) needs_digest: bool,
 }
 
-/// Headers of an object that is written.
+/// The headers of an operation that writes an object.
 const WRITTEN: &[&str] = &[
     "x-amz-acl",
     "x-amz-meta-",
@@ -86,11 +88,11 @@ const READ_HEADERS: &[&str] = &[
     "if-range",
     "range",
     "x-amz-checksum-mode",
-    // What the client can take, of which nothing is used here. Those for Java send it.
+    // The transfer encodings that the client accepts. None is used. Clients for Java send this header.
     "x-amz-te",
 ];
 
-/// Asks MinIO for more in a listing, and is passed over by S3. `mc` sends it to both.
+/// A parameter that asks MinIO for more in a listing, and that S3 ignores. `mc` sends it to both.
 const MINIO_METADATA: &str = "metadata";
 
 const SOURCE: [&str; 5] = [
@@ -115,7 +117,7 @@ const ACL: Payload = Payload::Xml(&[
     "Owner/ID",
 ]);
 
-/// An operation without anything special; others name what they have more.
+/// The base of all entries, which an operation overrides where it differs.
 const PLAIN: Operation = Operation {
     name: "",
     method: "GET",
@@ -127,12 +129,12 @@ const PLAIN: Operation = Operation {
     needs_digest: false,
 };
 
-/// One that reads a configuration of a bucket.
+/// Makes the entry of an operation that reads a configuration of a bucket.
 const fn configuration(name: &'static str, chosen_by: &'static [&'static str]) -> Operation {
     Operation { name, chosen_by, ..PLAIN }
 }
 
-/// All of them.
+/// The supported operations.
 pub(super) const OPERATIONS: &[Operation] = &[
     Operation {
         name: "ListBuckets",

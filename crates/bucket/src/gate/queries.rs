@@ -1,4 +1,4 @@
-//! The parameters of a URL: which an operation may have, and those of a presigned one that stand for headers.
+//! The parameters of a URL: those that an operation allows, and those of a presigned URL that stand for headers.
 
 use hyper::header::{HeaderName, HeaderValue};
 use hyper::{HeaderMap, Uri};
@@ -8,7 +8,7 @@ use super::operations::Operation;
 use crate::answer::{invalid_argument, not_implemented, twice};
 use crate::checksum::Algorithm;
 
-/// Parameters that sign a URL, by version 4 and by version 2.
+/// The parameters that sign a URL, by version 4 and by version 2.
 const SIGNING: [&str; 11] = [
     "X-Amz-Algorithm",
     "X-Amz-Credential",
@@ -23,7 +23,7 @@ const SIGNING: [&str; 11] = [
     "Expires",
 ];
 
-/// Reads the query as `s3s` does. No parameter may stand there twice: one would be judged, and the other be used.
+/// Parses the query as `s3s` does. A parameter must not occur twice: one value would be checked and the other used.
 pub(super) fn parse(uri: &Uri) -> S3Result<Vec<(String, String)>> {
     let query: Vec<(String, String)> = serde_urlencoded::from_str(uri.query().unwrap_or_default())
         .map_err(|error| s3_error!(error, InvalidURI, "The query of the URL could not be read"))?;
@@ -39,20 +39,20 @@ fn is_of_signature(name: &str) -> bool {
     SIGNING.contains(&name)
 }
 
-/// Whether a parameter of a presigned URL stands for a header.
+/// Returns whether a parameter of a presigned URL stands for a header.
 fn is_hoisted(name: &str) -> bool {
     !is_of_signature(name) && name.get(..6).is_some_and(|start| start.eq_ignore_ascii_case("x-amz-"))
 }
 
-/// Whether a URL is signed by version 4.
+/// Returns whether a URL is signed by version 4.
 pub(super) fn is_presigned(query: &[(String, String)]) -> bool {
     query.iter().any(|(name, _)| name == "X-Amz-Signature")
 }
 
-/// Puts the parameters of a URL that is presigned by version 4 in the place of the headers that they stand for, as S3 reads
-/// them. The signature covers the whole query.
+/// Converts the parameters of a URL presigned by version 4 into the headers that they stand for, as S3 does. The
+/// signature covers the whole query.
 ///
-/// A checksum of no bytes is left out: clients that presign a put make it before there is a body.
+/// A checksum of zero bytes is dropped: clients that presign a put compute it before there is a body.
 pub(super) fn hoist(query: &[(String, String)], headers: &mut HeaderMap) -> S3Result<()> {
     if !is_presigned(query) {
         return Ok(());
@@ -78,7 +78,7 @@ pub(super) fn hoist(query: &[(String, String)], headers: &mut HeaderMap) -> S3Re
     Ok(())
 }
 
-/// Checks that an operation has every parameter.
+/// Checks that an operation allows every parameter.
 pub(super) fn check(operation: &Operation, query: &[(String, String)]) -> S3Result<()> {
     let presigned = is_presigned(query);
     for (name, value) in query {

@@ -1,4 +1,4 @@
-//! Headers: which an operation may have, and which values of them say what holds anyway.
+//! Headers: those that an operation allows, and the values that request only what holds anyway.
 
 use hyper::HeaderMap;
 use hyper::header::{AUTHORIZATION, DATE, HeaderName, HeaderValue};
@@ -10,10 +10,10 @@ use crate::answer::{invalid_argument, invalid_request, no_lists, not_implemented
 use crate::checksum::Algorithm;
 use crate::options::OWNER;
 
-/// MD5 of no bytes.
+/// The MD5 of zero bytes.
 const MD5_OF_NOTHING: &str = "1B2M2Y8AsgTpgAmY7PhCfg==";
 
-/// Headers that every operation may have.
+/// The headers that every operation allows.
 const COMMON: [&str; 6] = [
     "x-amz-content-sha256",
     "x-amz-date",
@@ -23,7 +23,7 @@ const COMMON: [&str; 6] = [
     "x-amz-user-agent",
 ];
 
-/// Headers of HTTP that change what is asked for.
+/// The HTTP headers that change the meaning of a request.
 const OF_HTTP: [&str; 7] = [
     "if-match",
     "if-none-match",
@@ -34,12 +34,12 @@ const OF_HTTP: [&str; 7] = [
     "content-range",
 ];
 
-/// Whether a header may change what a request means.
+/// Returns whether a header may change the meaning of a request.
 pub(super) fn matters(name: &str) -> bool {
     name.starts_with("x-amz-") || OF_HTTP.contains(&name)
 }
 
-/// Checks that an operation has every header, each once and with a value that can be.
+/// Checks that an operation allows every header, and that each occurs once with a valid value.
 pub(super) fn check(operation: &Operation, headers: &HeaderMap) -> S3Result<()> {
     for name in headers.keys().map(HeaderName::as_str).filter(|name| matters(name) || *name == "content-md5")
     {
@@ -60,8 +60,8 @@ pub(super) fn check(operation: &Operation, headers: &HeaderMap) -> S3Result<()> 
     check_digests(operation, headers)
 }
 
-/// Checks that what is said of a body's digest can be compared: a trailer needs a body in chunks, and the name of an
-/// algorithm its checksum.
+/// Checks that the digests of a body can be compared. A trailer needs a body in chunks, and the name of an
+/// algorithm needs its checksum.
 fn check_digests(operation: &Operation, headers: &HeaderMap) -> S3Result<()> {
     let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok()).map(str::trim);
     let in_chunks = text("x-amz-content-sha256").is_some_and(|hash| hash.starts_with("STREAMING-"));
@@ -72,7 +72,7 @@ fn check_digests(operation: &Operation, headers: &HeaderMap) -> S3Result<()> {
             "{name} is for a body in chunks, which x-amz-content-sha256 has to say: STREAMING-UNSIGNED-PAYLOAD-TRAILER, for one"
         )));
     }
-    // MinIO's clients name it, with a checksum or without, for the store to make one.
+    // MinIO's clients name an algorithm with or without a checksum, so that the store computes one.
     let named = text("x-amz-checksum-algorithm").filter(|_| operation.payload == Payload::Bytes);
     if let Some(algorithm) = named.and_then(Algorithm::of_name) {
         let trailer = text("x-amz-trailer").map(str::to_ascii_lowercase);
@@ -92,7 +92,7 @@ fn check_digests(operation: &Operation, headers: &HeaderMap) -> S3Result<()> {
 
 fn is_known(operation: &Operation, name: &str) -> bool {
     let listed = |list: &[&str]| list.contains(&name);
-    // Clients for Java send the checksum of no bytes with a Get.
+    // Clients for Java send the checksum of zero bytes with a Get.
     let has_digest = operation.payload != Payload::Form;
     name == "content-md5"
         || listed(&COMMON)
@@ -114,7 +114,7 @@ fn is_checksum(name: &str) -> bool {
     Algorithm::ALL.iter().any(|algorithm| algorithm.header() == name)
 }
 
-/// Of a header, or of a form's field of its name.
+/// Checks the value of a header, or of the form field with its name.
 pub(super) fn check_value(operation: &Operation, name: &str, value: &str) -> S3Result<()> {
     let is_there = match name {
         "x-amz-acl" => {
@@ -141,7 +141,7 @@ pub(super) fn check_value(operation: &Operation, name: &str, value: &str) -> S3R
             }
             true
         }
-        // Of a body in one piece.
+        // The checksum type of a body in one piece.
         "x-amz-checksum-type" if operation.payload == Payload::Bytes => value == "FULL_OBJECT",
         "x-amz-storage-class" => value == "STANDARD",
         "x-amz-server-side-encryption" => value == "AES256",
@@ -158,7 +158,7 @@ pub(super) fn check_value(operation: &Operation, name: &str, value: &str) -> S3R
     if is_there { Ok(()) } else { Err(not_implemented(&format!("{name}: {value}"))) }
 }
 
-/// A date of HTTP (or in the short form) as `x-amz-date` has it.
+/// Converts an HTTP date (or the short form) to the format of `x-amz-date`.
 pub(crate) fn amz_date(date: &str) -> Option<String> {
     if date.len() == 16 && date.ends_with('Z') && date.as_bytes().get(8) == Some(&b'T') {
         return Some(date.to_owned());
@@ -166,13 +166,13 @@ pub(crate) fn amz_date(date: &str) -> Option<String> {
     let time = Timestamp::parse(TimestampFormat::HttpDate, date).ok()?;
     let mut text = Vec::new();
     time.format(TimestampFormat::DateTime, &mut text).ok()?;
-    // 2026-11-25T01:02:03.000Z
+    // The format is 2026-11-25T01:02:03.000Z here.
     let text: String = String::from_utf8(text).ok()?.chars().filter(|c| !matches!(c, '-' | ':')).collect();
     let seconds = text.split(['.', 'Z']).next()?;
     Some(format!("{seconds}Z"))
 }
 
-/// Puts the `Date` of a request that is signed by version 4 in the place of `x-amz-date`, where that is missing.
+/// Copies the `Date` of a request signed by version 4 to `x-amz-date` if that is missing.
 pub(super) fn take_date(headers: &mut HeaderMap) {
     let is_v4 = headers.get(AUTHORIZATION).is_some_and(|value| value.as_bytes().starts_with(b"AWS4-"));
     if !is_v4 || headers.contains_key("x-amz-date") {
@@ -184,10 +184,10 @@ pub(super) fn take_date(headers: &mut HeaderMap) {
     }
 }
 
-/// The algorithm and the value of the checksum that a body's headers name.
+/// Returns the algorithm and the value of the checksum in a body's headers.
 ///
 /// # Errors
-/// `InvalidRequest` for several, and for an algorithm without its checksum.
+/// `InvalidRequest` if there are several checksums, or an algorithm without its checksum.
 pub(crate) fn checksum_header(headers: &HeaderMap) -> S3Result<Option<(Algorithm, String)>> {
     let mut named = Algorithm::ALL.into_iter().filter_map(|algorithm| {
         let value = headers.get(algorithm.header())?.to_str().unwrap_or_default();
@@ -202,7 +202,7 @@ pub(crate) fn checksum_header(headers: &HeaderMap) -> S3Result<Option<(Algorithm
     Ok(first)
 }
 
-/// A form's field that cannot be.
+/// Refuses an unknown field of a form.
 pub(super) fn unknown_field(name: &str) -> S3Error {
     match name {
         "" => invalid_argument("a field of the form has no name"),

@@ -1,4 +1,4 @@
-//! The elements of an XML body. `s3s` passes over those that it does not know, and over CDATA.
+//! The elements of an XML body. `s3s` ignores unknown elements, and CDATA.
 
 use quick_xml::Reader;
 use quick_xml::events::Event;
@@ -7,7 +7,7 @@ use s3s::{S3Result, s3_error};
 use super::operations::Operation;
 use crate::answer::not_implemented;
 
-/// Checks that an operation has every element, by the names on the way to it.
+/// Checks that an operation allows every element, by its path of names.
 pub(super) fn check(operation: &Operation, known: &[&str], body: &[u8]) -> S3Result<()> {
     let malformed = || s3_error!(MalformedXML, "The XML you provided was not well-formed");
     let mut reader = Reader::from_reader(body);
@@ -29,7 +29,7 @@ pub(super) fn check(operation: &Operation, known: &[&str], body: &[u8]) -> S3Res
             }
         };
         path.push(String::from_utf8_lossy(start.name().as_ref()).into_owned());
-        // The root is `s3s`' to judge.
+        // `s3s` checks the root element.
         let inside = path.get(1..).unwrap_or_default().join("/");
         if !inside.is_empty() && !known.contains(&inside.as_str()) {
             return Err(not_implemented(&format!("the element {inside} of {}", operation.name)));

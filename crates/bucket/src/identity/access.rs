@@ -1,6 +1,7 @@
-//! What a request asks for, and whether its caller may do it.
+//! The access check of a request: the rights that it needs, and whether its caller has them.
 //!
-//! Everything but a copy's source and the keys of a multi-delete is known before the operation's input is read.
+//! All rights except those for a copy's source and for the keys of a multi-delete are known before the
+//! operation's input is read.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -18,22 +19,22 @@ use super::signed::{self, parameter};
 use crate::gate::Gate;
 use crate::policy::{self, Scope, Verdict, needed};
 
-/// Where a session's token is, unless it is in the URL.
+/// The header with a session's token, unless the token is in the URL.
 const TOKEN: &str = "x-amz-security-token";
 
-/// Asks the identities at each request.
+/// The access check, which runs for each request.
 pub(crate) struct Access(pub(crate) Identities);
 
 /// The keys of a multi-delete that the caller may not delete.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DeniedKeys(pub(crate) HashSet<String>);
 
-/// The caller may not list the bucket that is read from.
+/// A mark that the caller may not list the bucket from which it reads.
 #[derive(Clone, Copy)]
 struct MayNotList;
 
-/// Whoever may not list a bucket is not told that an object is absent, but what S3 says of one that is there: no.
-pub(crate) fn discreetly(extensions: &Extensions) -> impl Fn(S3Error) -> S3Error + use<> {
+/// Replaces `NoSuchKey` by `AccessDenied` for callers who may not list the bucket, as S3 does.
+pub(crate) fn hide_missing_key(extensions: &Extensions) -> impl Fn(S3Error) -> S3Error + use<> {
     let may_list = extensions.get::<MayNotList>().is_none();
     move |error| {
         if may_list || *error.code() != S3ErrorCode::NoSuchKey {
@@ -70,7 +71,7 @@ impl S3Access for Access {
             Caller::Session(session) => session,
         };
         let operation = cx.s3_op().name();
-        // Key by key, when they are known.
+        // For `DeleteObjects`, each key is checked once the keys are known.
         if operation != "DeleteObjects" {
             let Some((scope, actions)) = needed(operation) else {
                 return Err(denied(&session, operation, "no policy can allow it"));
@@ -82,7 +83,7 @@ impl S3Access for Access {
             for action in actions {
                 ask(&session, &policy::Access { action, resource: &resource, prefix, delimiter })?;
             }
-            // A canned list of who may do what is a right of its own.
+            // Setting a canned access list needs a right of its own.
             if cx.headers().contains_key("x-amz-acl") && scope == Scope::Object {
                 ask(&session, &plainly("s3:PutObjectAcl", &resource))?;
             }
@@ -126,7 +127,7 @@ fn may_read(extensions: &mut Extensions, source: &CopySource) -> S3Result<()> {
     }
 }
 
-/// For [`discreetly`].
+/// Records for [`hide_missing_key`] whether the caller may list the bucket.
 fn note_listing(session: &Session, bucket: &str, extensions: &mut Extensions) {
     let resource = arn(bucket, None);
     match session.policy.verdict(&plainly("s3:ListBucket", &resource)) {
@@ -148,7 +149,7 @@ fn denied(session: &Session, action: &str, why: &str) -> S3Error {
     S3Error::with_message(S3ErrorCode::AccessDenied, message)
 }
 
-/// Without what only a listing asks for.
+/// Makes an access without the fields of a listing.
 fn plainly<'a>(action: &'a str, resource: &'a str) -> policy::Access<'a> {
     policy::Access { action, resource, prefix: None, delimiter: None }
 }

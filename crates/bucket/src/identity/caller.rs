@@ -1,4 +1,4 @@
-//! Whose key and token a request carries.
+//! The caller of a request, by its key and token.
 
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -9,17 +9,17 @@ use s3s::{S3Error, S3ErrorCode, S3Result, s3_error};
 use super::session::{Session, Sessions};
 use crate::options::Credentials;
 
-/// The owner and all sessions; clones share them.
+/// The owner and all sessions. Clones share them.
 #[derive(Clone)]
 pub(crate) struct Identities {
     owner: Arc<Credentials>,
     pub(super) sessions: Arc<Sessions>,
 }
 
-/// Whose key a request was signed with.
+/// The identity whose key signed a request.
 #[derive(Clone)]
 pub(crate) enum Caller {
-    /// Whoever started the store.
+    /// The owner of the store.
     Owner,
     /// A session that has not expired.
     Session(Arc<Session>),
@@ -30,8 +30,10 @@ impl Identities {
         Self { owner: Arc::new(owner), sessions: Arc::new(sessions) }
     }
 
+    /// Returns the secret of an access key.
+    ///
     /// # Errors
-    /// `InvalidAccessKeyId` for a key that nobody has, `ExpiredToken` for one of a session that is over.
+    /// `InvalidAccessKeyId` for an unknown key, `ExpiredToken` for one of an expired session.
     fn secret(&self, access_key: &str, now: SystemTime) -> S3Result<SecretKey> {
         if access_key == self.owner.access_key {
             return Ok(self.owner.secret_key.as_str().into());
@@ -40,10 +42,10 @@ impl Identities {
         Ok(session.secret_key.as_str().into())
     }
 
-    /// Who has this key and comes with this token.
+    /// Returns the identity with this key and this token.
     ///
     /// # Errors
-    /// As [`Self::secret`]; `InvalidToken` for a token that is not the key's.
+    /// As [`Self::secret`]; `InvalidToken` for a token that does not belong to the key.
     pub(crate) fn caller(&self, access_key: &str, token: Option<&str>, now: SystemTime) -> S3Result<Caller> {
         let invalid = || s3_error!(InvalidToken, "The provided token is malformed or otherwise invalid.");
         if access_key == self.owner.access_key {
@@ -53,7 +55,7 @@ impl Identities {
         match token {
             Some(token) if session.has_token(token) => Ok(Caller::Session(session)),
             Some(_) => Err(invalid()),
-            // As S3 answers: a temporary key alone is nobody's.
+            // S3 answers likewise: a temporary key without its token is unknown.
             None => Err(unknown_key()),
         }
     }

@@ -1,4 +1,4 @@
-//! Sessions: made once, looked up at each request, kept in the database for the next start.
+//! Sessions: made once, looked up for each request, and kept in the database for the next start.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -11,21 +11,23 @@ use serde::{Deserialize, Serialize};
 use crate::policy::Policy;
 use crate::storage::{Kind, Storage, Table, Unavailable, View};
 
-/// What `AssumeRole` gave, and to whom.
+/// A session made by `AssumeRole`, and its holder.
 pub(crate) struct Session {
     pub(crate) secret_key: String,
     pub(crate) token: String,
     pub(crate) policy: Policy,
-    /// `arn:aws:sts::000000000000:assumed-role/role/session`
+    /// The ARN `arn:aws:sts::000000000000:assumed-role/role/session`.
     pub(crate) arn: String,
     pub(crate) expires: SystemTime,
-    /// The policy as it came.
+    /// The policy document as it was received.
     document: String,
 }
 
 impl Session {
+    /// Parses the policy document.
+    ///
     /// # Errors
-    /// What is wrong with the policy.
+    /// The error in the policy.
     pub(crate) fn new(
         secret_key: String,
         token: String,
@@ -41,7 +43,7 @@ impl Session {
         now >= self.expires
     }
 
-    /// In a time that does not tell how much of it is right.
+    /// Compares the token in constant time, which reveals nothing about the position of a difference.
     pub(crate) fn has_token(&self, token: &str) -> bool {
         let (ours, theirs) = (self.token.as_bytes(), token.as_bytes());
         ours.len() == theirs.len() && ours.iter().zip(theirs).fold(0, |diff, (a, b)| diff | (a ^ b)) == 0
@@ -57,7 +59,7 @@ impl fmt::Debug for Session {
     }
 }
 
-/// A session in the database.
+/// The form of a session in the database.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Kept {
@@ -65,21 +67,21 @@ struct Kept {
     token: String,
     policy: String,
     arn: String,
-    /// Milliseconds since 1970.
+    /// The expiry in milliseconds since 1970.
     expires_ms: u64,
 }
 
-/// All sessions that are not over.
+/// All sessions that have not expired.
 pub(crate) struct Sessions {
     storage: Storage,
     by_key: RwLock<BTreeMap<String, Arc<Session>>>,
 }
 
 impl Sessions {
-    /// Those of the earlier runs that are not over yet.
+    /// Loads the sessions of earlier runs that have not expired.
     ///
     /// # Errors
-    /// When the storage cannot be read.
+    /// Returns an error if the storage cannot be read.
     pub(crate) fn open(storage: Storage, now: SystemTime) -> Result<Self, Unavailable> {
         let failed = |error: StorageError| Unavailable::Failed(error.to_string().into());
         let mut by_key = BTreeMap::new();
@@ -97,10 +99,10 @@ impl Sessions {
         self.by_key.read().unwrap_or_else(PoisonError::into_inner).get(access_key).cloned()
     }
 
-    /// Keeps a session, which is known from when this returns, also after a crash; those that are over are forgotten.
+    /// Stores a session. It is known from the return on, also after a crash. Removes the expired ones.
     ///
     /// # Errors
-    /// When the storage cannot be written.
+    /// Returns an error if the storage cannot be written.
     pub(crate) async fn add(
         &self,
         access_key: &str,
@@ -139,7 +141,7 @@ impl Sessions {
     }
 }
 
-/// One that this version cannot read, for its policy say, allows nothing.
+/// Reads a session. One that this version cannot read, for example because of its policy, has no rights.
 fn read(kept: &[u8]) -> Option<Session> {
     let kept: Kept = serde_json::from_slice(kept).ok()?;
     let expires = UNIX_EPOCH.checked_add(Duration::from_millis(kept.expires_ms))?;
@@ -163,7 +165,8 @@ mod tests {
     fn only_the_very_token_is_a_sessions() {
         let session = Session::example("abc", UNIX_EPOCH);
         assert!(session.has_token("token of abc"));
-        // One letter is another one, two are off by the same bit, the end is missing, something follows.
+        // One letter differs, two differ in the same bit, the end is missing, something follows,
+        // and the case differs.
         for other in ["token of abd", "token of `cc", "token of ab", "", "token of abc ", "TOKEN OF ABC"] {
             assert!(!session.has_token(other), "{other}");
         }

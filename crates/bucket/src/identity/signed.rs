@@ -1,7 +1,7 @@
-//! What a signature of version 4 has to cover, beyond what `s3s` looks at when it checks that it is right.
+//! The headers that a signature of version 4 must cover, beyond the check of `s3s` that it is right.
 //!
-//! A signature covers the headers that it lists and no other, so that whoever was given a presigned URL may add some. One
-//! that begins with `x-amz-` changes what is asked for: a copy's source turns a write of one object into a read of another.
+//! A signature covers only the headers that it lists, so the holder of a presigned URL may add some. A header that
+//! begins with `x-amz-` changes the request: the source of a copy turns a write of one object into a read of another.
 
 use hyper::HeaderMap;
 use hyper::header::{AUTHORIZATION, DATE, HeaderName};
@@ -9,22 +9,22 @@ use s3s::{S3Error, S3ErrorCode, S3Result, s3_error};
 
 use crate::gate::amz_date;
 
-/// Seconds that a presigned URL may be valid, as with AWS.
+/// The longest time that a presigned URL may be valid in seconds, as on AWS.
 const LONGEST_EXPIRY: u64 = 604_800;
 
 const ALGORITHM: &str = "AWS4-HMAC-SHA256 ";
 
-/// Of version 4: who signed for what, and which headers.
+/// A signature of version 4: its credential and the headers that it covers.
 struct Signature<'a> {
-    /// `KEY/DATE/REGION/SERVICE/aws4_request`.
+    /// The credential, as `KEY/DATE/REGION/SERVICE/aws4_request`.
     credential: &'a str,
     headers: &'a str,
     is_in_url: bool,
 }
 
 impl<'a> Signature<'a> {
-    /// Where `s3s` looks for it: in the URL first. There is none in requests that are signed by version 2, which covers all
-    /// headers that begin with `x-amz-`.
+    /// Finds the signature as `s3s` does: in the URL first. Returns `None` for a request signed by version 2, whose
+    /// signature covers all headers that begin with `x-amz-`.
     fn of(headers: &'a HeaderMap, query: &'a [(String, String)]) -> S3Result<Option<Self>> {
         if parameter(query, "X-Amz-Signature")?.is_some() {
             let part = |name| Ok::<_, S3Error>(parameter(query, name)?.unwrap_or_default());
@@ -36,7 +36,7 @@ impl<'a> Signature<'a> {
         if text.starts_with("AWS ") && !text.contains("SignedHeaders=") {
             return Ok(None);
         }
-        // `s3s` takes any word for the algorithm, also one that looks like a list of headers.
+        // `s3s` accepts any word as the algorithm, also one that looks like a list of headers.
         let parts = || {
             let credential = text.strip_prefix(ALGORITHM)?.trim_start().strip_prefix("Credential=")?;
             let (credential, rest) = credential.split_once(',')?;
@@ -65,10 +65,11 @@ impl<'a> Signature<'a> {
     }
 }
 
-/// A request to S3 whose signature is right; not a form's, which is in the form and covers its fields.
+/// Checks a request to S3 whose signature is right. Not for a form, which contains its signature and the
+/// fields that it covers.
 ///
 /// # Errors
-/// `AccessDenied` for a header that should be signed and is not, and AWS's codes for another service's signature and for
+/// `AccessDenied` for a header that must be signed and is not; AWS's codes for a signature of another service and for
 /// a URL that is valid for too long.
 pub(super) fn check(headers: &HeaderMap, query: &[(String, String)]) -> S3Result<()> {
     let Some(signature) = Signature::of(headers, query)? else { return Ok(()) };
@@ -81,9 +82,9 @@ pub(super) fn check(headers: &HeaderMap, query: &[(String, String)]) -> S3Result
     {
         return Err(signature.malformed("X-Amz-Expires must be less than a week (in seconds)".to_owned()));
     }
-    // The hash of the body is part of what is signed, or is checked against the body.
+    // The hash of the body is part of the signed text, or is checked against the body.
     let is_free = |name: &str| !name.starts_with("x-amz-") || name == "x-amz-content-sha256";
-    // The whole query of a URL is signed, and a parameter of it may stand for a header (`gate`).
+    // The signature covers the whole query of a URL, and a parameter of it may stand for a header (`gate`).
     let in_query = |name: &str| {
         signature.is_in_url
             && query.iter().any(|(given, value)| {
@@ -105,12 +106,12 @@ pub(super) fn check(headers: &HeaderMap, query: &[(String, String)]) -> S3Result
     }
 }
 
-/// A parameter that may stand there once: with two, one would be judged and the other be used.
+/// Returns a parameter that may occur once. With two, one would be checked and the other used.
 pub(super) fn parameter<'a>(query: &'a [(String, String)], name: &str) -> S3Result<Option<&'a str>> {
     let mut found = query.iter().filter(|(other, _)| other == name).map(|(_, value)| value.as_str());
     let first = found.next();
     if found.next().is_some() {
-        return Err(s3_error!(InvalidArgument, "{name} stands there twice"));
+        return Err(s3_error!(InvalidArgument, "{name} occurs more than once"));
     }
     Ok(first)
 }
@@ -161,7 +162,7 @@ mod tests {
             let answer = outcome(&[("authorization", &disguised), copy], &[]);
             assert_eq!(answer, "AuthorizationHeaderMalformed", "{disguised}");
         }
-        // The one that was checked counts.
+        // The signature that was checked applies.
         assert_eq!(outcome(&[("authorization", &whole), copy], &url("host")), "AccessDenied");
         let listed = ("X-Amz-SignedHeaders", "host;x-amz-copy-source");
         assert_eq!(outcome(&[("authorization", &plain), copy], &[listed]), "AccessDenied");

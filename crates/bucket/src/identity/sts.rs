@@ -1,8 +1,8 @@
-//! `AssumeRole` of AWS's Security Token Service: temporary keys that may do what a policy says.
+//! `AssumeRole` of AWS's Security Token Service: temporary keys with the rights of a policy.
 //!
-//! There are no roles with policies of their own here, so the request's `Policy` alone says what the session may do, and it
-//! is required. Answers and errors have STS's shape (the Query protocol of 2011-06-15), also for requests whose signature
-//! is wrong, which are refused before they come here ([`in_sts_shape`]).
+//! The store has no roles with policies, so the request's `Policy` alone defines the rights of the session, and it is
+//! required. Responses and errors have STS's format (the Query protocol of 2011-06-15). That includes requests with a
+//! wrong signature, which are refused before they reach this module ([`in_sts_shape`]).
 
 use std::time::{Duration, SystemTime};
 
@@ -20,20 +20,21 @@ use super::session::Session;
 const FORM: &str = "application/x-www-form-urlencoded";
 const NAMESPACE: &str = "https://sts.amazonaws.com/doc/2011-06-15/";
 
-/// Bytes of a request: the policy may have 2,048 characters, each of them up to three times three bytes in the form.
+/// The largest request in bytes. The policy may have 2,048 characters, each of up to three bytes that take
+/// three in the form.
 const LONGEST_REQUEST: usize = 8 << 10;
 
-/// Characters of a policy, as with AWS.
+/// The largest number of characters of a policy, as on AWS.
 const LONGEST_POLICY: usize = 2048;
 
-/// Seconds that a session may last, as with AWS, and how long it does when nothing is said.
+/// The allowed lifetime of a session in seconds, as on AWS. `USUAL_DURATION` is the default.
 const DURATION: std::ops::RangeInclusive<u64> = 900..=43_200;
 const USUAL_DURATION: u64 = 3600;
 
-/// Answers `POST /` with a form.
+/// The route that answers `POST /` with a form.
 pub(crate) struct AssumeRole(pub(crate) Identities);
 
-/// Why there is no session: the error's code and a message for people.
+/// The reason why there is no session: the error's code and a message.
 #[derive(Debug, PartialEq, Eq)]
 struct Refusal {
     status: StatusCode,
@@ -51,7 +52,7 @@ impl Refusal {
     }
 }
 
-/// What a request asks for.
+/// The parameters of a request.
 #[derive(Debug, PartialEq, Eq)]
 struct Wish {
     role: String,
@@ -77,7 +78,7 @@ impl Wish {
                 _ => return Err(Refusal::invalid(format!("the parameter {name} is not supported"))),
             };
             if place.replace(value).is_some() {
-                return Err(Refusal::invalid(format!("{name} stands there twice")));
+                return Err(Refusal::invalid(format!("{name} occurs more than once")));
             }
         }
         let action = action.unwrap_or_default();
@@ -117,7 +118,7 @@ impl Wish {
     }
 }
 
-/// Of `arn:aws:iam::000000000000:role/path/name`.
+/// Returns the name in `arn:aws:iam::000000000000:role/path/name`.
 fn role_name(arn: &str) -> Result<String, Refusal> {
     let parts: Vec<&str> = arn.splitn(6, ':').collect();
     if let ["arn", "aws", "iam", "", account, rest] = parts[..]
@@ -143,7 +144,7 @@ impl AssumeRole {
         if req.service.as_deref() != Some("sts") {
             return Err(denied("the request is signed for another service than sts"));
         }
-        // Without that header the signature covers the body, as STS wants it.
+        // Without that header the signature covers the body, as STS requires.
         if req.headers.get("x-amz-content-sha256").is_some_and(|hash| hash.len() != 64) {
             return Err(denied("the body must be signed"));
         }
@@ -184,7 +185,7 @@ impl AssumeRole {
             .map_err(|error| broken(error.to_string()))?;
         let expiration = String::from_utf8_lossy(&expiration);
         let share = wish.policy.chars().count() * 100 / LONGEST_POLICY;
-        // Names and keys consist of characters that XML has no other use for.
+        // Names and keys contain no characters with a meaning in XML.
         Ok(format!(
             "<AssumeRoleResponse xmlns=\"{NAMESPACE}\"><AssumeRoleResult>\
              <AssumedRoleUser><AssumedRoleId>AROA{id}:{}</AssumedRoleId><Arn>{arn}</Arn></AssumedRoleUser>\
@@ -197,7 +198,7 @@ impl AssumeRole {
     }
 }
 
-/// Random characters of the 32 that AWS's keys consist of.
+/// Returns random characters of the 32 that occur in AWS's keys.
 fn random(characters: usize) -> Result<String, getrandom::Error> {
     const ALPHABET: &[u8; 32] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZ234567";
     let mut bytes = vec![0; characters];
@@ -212,7 +213,7 @@ impl S3Route for AssumeRole {
     }
 
     async fn check_access(&self, _: &mut S3Request<Body>) -> S3Result<()> {
-        // In the answer, whose errors have another shape than S3's.
+        // The rights are checked when the response is made, because its errors have another format than S3's.
         Ok(())
     }
 
@@ -227,7 +228,7 @@ impl S3Route for AssumeRole {
     }
 }
 
-/// Is this a form for STS, and no request of S3?
+/// Returns whether the request is a form for STS and not a request to S3.
 pub(crate) fn is_for_sts(method: &Method, uri: &Uri, headers: &HeaderMap) -> bool {
     let is_form = |value: &HeaderValue| {
         value.to_str().is_ok_and(|text| text.split(';').next().is_some_and(|kind| kind.trim() == FORM))
@@ -242,7 +243,7 @@ fn shown(refusal: &Refusal) -> String {
     error_text(refusal.status, &escaped(&refusal.code), &escaped(&refusal.message))
 }
 
-/// Code and message as they stand in XML.
+/// Formats code and message as XML.
 fn error_text(status: StatusCode, code: &str, message: &str) -> String {
     let fault = if status.is_server_error() { "Receiver" } else { "Sender" };
     format!(
@@ -258,7 +259,7 @@ fn escaped(text: &str) -> String {
             '&' => out.push_str("&amp;"),
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
-            // XML has no way to write most of them.
+            // XML cannot represent most of them.
             c if c.is_control() => out.push(' '),
             c => out.push(c),
         }
@@ -266,7 +267,7 @@ fn escaped(text: &str) -> String {
     out
 }
 
-/// What STS calls an error that S3 has another name for.
+/// Returns STS's name for an error that S3 names differently.
 fn code_of(of_s3: &str) -> &str {
     match of_s3 {
         "InvalidAccessKeyId" | "InvalidToken" => "InvalidClientTokenId",
@@ -275,10 +276,11 @@ fn code_of(of_s3: &str) -> &str {
     }
 }
 
-/// An answer to a request that is meant for STS: when it was refused before it came here, in S3's words, in STS's.
+/// Converts a refusal in S3's format to STS's format, for a request that is meant for STS.
+/// Returns other responses unchanged.
 ///
 /// # Errors
-/// When the answer's body cannot be read.
+/// Returns an error if the response body cannot be read.
 pub(crate) async fn in_sts_shape(answer: Response<Body>) -> Result<Response<Body>, HttpError> {
     if !answer.status().is_client_error() {
         return Ok(answer);
@@ -297,7 +299,7 @@ pub(crate) async fn in_sts_shape(answer: Response<Body>) -> Result<Response<Body
     Ok(Response::from_parts(parts, Body::from(text)))
 }
 
-/// The text of an element of an error that the S3 service wrote.
+/// Returns the text of an element of an error that the S3 service wrote.
 fn element<'a>(text: &'a str, name: &str) -> Option<&'a str> {
     let start = text.split_once(&format!("<{name}>"))?.1;
     Some(start.split_once(&format!("</{name}>"))?.0)
@@ -337,7 +339,7 @@ mod tests {
             ("=900", "=43201", "ValidationError", "43201"),
             ("=900", "=x", "ValidationError", "900 to 43200"),
             ("&DurationSeconds=900", "&PolicyArns.member.1.arn=a", "ValidationError", "PolicyArns"),
-            ("&DurationSeconds=900", "&Policy=x", "ValidationError", "twice"),
+            ("&DurationSeconds=900", "&Policy=x", "ValidationError", "more than once"),
         ] {
             assert!(GOOD.contains(good), "{good}");
             let refusal = Wish::read(GOOD.replacen(good, bad, 1).as_bytes()).unwrap_err();

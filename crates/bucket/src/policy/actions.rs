@@ -1,22 +1,23 @@
-//! Which actions an operation of S3 asks for, after the table of the Service Authorization Reference.
+//! The actions that an operation of S3 needs, from the table of the Service Authorization Reference.
 //!
 //! <https://docs.aws.amazon.com/service-authorization/latest/reference/list_amazons3.html>
 
-/// What an action is asked on.
+/// The kind of resource of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
-    /// No bucket: `*`.
+    /// All buckets, as `*`.
     Account,
-    /// `arn:aws:s3:::bucket`
+    /// A bucket, as `arn:aws:s3:::bucket`.
     Bucket,
-    /// `arn:aws:s3:::bucket/key`
+    /// An object, as `arn:aws:s3:::bucket/key`.
     Object,
 }
 
-/// The actions that an operation, by its name in the API, asks for, and on what. All of them are needed.
+/// Returns the actions that an operation needs, and the kind of their resource. The operation is given by its name in
+/// the API, and all of the actions must be allowed.
 ///
-/// Reading a copy's source and deleting many objects at once are asked for object by object beside this. Nothing is
-/// returned for operations that no policy can allow here.
+/// The rights to read a copy's source and to delete many objects at once are checked for each object in addition.
+/// Returns `None` for operations that no policy can allow in this store.
 pub fn needed(operation: &str) -> Option<(Scope, &'static [&'static str])> {
     let (scope, actions): (_, &[&str]) = match operation {
         "ListBuckets" => (Scope::Account, &["s3:ListAllMyBuckets"]),
@@ -65,7 +66,7 @@ pub fn needed(operation: &str) -> Option<(Scope, &'static [&'static str])> {
 mod tests {
     use super::*;
 
-    /// As the reference has it: operation, what it is asked on, actions.
+    /// The reference's table: operation, kind of resource, actions.
     const REFERENCE: &str = "
         ListBuckets                         Account  s3:ListAllMyBuckets
         CreateBucket                        Bucket   s3:CreateBucket

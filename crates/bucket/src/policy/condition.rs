@@ -1,19 +1,19 @@
-//! Conditions of a statement: operators on what a listing asks for.
+//! The conditions of a statement: operators on the parameters of a listing.
 
 use super::access::Access;
 use super::pattern::Pattern;
 
-/// What a condition looks at.
+/// A condition key that is supported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Key {
-    /// `s3:prefix`
+    /// The key `s3:prefix` of a listing.
     Prefix,
-    /// `s3:delimiter`
+    /// The key `s3:delimiter` of a listing.
     Delimiter,
 }
 
 impl Key {
-    /// The names of condition keys have no case.
+    /// Parses the name of a condition key, which is case-insensitive.
     pub(super) fn named(name: &str) -> Option<Self> {
         match name.to_ascii_lowercase().as_str() {
             "s3:prefix" => Some(Self::Prefix),
@@ -30,14 +30,14 @@ impl Key {
     }
 }
 
-/// How a condition compares.
+/// The operator of a condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Operator {
-    /// `Null`: whether the request has the key at all.
+    /// `Null`: whether the request has the key.
     Null,
     /// The family of string operators.
     String {
-        /// What counts as equal.
+        /// The comparison that counts as equality.
         comparison: Comparison,
         /// `…Not…`: none of the values may be equal.
         negated: bool,
@@ -46,7 +46,7 @@ pub(super) enum Operator {
     },
 }
 
-/// When a string equals a condition's value.
+/// The way in which a string equals a condition's value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Comparison {
     Exact,
@@ -76,7 +76,7 @@ impl Operator {
     }
 }
 
-/// One key under one operator.
+/// A key with its operator and values.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Condition {
     key: Key,
@@ -85,7 +85,7 @@ pub(super) struct Condition {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Test {
-    /// The key is absent (true), present (false), or either.
+    /// The key must be absent (true) or present (false); with both values, either.
     Null(Vec<bool>),
     String {
         values: Vec<Value>,
@@ -97,7 +97,7 @@ enum Test {
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Value {
     Exact(String),
-    /// In lower case.
+    /// The value in lower case.
     IgnoreCase(String),
     Like(Pattern),
 }
@@ -113,8 +113,10 @@ impl Value {
 }
 
 impl Condition {
+    /// Makes a condition.
+    ///
     /// # Errors
-    /// For a value that the operator cannot use, that value.
+    /// Returns the value that the operator cannot use.
     pub(super) fn new(operator: Operator, key: Key, values: Vec<String>) -> Result<Self, String> {
         let test = match operator {
             Operator::Null => {
@@ -137,7 +139,7 @@ impl Condition {
         Ok(Self { key, test })
     }
 
-    /// A key that the request lacks equals no value: so a negated operator holds.
+    /// Evaluates the condition. A missing key equals no value, so a negated operator then holds.
     pub(super) fn holds(&self, access: &Access<'_>) -> bool {
         match (&self.test, self.key.of(access)) {
             (Test::Null(absent), found) => absent.contains(&found.is_none()),

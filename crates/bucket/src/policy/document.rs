@@ -1,4 +1,4 @@
-//! The JSON of a policy document, read strictly: every refusal names what is refused and where it stands.
+//! The JSON of a policy document, parsed strictly: every error names the refused part and its position.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -11,16 +11,16 @@ use super::condition::{Condition, Key, Operator};
 use super::pattern::Pattern;
 use super::statement::{self, Effect, Policy};
 
-/// The start of the ARN of every bucket and object.
+/// The prefix of the ARNs of all buckets and objects.
 const ARN: &str = "arn:aws:s3:::";
 
 impl FromStr for Policy {
     type Err = serde_json::Error;
 
-    /// Reads a document.
+    /// Parses a policy document.
     ///
     /// # Errors
-    /// What is wrong and where, also for whatever is valid in IAM and not understood here.
+    /// The problem and its position, also for anything that is valid in IAM but not supported here.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         read(text)
     }
@@ -103,7 +103,7 @@ impl TryFrom<String> for Action {
         if lower == "*" || lower.strip_prefix("s3:").is_some_and(is_name) {
             Ok(Self(Pattern::new(&lower)))
         } else {
-            Err(format!("the action `{text}` is none of S3: expected `s3:` and a name, or `*`"))
+            Err(format!("unknown action `{text}`: expected `s3:` and a name, or `*`"))
         }
     }
 }
@@ -120,12 +120,12 @@ impl TryFrom<String> for Resource {
         if text == "*" || text.strip_prefix(ARN).is_some_and(|rest| !rest.is_empty()) {
             Ok(Self(Pattern::new(&text)))
         } else {
-            Err(format!("the resource `{text}` is none of S3: expected `{ARN}` and a bucket, or `*`"))
+            Err(format!("invalid resource `{text}`: expected `{ARN}` and a bucket, or `*`"))
         }
     }
 }
 
-/// `${aws:username}` and the like, which only IAM can resolve.
+/// Refuses policy variables such as `${aws:username}`, which only IAM can resolve.
 fn without_variables(text: &str) -> Result<(), String> {
     if text.contains("${") {
         return Err(format!("`{text}` has a policy variable, which is not supported"));
@@ -133,7 +133,7 @@ fn without_variables(text: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Operator, then key, then values.
+/// Conditions, nested in the JSON as operator, key and values.
 #[derive(Default)]
 struct Conditions(Vec<Condition>);
 
@@ -156,7 +156,9 @@ impl<'de> Deserialize<'de> for Conditions {
                         Error::custom(format_args!("the condition operator `{name}` is not supported"))
                     })?;
                     if seen.contains(&operator) {
-                        return Err(Error::custom(format_args!("the operator `{name}` stands there twice")));
+                        return Err(Error::custom(format_args!(
+                            "the operator `{name}` occurs more than once"
+                        )));
                     }
                     seen.push(operator);
                     for (key, values) in map.next_value::<Keys>()?.0 {
@@ -174,7 +176,7 @@ impl<'de> Deserialize<'de> for Conditions {
     }
 }
 
-/// What one operator is applied to.
+/// The keys and values of one operator.
 struct Keys(Vec<(Key, Vec<String>)>);
 
 impl<'de> Deserialize<'de> for Keys {
@@ -195,7 +197,7 @@ impl<'de> Deserialize<'de> for Keys {
                         Error::custom(format_args!("the condition key `{name}` is not supported"))
                     })?;
                     if pairs.iter().any(|(other, _)| *other == key) {
-                        return Err(Error::custom(format_args!("the key `{name}` stands there twice")));
+                        return Err(Error::custom(format_args!("the key `{name}` occurs more than once")));
                     }
                     let values = map.next_value::<OneOrMany<Text>>()?.0;
                     pairs.push((key, values.into_iter().map(|Text(text)| text).collect()));
@@ -208,7 +210,7 @@ impl<'de> Deserialize<'de> for Keys {
     }
 }
 
-/// A condition's value: a string, or a truth value for `Null`.
+/// A value of a condition: a string, or a Boolean for `Null`.
 struct Text(String);
 
 impl<'de> Deserialize<'de> for Text {
@@ -236,7 +238,7 @@ impl<'de> Deserialize<'de> for Text {
     }
 }
 
-/// What stands alone or in a list that is not empty.
+/// A value alone or a list that is not empty.
 struct OneOrMany<T>(Vec<T>);
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for OneOrMany<T> {
@@ -335,7 +337,7 @@ mod tests {
         assert!(read(&twice).unwrap_err().to_string().contains("List1"));
     }
 
-    /// A value of another kind is told what may stand in its place.
+    /// The error for a value of a wrong type names the right ones.
     #[test]
     fn what_may_stand_there_is_said() {
         let with = |condition: &str| {

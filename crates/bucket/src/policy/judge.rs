@@ -1,12 +1,12 @@
-//! An evaluator of its own for the tests: it reads the JSON as it stands and follows IAM's user guide word by word, as
-//! slowly as that is done. Nothing of it is shared with what it judges.
+//! A second evaluator for the tests. It interprets the JSON directly and follows IAM's user guide word by word,
+//! without regard to speed. It shares no code with the evaluator that it tests.
 
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
 use super::{Access, Policy, Verdict};
 
-/// By the definition: a star takes nothing, or one character and stands there still.
+/// Matches by the definition: a star matches nothing, or one character followed by the same star.
 pub(super) fn naive_match(pattern: &str, text: &str) -> bool {
     let mut pattern_rest = pattern.chars();
     let mut text_rest = text.chars();
@@ -31,8 +31,9 @@ fn list(value: &Value) -> Vec<String> {
     }
 }
 
-/// "When a request is made, the key's value is compared with each value of the condition, with a logical OR; for a
-/// negated operator with a logical NOR. Several keys and several operators are joined by a logical AND."
+/// Evaluates a condition by the definition: "When a request is made, the key's value is compared with each value of
+/// the condition, with a logical OR; for a negated operator with a logical NOR. Several keys and several operators
+/// are joined by a logical AND."
 fn naive_condition(operator: &str, wanted: &[String], found: Option<&str>) -> bool {
     let base = operator.trim_end_matches("IfExists");
     if operator != base && found.is_none() {
@@ -180,7 +181,7 @@ proptest! {
     }
 }
 
-/// So that the comparison above is one of all three verdicts, and of conditions that matter.
+/// Checks that the comparison above covers all three verdicts, and conditions that matter.
 #[test]
 fn the_generator_meets_every_verdict() {
     use proptest::strategy::ValueTree;

@@ -1,4 +1,4 @@
-//! Wildcards as IAM has them: `*` stands for any text, also none and across slashes; `?` for one character.
+//! IAM's wildcards: `*` stands for any text, also an empty one and across slashes; `?` stands for one character.
 
 /// A text with wildcards.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -9,12 +9,12 @@ impl Pattern {
         Self(text.chars().collect())
     }
 
-    /// The whole of `text` is what the pattern says. Takes at most pattern times text steps.
+    /// Returns whether the pattern matches all of `text`. Takes at most pattern length times text length steps.
     pub(super) fn matches(&self, text: &str) -> bool {
         let text: Vec<char> = text.chars().collect();
         let pattern = &self.0;
         let (mut at, mut place) = (0, 0);
-        // The last star met, and where the text stood that comes after what it swallows.
+        // The last star, and the position in the text after the part that it matches.
         let mut star: Option<(usize, usize)> = None;
         while place < text.len() {
             match pattern.get(at) {

@@ -1,20 +1,20 @@
-//! A policy's statements, and what they come to together.
+//! The statements of a policy, and their joint verdict.
 
 use super::access::{Access, Verdict};
 use super::condition::Condition;
 use super::pattern::Pattern;
 
-/// A policy document, checked.
+/// A policy document that has been validated.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Policy {
     pub(super) statements: Vec<Statement>,
 }
 
-/// Allows or denies some actions on some resources, under all of its conditions.
+/// A statement, which allows or denies some actions on some resources if all its conditions hold.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Statement {
     pub(super) effect: Effect,
-    /// In lower case: the names of actions have none.
+    /// The actions in lower case, because their names are case-insensitive.
     pub(super) actions: Vec<Pattern>,
     pub(super) resources: Vec<Pattern>,
     pub(super) conditions: Vec<Condition>,
@@ -27,7 +27,7 @@ pub(super) enum Effect {
 }
 
 impl Policy {
-    /// May this be done?
+    /// Returns the verdict about an access.
     pub fn verdict(&self, access: &Access<'_>) -> Verdict {
         let action = access.action.to_ascii_lowercase();
         let mut verdict = Verdict::NotAllowed;

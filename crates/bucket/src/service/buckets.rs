@@ -1,4 +1,4 @@
-//! Buckets: made, found, listed, deleted; and what can be asked of one that has no such thing.
+//! Buckets: creating, finding, listing and deleting them, and requests for configurations that they cannot have.
 
 use s3s::dto::*;
 use s3s::{S3Error, S3ErrorCode, S3Response, S3Result, s3_error};
@@ -10,11 +10,11 @@ use crate::options::OWNER;
 use crate::records::{self, Moment, abandon, all, decode, find, key, set};
 use crate::storage::{Kind, Table, View};
 
-/// What a page of buckets holds when the client does not say.
+/// The default number of buckets on a page.
 const PAGE: usize = 10_000;
 
 impl Service {
-    pub(super) fn buckets_listed(&self, input: &ListBucketsInput) -> Answer<ListBucketsOutput> {
+    pub(super) fn handle_list_buckets(&self, input: &ListBucketsInput) -> Answer<ListBucketsOutput> {
         let most = match input.max_buckets {
             None => PAGE,
             Some(most @ 1..=10_000) => usize::try_from(most).unwrap_or(PAGE),
@@ -24,7 +24,7 @@ impl Service {
         let elsewhere = input.bucket_region.as_deref().is_some_and(|region| region != &*self.region);
         let mut buckets = Vec::new();
         let mut next = None;
-        // The token is the name of the last bucket told.
+        // The token is the name of the last bucket listed.
         let after = input.continuation_token.as_deref().unwrap_or_default();
         let rows = all(&self.snapshot()?, Table::Buckets, prefix.as_bytes()).map_err(unreadable)?;
         for (name, value) in rows {
@@ -51,7 +51,7 @@ impl Service {
         })
     }
 
-    pub(super) async fn bucket_created(&self, input: CreateBucketInput) -> Answer<CreateBucketOutput> {
+    pub(super) async fn handle_create_bucket(&self, input: CreateBucketInput) -> Answer<CreateBucketOutput> {
         if input.object_lock_enabled_for_bucket == Some(true) {
             return Err(not_implemented("object lock"));
         }
@@ -72,7 +72,7 @@ impl Service {
             return Err(s3_error!(InvalidBucketName, "The specified bucket is not valid."));
         }
         let location = format!("/{name}");
-        // As ever: S3's first region answers its owner as if the bucket were new.
+        // As in S3's first region, which answers the owner as if the bucket were new.
         let again_is_fine = &*self.region == "us-east-1";
         let create = self.change(Kind::Grows, move |batch| {
             if batch.get(Table::Buckets, name.as_bytes())?.is_some() {
@@ -97,13 +97,16 @@ impl Service {
         self.bucket(&self.snapshot()?, name).map(drop)
     }
 
-    pub(super) fn bucket_found(&self, input: &HeadBucketInput) -> Answer<HeadBucketOutput> {
+    pub(super) fn handle_head_bucket(&self, input: &HeadBucketInput) -> Answer<HeadBucketOutput> {
         self.bucket_exists(&input.bucket)?;
         Ok(HeadBucketOutput { bucket_region: Some(self.region.to_string()), ..HeadBucketOutput::default() })
     }
 
-    /// An empty location is us-east-1, as ever.
-    pub(super) fn bucket_location(&self, input: &GetBucketLocationInput) -> Answer<GetBucketLocationOutput> {
+    /// Returns the region. An empty location means us-east-1, as in S3.
+    pub(super) fn handle_get_bucket_location(
+        &self,
+        input: &GetBucketLocationInput,
+    ) -> Answer<GetBucketLocationOutput> {
         self.bucket_exists(&input.bucket)?;
         let elsewhere = &*self.region != "us-east-1";
         let location_constraint = elsewhere.then(|| self.region.to_string().into());
@@ -111,7 +114,7 @@ impl Service {
     }
 
     /// Deletes an empty bucket, with its unfinished uploads.
-    pub(super) async fn bucket_deleted(&self, input: DeleteBucketInput) -> Answer<DeleteBucketOutput> {
+    pub(super) async fn handle_delete_bucket(&self, input: DeleteBucketInput) -> Answer<DeleteBucketOutput> {
         let name = input.bucket;
         let delete = self.change(Kind::Shrinks, move |batch| {
             bucket(batch, &name)?;
@@ -129,7 +132,7 @@ impl Service {
         Ok(DeleteBucketOutput {})
     }
 
-    /// What is asked for is no thing that a bucket here can have.
+    /// Refuses a request for a configuration that a bucket of this store cannot have.
     pub(super) fn no_configuration<O>(&self, bucket: &str, code: S3ErrorCode) -> S3Result<S3Response<O>> {
         let _: records::Bucket = find(&self.snapshot()?, Table::Buckets, bucket.as_bytes())
             .map_err(unreadable)?
@@ -138,14 +141,15 @@ impl Service {
     }
 }
 
-/// What S3 demands of a new bucket's name beyond what `s3s` looks at.
+/// Checks S3's rules for the name of a new bucket beyond those that `s3s` checks.
 fn can_be_new(name: &str) -> bool {
     let kept = ["sthree-", "amzn-s3-demo-"].iter().any(|start| name.starts_with(start))
         || ["-s3alias", "--ol-s3", ".mrap", "--x-s3", "--table-s3"].iter().any(|end| name.ends_with(end));
     !kept && !name.contains(".-") && !name.contains("-.")
 }
 
-/// An access list is one that says what holds anyway: the owner may do everything. Canned lists were judged before.
+/// Checks that an access list only repeats the fixed rights: the owner may do everything. Canned
+/// lists were checked before.
 pub(super) fn check_list(is_canned: bool, list: Option<AccessControlPolicy>) -> Answer<()> {
     let Some(list) = list else {
         return if is_canned { Ok(()) } else { Err(s3_error!(MissingSecurityHeader, "An ACL is missing.")) };
@@ -165,7 +169,7 @@ pub(super) fn owner() -> Owner {
     Owner { display_name: Some("owner".to_owned()), id: Some(OWNER.to_owned()) }
 }
 
-/// The access list of everything.
+/// Returns the access list of every bucket and object.
 pub(super) fn owners_alone() -> GetBucketAclOutput {
     let grantee = Grantee {
         display_name: Some("owner".to_owned()),

@@ -1,4 +1,4 @@
-//! If-Match, If-None-Match, If-Modified-Since and If-Unmodified-Since, as S3 answers them.
+//! If-Match, If-None-Match, If-Modified-Since and If-Unmodified-Since, evaluated as S3 does.
 
 use std::time::SystemTime;
 
@@ -23,7 +23,7 @@ impl WriteConditions {
         }
     }
 
-    /// Against what is there now: 412 where it is not as was said, 404 where nothing is there.
+    /// Compares with the current object: 412 if the condition fails, 404 if the object is missing.
     pub(crate) fn check(&self, now: Option<&Object>) -> Answer<()> {
         if let Some(condition) = &self.if_match {
             let object = now.ok_or_else(no_such_key)?;
@@ -38,7 +38,7 @@ impl WriteConditions {
     }
 }
 
-/// The conditions of a read, or of a copy's source.
+/// The conditions of a read, or of the source of a copy.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ReadConditions {
     pub(crate) if_match: Option<ETagCondition>,
@@ -47,17 +47,18 @@ pub(crate) struct ReadConditions {
     pub(crate) if_unmodified_since: Option<Timestamp>,
 }
 
-/// Why it is not read.
+/// The reason why the object is not read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Unmet {
-    /// 412.
+    /// The answer is 412.
     Failed,
-    /// 304, or 412 of a copy's source.
+    /// The answer is 304, or 412 for the source of a copy.
     NotModified,
 }
 
 impl ReadConditions {
-    /// The entity tag wins over the date of the same sense (RFC 9110, 13.2.2).
+    /// Returns the first condition that fails. An entity tag takes precedence over the corresponding
+    /// date (RFC 9110, 13.2.2).
     pub(crate) fn unmet(&self, object: &Object) -> Option<Unmet> {
         let modified = Timestamp::from(object.modified.whole_seconds());
         let now = Timestamp::from(SystemTime::now());
@@ -68,13 +69,13 @@ impl ReadConditions {
         }
         match (&self.if_none_match, &self.if_modified_since) {
             (Some(condition), _) if matches(condition, &object.etag) => Some(Unmet::NotModified),
-            // A date that is still to come is none (RFC 9110, 13.1.3).
+            // A date in the future is ignored (RFC 9110, 13.1.3).
             (None, Some(since)) if *since <= now && modified <= *since => Some(Unmet::NotModified),
             _ => None,
         }
     }
 
-    /// As a read answers.
+    /// Checks the conditions of a read.
     pub(crate) fn check(&self, object: &Object) -> Answer<()> {
         match self.unmet(object) {
             None => Ok(()),
@@ -83,7 +84,7 @@ impl ReadConditions {
         }
     }
 
-    /// As a copy answers.
+    /// Checks the conditions of a copy's source.
     pub(crate) fn check_source(&self, object: &Object) -> Answer<()> {
         self.unmet(object).map_or(Ok(()), |_| Err(precondition_failed()))
     }

@@ -1,10 +1,10 @@
-//! CopyObject: a body is read and written anew, so that a copy has an ETag and a checksum of its own.
+//! CopyObject: a body is read and written again, so that a copy has its own ETag and checksum.
 
 use s3s::dto::*;
 use s3s::{S3Request, s3_error};
 
 use super::conditions::{ReadConditions, WriteConditions};
-use super::ingest::{Claims, etag, ingest, is_too_large};
+use super::ingest::{ExpectedBody, etag, ingest, is_too_large};
 use super::objects::{Destination, admit, check_key, check_metadata, expires, keep, place};
 use super::writes::{of, stored_encoding};
 use super::{Caller, Service};
@@ -14,9 +14,12 @@ use crate::records::{self, Headers, Moment};
 use crate::storage::Kind;
 
 impl Service {
-    pub(super) async fn object_copied(&self, req: S3Request<CopyObjectInput>) -> Answer<CopyObjectOutput> {
+    pub(super) async fn handle_copy_object(
+        &self,
+        req: S3Request<CopyObjectInput>,
+    ) -> Answer<CopyObjectOutput> {
         let caller = Caller::of(&req);
-        // Conditions on the destination have no place in the input yet.
+        // The input of `s3s` has no conditions on the destination yet.
         let header = |name: &str| {
             req.headers.get(name).map(|value| ETagCondition::parse_http_header(value.as_bytes()))
         };
@@ -71,7 +74,7 @@ impl Service {
         };
         self.bucket_exists(&input.bucket)?;
         let bytes = held.bytes(&self.storage, 0..from.size)?;
-        let ingested = ingest(&self.storage, Claims::none(algorithm), bytes).await?;
+        let ingested = ingest(&self.storage, ExpectedBody::none(algorithm), bytes).await?;
         if ingested.size != from.size {
             return Err(s3_error!(InternalError, "the source's body is shorter than it should be"));
         }
@@ -111,7 +114,7 @@ impl Service {
     }
 }
 
-/// Bucket and key of a copy's source.
+/// Returns bucket and key of a copy's source.
 pub(super) fn source(source: &CopySource) -> Answer<(String, String)> {
     match source {
         CopySource::Bucket { bucket, key, version_id } => {
@@ -126,7 +129,7 @@ pub(super) fn source(source: &CopySource) -> Answer<(String, String)> {
     }
 }
 
-/// Whether the copy's headers are the request's.
+/// Returns whether the headers of the request replace those of the source.
 fn directive(directive: Option<&MetadataDirective>) -> Answer<bool> {
     match directive.map(MetadataDirective::as_str) {
         None | Some(MetadataDirective::COPY) => Ok(false),

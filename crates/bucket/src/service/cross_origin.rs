@@ -1,4 +1,4 @@
-//! A bucket's rules for pages of other sites, put, told and removed. What they mean is `cors`'.
+//! The requests that put, get and delete a bucket's CORS rules. `cors` interprets the rules.
 
 use s3s::dto::{CORSRule, GetBucketCorsOutput};
 use s3s::{S3Error, S3ErrorCode, s3_error};
@@ -9,22 +9,22 @@ use crate::answer::{Answer, invalid_request};
 use crate::records::{CorsRule, set};
 use crate::storage::{Kind, Table};
 
-/// Of one bucket: S3's.
-const MOST_RULES: usize = 100;
+/// S3's limit on the rules of a bucket.
+const MAX_RULES: usize = 100;
 
-/// Of a rule's id: S3's.
+/// S3's limit on the length of a rule's id.
 const LONGEST_ID: usize = 255;
 
 const METHODS: [&str; 5] = ["GET", "PUT", "POST", "DELETE", "HEAD"];
 
 impl Service {
-    /// The rules of a bucket, if there is one; what cannot be read has none.
+    /// Returns the rules of a bucket. A bucket that is missing or unreadable has none.
     pub(crate) fn cors_rules(&self, name: &str) -> Vec<CorsRule> {
         let found = self.snapshot().and_then(|snapshot| self.bucket(&snapshot, name));
         found.map(|bucket| bucket.cors).unwrap_or_default()
     }
 
-    pub(super) fn cors_told(&self, name: &str) -> Answer<GetBucketCorsOutput> {
+    pub(super) fn handle_get_bucket_cors(&self, name: &str) -> Answer<GetBucketCorsOutput> {
         let rules = self.bucket(&self.snapshot()?, name)?.cors;
         if rules.is_empty() {
             return Err(S3Error::with_message(
@@ -33,7 +33,7 @@ impl Service {
             ));
         }
         let some = |texts: Vec<String>| (!texts.is_empty()).then_some(texts);
-        let told = rules.into_iter().map(|rule| CORSRule {
+        let output = rules.into_iter().map(|rule| CORSRule {
             allowed_headers: some(rule.headers),
             allowed_methods: rule.methods,
             allowed_origins: rule.origins,
@@ -41,18 +41,18 @@ impl Service {
             id: rule.id,
             max_age_seconds: rule.max_age_seconds,
         });
-        Ok(GetBucketCorsOutput { cors_rules: Some(told.collect()) })
+        Ok(GetBucketCorsOutput { cors_rules: Some(output.collect()) })
     }
 
-    pub(super) async fn cors_set(&self, name: String, rules: Vec<CORSRule>) -> Answer<()> {
-        if rules.is_empty() || rules.len() > MOST_RULES {
-            return Err(s3_error!(MalformedXML, "A CORS configuration has between 1 and {MOST_RULES} rules"));
+    pub(super) async fn handle_put_bucket_cors(&self, name: String, rules: Vec<CORSRule>) -> Answer<()> {
+        if rules.is_empty() || rules.len() > MAX_RULES {
+            return Err(s3_error!(MalformedXML, "A CORS configuration has between 1 and {MAX_RULES} rules"));
         }
         let rules = rules.into_iter().map(read).collect::<Answer<Vec<_>>>()?;
         self.cors_changed(name, Kind::Grows, rules).await
     }
 
-    pub(super) async fn cors_removed(&self, name: String) -> Answer<()> {
+    pub(super) async fn handle_delete_bucket_cors(&self, name: String) -> Answer<()> {
         self.cors_changed(name, Kind::Shrinks, Vec::new()).await
     }
 
@@ -66,7 +66,7 @@ impl Service {
     }
 }
 
-/// A rule as it is kept.
+/// Converts a rule to the stored form.
 fn read(rule: CORSRule) -> Answer<CorsRule> {
     let rule = CorsRule {
         id: rule.id,

@@ -1,20 +1,20 @@
-//! DeleteObject and DeleteObjects: what is not there is deleted as well.
+//! DeleteObject and DeleteObjects. Deleting a missing object succeeds.
 
 use s3s::dto::*;
 use s3s::{S3Request, s3_error};
 
 use super::objects::{bucket, tell};
-use super::{Caller, Service, Stop};
+use super::{Caller, ChangeError, Service};
 use crate::answer::{Answer, invalid_request, not_implemented, precondition_failed, unavailable};
 use crate::identity::DeniedKeys;
 use crate::records::{self, find, key, release};
 use crate::storage::{Batch, Bodies, Kind, Table};
 
-/// Of one request: S3's.
-const MOST_KEYS: usize = 1000;
+/// S3's limit on the keys of a request.
+const MAX_KEYS: usize = 1000;
 
 impl Service {
-    pub(super) async fn object_deleted(
+    pub(super) async fn handle_delete_object(
         &self,
         req: S3Request<DeleteObjectInput>,
     ) -> Answer<DeleteObjectOutput> {
@@ -29,17 +29,17 @@ impl Service {
         Ok(DeleteObjectOutput::default())
     }
 
-    pub(super) async fn objects_deleted(
+    pub(super) async fn handle_delete_objects(
         &self,
         req: S3Request<DeleteObjectsInput>,
     ) -> Answer<DeleteObjectsOutput> {
         let caller = Caller::of(&req);
         let S3Request { input: DeleteObjectsInput { bucket: name, delete, .. }, extensions, .. } = req;
         let denied = extensions.get::<DeniedKeys>().cloned().unwrap_or_default();
-        if delete.objects.is_empty() || delete.objects.len() > MOST_KEYS {
+        if delete.objects.is_empty() || delete.objects.len() > MAX_KEYS {
             return Err(s3_error!(
                 MalformedXML,
-                "The request must name between 1 and {MOST_KEYS} objects to delete"
+                "The request must name between 1 and {MAX_KEYS} objects to delete"
             ));
         }
         for object in &delete.objects {
@@ -55,8 +55,8 @@ impl Service {
         let delete = self.storage.change(Kind::Shrinks, move |batch| {
             let here = match bucket(batch, &name) {
                 Ok(here) => here,
-                Err(Stop::Refused(refused)) => return Ok(Err(*refused)),
-                Err(Stop::Storage(error)) => return Err(error),
+                Err(ChangeError::Refused(refused)) => return Ok(Err(*refused)),
+                Err(ChangeError::Storage(error)) => return Err(error),
             };
             let mut output = (Vec::new(), Vec::new());
             for object in delete.objects {
@@ -67,8 +67,8 @@ impl Service {
                 let condition = object.e_tag.map(ETagCondition::ETag);
                 match remove(batch, &ids, (&name, &here), &object.key, condition.as_ref(), &caller) {
                     Ok(()) => output.0.push(object.key),
-                    Err(Stop::Refused(refused)) => output.1.push((object.key, *refused)),
-                    Err(Stop::Storage(error)) => return Err(error),
+                    Err(ChangeError::Refused(refused)) => output.1.push((object.key, *refused)),
+                    Err(ChangeError::Storage(error)) => return Err(error),
                 }
             }
             Ok(Ok(output))
@@ -90,7 +90,7 @@ impl Service {
     }
 }
 
-/// Removes an object, on its condition, and tells of it if it was there.
+/// Removes an object under its condition, and writes an event if it existed.
 fn remove(
     batch: &mut Batch<'_>,
     ids: &Bodies,
@@ -98,7 +98,7 @@ fn remove(
     object_key: &str,
     if_match: Option<&ETagCondition>,
     caller: &Caller,
-) -> Result<(), Stop> {
+) -> Result<(), ChangeError> {
     let row = key::object(name, object_key.as_bytes());
     let existing: Option<records::Object> = find(batch, Table::Objects, &row)?;
     if let Some(condition) = if_match {

@@ -1,7 +1,8 @@
-//! A body on its way in: counted, digested and kept, with memory that does not grow with it.
+//! Receiving a body: it is counted, digested and stored, with memory that does not grow with it.
 //!
-//! A small body stays in memory and becomes a row; a larger one goes to a file, a block at a time, while the next block
-//! is read. What the client said of it (length, MD5, checksum) is compared at the end, before anything refers to it.
+//! A small body stays in memory and becomes a row. A larger one goes to a file, a block at a time, while the next
+//! block is received. The client's data about the body (length, MD5, checksum) is compared at the end, before
+//! anything refers to it.
 
 use bytes::Bytes;
 use futures_util::{Stream, StreamExt};
@@ -14,27 +15,28 @@ use crate::checksum::{Algorithm, Checksum, Digests, bytes_of};
 use crate::gate::checksum_header;
 use crate::storage::{NewBody, Storage};
 
-/// A body up to this size is a row: one sync for everything. Beyond it, writing it twice would cost more than its own.
+/// Bodies up to this size are stored in the row, with one sync in all. Writing a larger body twice would cost more
+/// than a second sync.
 const ROW_BYTES: usize = 128 * 1024;
 
-/// What is digested and written at a time.
+/// The number of bytes that are digested and written at a time.
 const BLOCK_BYTES: usize = 1024 * 1024;
 
-/// Of one request: S3's.
+/// S3's limit on the body of a request.
 const LARGEST_BODY: u64 = 5 * 1024 * 1024 * 1024;
 
-/// What the client says of a body.
-pub(crate) struct Claims {
+/// The length and digests of a body that the client announced.
+pub(crate) struct ExpectedBody {
     length: Option<u64>,
     md5: Option<Vec<u8>>,
     algorithm: Algorithm,
-    /// In a header.
+    /// The checksum in a header.
     checksum: Option<String>,
-    /// Behind the body.
+    /// The headers after the body, which may hold the checksum.
     trailer: Option<TrailingHeaders>,
 }
 
-/// A body that is all there, and as the client said.
+/// A body that has been received completely and matches the announced data.
 pub(crate) struct Ingested {
     pub(crate) size: u64,
     pub(crate) md5: [u8; 16],
@@ -42,21 +44,21 @@ pub(crate) struct Ingested {
     pub(crate) content: Content,
 }
 
-/// Where it is until a row refers to it.
+/// The location of a body until a row refers to it.
 pub(crate) enum Content {
     Row(Vec<u8>),
     File(NewBody),
 }
 
-impl Claims {
-    /// Those of a request with a body. `otherwise` is the checksum's algorithm where the client names none.
+impl ExpectedBody {
+    /// Reads them from a request with a body. `otherwise` is the algorithm of the checksum if the client names none.
     pub(crate) fn of_request(
         headers: &HeaderMap,
         trailer: Option<TrailingHeaders>,
         otherwise: Algorithm,
     ) -> Answer<Self> {
         let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok()).map(str::trim);
-        // `s3s` has put the length of the bytes themselves in the place of that of the chunks, where one was given.
+        // If the length of the bytes themselves was given, `s3s` has put it in place of the length of the chunks.
         let in_chunks = text("x-amz-content-sha256").is_some_and(|hash| hash.starts_with("STREAMING-"));
         let decoded = text("x-amz-decoded-content-length").filter(|_| in_chunks);
         let length = text("content-length").or(decoded).and_then(|text| text.parse().ok());
@@ -85,7 +87,8 @@ impl Claims {
                 "x-amz-sdk-checksum-algorithm specified ({name}), but no corresponding x-amz-checksum-* or x-amz-trailer headers were found."
             )));
         }
-        // A client may name it for the store to make the checksum; the gate sees to it that it is that of the others.
+        // A client may name an algorithm so that the store computes the checksum. The gate checks that it
+        // agrees with the others.
         let named = text("x-amz-checksum-algorithm").and_then(Algorithm::of_name);
         let given = in_header.as_ref().map(|(algorithm, _)| *algorithm).or(in_trailer);
         let algorithm = given.or(named).unwrap_or(otherwise);
@@ -94,18 +97,18 @@ impl Claims {
         Ok(Self { length, md5, algorithm, checksum, trailer })
     }
 
-    /// None: a body that comes from the store itself.
+    /// Makes the expectation for a body that comes from the store itself: there is nothing to compare.
     pub(crate) fn none(algorithm: Algorithm) -> Self {
         Self { length: None, md5: None, algorithm, checksum: None, trailer: None }
     }
 }
 
-/// Whether a body is larger than one request may bring, or copy.
+/// Returns whether a body exceeds what one request may upload or copy.
 pub(crate) fn is_too_large(size: u64) -> bool {
     size > LARGEST_BODY
 }
 
-/// A checksum that has the right form.
+/// Returns the checksum if it has the right form.
 pub(crate) fn valid(algorithm: Algorithm, value: Option<&str>) -> Answer<String> {
     value
         .filter(|value| bytes_of(value).is_some_and(|bytes| bytes.len() == algorithm.bytes()))
@@ -113,15 +116,15 @@ pub(crate) fn valid(algorithm: Algorithm, value: Option<&str>) -> Answer<String>
         .ok_or_else(|| invalid_request(format!("Value for {} header is invalid.", algorithm.header())))
 }
 
-/// Takes a body in.
-pub(crate) async fn ingest<S>(storage: &Storage, claims: Claims, mut body: S) -> Answer<Ingested>
+/// Receives a body.
+pub(crate) async fn ingest<S>(storage: &Storage, expected: ExpectedBody, mut body: S) -> Answer<Ingested>
 where
     S: Stream<Item = Result<Bytes, StdError>> + Unpin,
 {
-    let mut sink = Sink::new(storage.clone(), claims.algorithm);
+    let mut sink = Sink::new(storage.clone(), expected.algorithm);
     while let Some(bytes) = body.next().await {
         sink.take(&bytes.map_err(|error| body_failed(&error))?).await?;
-        if sink.size > claims.length.unwrap_or(LARGEST_BODY) {
+        if sink.size > expected.length.unwrap_or(LARGEST_BODY) {
             return Err(s3_error!(
                 EntityTooLarge,
                 "The body is longer than Content-Length says, or than 5 GiB."
@@ -129,28 +132,28 @@ where
         }
     }
     let ingested = sink.end().await?;
-    if claims.length.is_some_and(|length| length != ingested.size) {
+    if expected.length.is_some_and(|length| length != ingested.size) {
         return Err(s3_error!(IncompleteBody, "The body is shorter than Content-Length says."));
     }
-    if claims.md5.is_some_and(|md5| md5 != ingested.md5) {
+    if expected.md5.is_some_and(|md5| md5 != ingested.md5) {
         return Err(wrong_md5());
     }
-    let header = claims.algorithm.header();
-    let claimed = match claims.trailer {
-        None => claims.checksum,
+    let header = expected.algorithm.header();
+    let claimed = match expected.trailer {
+        None => expected.checksum,
         Some(trailer) => {
             let value =
                 trailer.read(|headers| headers.get(header).and_then(|v| v.to_str().ok()).map(str::to_owned));
-            Some(valid(claims.algorithm, value.flatten().as_deref())?)
+            Some(valid(expected.algorithm, value.flatten().as_deref())?)
         }
     };
     if claimed.is_some_and(|claimed| claimed != ingested.checksum.value) {
-        return Err(wrong_checksum(claims.algorithm));
+        return Err(wrong_checksum(expected.algorithm));
     }
     Ok(ingested)
 }
 
-/// The ETag of a body.
+/// Returns the ETag of a body.
 pub(crate) fn etag(md5: [u8; 16]) -> String {
     md5.iter().map(|byte| format!("{byte:02x}")).collect()
 }
@@ -187,7 +190,7 @@ impl Sink {
         Ok(())
     }
 
-    /// Waits for the block before, and hands this one on.
+    /// Waits until the previous block is written, and passes this one on.
     async fn write(&mut self) -> Answer<()> {
         let mut state = self.state().await?;
         let block = std::mem::take(&mut self.block);
@@ -239,22 +242,22 @@ mod tests {
 
     use super::*;
 
-    fn claims(headers: &[(&'static str, &str)]) -> Result<Claims, String> {
+    fn expected(headers: &[(&'static str, &str)]) -> Result<ExpectedBody, String> {
         let headers = headers.iter().map(|(name, value)| {
             (
                 hyper::header::HeaderName::from_static(name),
                 hyper::header::HeaderValue::from_str(value).unwrap(),
             )
         });
-        let claims = Claims::of_request(&headers.collect(), None, Algorithm::Crc32);
-        claims.map_err(|error| error.code().as_str().to_owned())
+        let expected = ExpectedBody::of_request(&headers.collect(), None, Algorithm::Crc32);
+        expected.map_err(|error| error.code().as_str().to_owned())
     }
 
     #[test]
     fn what_is_said_of_a_body_is_read_or_refused() {
         let largest = LARGEST_BODY.to_string();
         assert_eq!(
-            claims(&[("content-length", &largest)]).map(|claims| claims.length),
+            expected(&[("content-length", &largest)]).map(|expected| expected.length),
             Ok(Some(LARGEST_BODY))
         );
         let larger = (LARGEST_BODY + 1).to_string();
@@ -271,21 +274,21 @@ mod tests {
             (vec![length, crc, ("x-amz-trailer", "x-amz-checksum-crc32")], "InvalidRequest"),
             (vec![length, ("x-amz-sdk-checksum-algorithm", "CRC32")], "InvalidRequest"),
         ] {
-            assert_eq!(claims(&headers).map(|_| ()), Err(code.to_owned()), "{headers:?}");
+            assert_eq!(expected(&headers).map(|_| ()), Err(code.to_owned()), "{headers:?}");
         }
         let chunked = [
             ("x-amz-content-sha256", "STREAMING-UNSIGNED-PAYLOAD-TRAILER"),
             ("x-amz-decoded-content-length", "7"),
         ];
-        assert_eq!(claims(&chunked).map(|claims| claims.length), Ok(Some(7)));
-        assert_eq!(claims(&chunked[1..]).map(|_| ()), Err("MissingContentLength".to_owned()));
-        let good = claims(&[length, crc, ("content-md5", "CZ7fAjxLoqlN0Cf2Vm8Zew==")]).unwrap();
+        assert_eq!(expected(&chunked).map(|expected| expected.length), Ok(Some(7)));
+        assert_eq!(expected(&chunked[1..]).map(|_| ()), Err("MissingContentLength".to_owned()));
+        let good = expected(&[length, crc, ("content-md5", "CZ7fAjxLoqlN0Cf2Vm8Zew==")]).unwrap();
         assert_eq!((good.md5.map(|md5| md5.len()), good.algorithm), (Some(16), Algorithm::Crc32));
-        let behind = claims(&[length, ("x-amz-trailer", "x-amz-checksum-sha256")]).unwrap();
+        let behind = expected(&[length, ("x-amz-trailer", "x-amz-checksum-sha256")]).unwrap();
         assert_eq!((behind.algorithm, behind.checksum), (Algorithm::Sha256, None));
     }
 
-    /// However the pieces come: no more than a block is in memory, and what is kept is the same.
+    /// Pieces of any size: at most one block is in memory, and the stored bytes are the same.
     #[tokio::test]
     async fn pieces_of_any_size_make_blocks() {
         let folder = tempfile::tempdir().unwrap();
@@ -297,7 +300,7 @@ mod tests {
         }
         let sunk = sink.end().await.unwrap();
         let whole = stream::iter([Ok(Bytes::from(vec![7; 7_000_010]))]);
-        let at_once = ingest(&storage, Claims::none(Algorithm::Crc32), whole).await.unwrap();
+        let at_once = ingest(&storage, ExpectedBody::none(Algorithm::Crc32), whole).await.unwrap();
         assert_eq!((sunk.size, sunk.md5, &sunk.checksum), (7_000_010, at_once.md5, &at_once.checksum));
         drop((sunk, at_once));
         writing.end();
@@ -308,9 +311,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (storage, writing) = Storage::open(folder.path()).unwrap();
         for (length, code) in [("4", "EntityTooLarge"), ("5", ""), ("6", "IncompleteBody")] {
-            let claims = claims(&[("content-length", length)]).unwrap();
+            let expected = expected(&[("content-length", length)]).unwrap();
             let body = stream::iter([Ok(Bytes::from_static(b"he")), Ok(Bytes::from_static(b"llo"))]);
-            let ingested = ingest(&storage, claims, body).await;
+            let ingested = ingest(&storage, expected, body).await;
             assert_eq!(
                 ingested.err().map(|error| error.code().as_str().to_owned()).unwrap_or_default(),
                 code

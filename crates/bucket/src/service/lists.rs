@@ -1,8 +1,8 @@
-//! ListObjects, first and second version: one page, read from one snapshot.
+//! ListObjects, versions 1 and 2: one page, read from one snapshot.
 //!
-//! [`walk`] goes over the rows in the order of the keys' bytes. A key with the delimiter behind the prefix stands for all
-//! keys that share it up to there: they become one common prefix, and the walk goes on behind the last of them without
-//! looking at them. So a page costs what it holds, however much lies below its prefixes.
+//! [`walk`] visits the rows in the order of the keys' bytes. A key with the delimiter after the prefix stands for all
+//! keys with the same part up to there. They become one common prefix, and the walk continues after the last of them
+//! without reading them. So the cost of a page depends on its entries, not on the number of keys under its prefixes.
 
 use s3s::dto::*;
 
@@ -12,29 +12,29 @@ use crate::answer::{Answer, invalid_argument, time, unreadable};
 use crate::records::{self, decode, key};
 use crate::storage::{Snapshot, Table, View};
 
-/// Keys and common prefixes of one page, together.
+/// The largest number of keys and common prefixes on a page together.
 pub(super) const PAGE: usize = 1000;
 
-/// What is listed.
+/// The parameters of a listing.
 #[derive(Clone, Debug)]
 pub(super) struct Query {
     pub(super) bucket: String,
     pub(super) prefix: String,
-    /// Empty: none.
+    /// The delimiter; empty for none.
     pub(super) delimiter: String,
     pub(super) most: usize,
 }
 
-/// A page.
+/// A page of a listing.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Page {
     pub(super) objects: Vec<(String, records::Object)>,
     pub(super) prefixes: Vec<String>,
-    /// The first key that the next page may hold; none when this page is the last.
+    /// The first key that the next page may hold, or `None` if this page is the last.
     pub(super) next: Option<Vec<u8>>,
 }
 
-/// One page, from the first key that is not below `from`.
+/// Returns a page, starting at the first key that is not less than `from`.
 pub(super) fn walk(snapshot: &Snapshot, query: &Query, from: &[u8]) -> Answer<Page> {
     let mut page = Page::default();
     if query.most == 0 {
@@ -68,7 +68,7 @@ pub(super) fn walk(snapshot: &Snapshot, query: &Query, from: &[u8]) -> Answer<Pa
     }
 }
 
-/// A key up to the first delimiter behind the prefix, and with it.
+/// Returns a key up to and including the first delimiter after the prefix.
 fn common_prefix<'a>(name: &'a [u8], prefix: &str, delimiter: &str) -> Option<&'a [u8]> {
     if delimiter.is_empty() {
         return None;
@@ -78,7 +78,7 @@ fn common_prefix<'a>(name: &'a [u8], prefix: &str, delimiter: &str) -> Option<&'
     name.get(..prefix.len() + at + delimiter.len())
 }
 
-/// The first key behind all that begin with this.
+/// Returns the first key after all keys that begin with `prefix`.
 fn behind(prefix: &[u8]) -> Option<Vec<u8>> {
     let last = prefix.iter().rposition(|byte| *byte != u8::MAX)?;
     let mut next = prefix[..=last].to_vec();
@@ -86,7 +86,7 @@ fn behind(prefix: &[u8]) -> Option<Vec<u8>> {
     Some(next)
 }
 
-/// Where a listing after a key begins. A key within a common prefix stands for all of it.
+/// Returns the start of a listing after a key. A key within a common prefix stands for all of it.
 pub(super) fn after(name: &str, prefix: &str, delimiter: &str) -> Vec<u8> {
     let within =
         name.starts_with(prefix).then(|| common_prefix(name.as_bytes(), prefix, delimiter)).flatten();
@@ -101,7 +101,10 @@ fn text(bytes: &[u8]) -> String {
 }
 
 impl Service {
-    pub(super) async fn objects_listed_v2(&self, input: ListObjectsV2Input) -> Answer<ListObjectsV2Output> {
+    pub(super) async fn handle_list_objects_v2(
+        &self,
+        input: ListObjectsV2Input,
+    ) -> Answer<ListObjectsV2Output> {
         let most = most(input.max_keys, "max-keys")?;
         let prefix = input.prefix.clone().unwrap_or_default();
         let delimiter = input.delimiter.clone().unwrap_or_default();
@@ -133,7 +136,7 @@ impl Service {
         })
     }
 
-    pub(super) async fn objects_listed(&self, input: ListObjectsInput) -> Answer<ListObjectsOutput> {
+    pub(super) async fn handle_list_objects(&self, input: ListObjectsInput) -> Answer<ListObjectsOutput> {
         let most = most(input.max_keys, "max-keys")?;
         let prefix = input.prefix.clone().unwrap_or_default();
         let delimiter = input.delimiter.clone().unwrap_or_default();
@@ -142,7 +145,7 @@ impl Service {
         let page = self.page(query, from).await?;
         let url = encoding(input.encoding_type.as_ref())?;
         let shown = |text: String| if url { encoded(&text) } else { text };
-        // S3 names the next marker only where the last key alone may not say it.
+        // S3 returns the next marker only if the last key alone may not determine it.
         let last_key = page.objects.last().map(|(name, _)| name);
         let last = last_key.into_iter().chain(page.prefixes.last()).max().cloned();
         let next = last.filter(|_| {
@@ -163,7 +166,7 @@ impl Service {
         })
     }
 
-    /// Reads a page where it may block.
+    /// Reads a page on a thread that may block.
     pub(super) async fn page(&self, query: Query, from: Vec<u8>) -> Answer<Page> {
         let snapshot = self.snapshot()?;
         self.bucket(&snapshot, &query.bucket)?;
@@ -172,7 +175,7 @@ impl Service {
     }
 }
 
-/// A page's size, as it was asked for.
+/// Returns the page size for a request.
 pub(super) fn most(asked: Option<i32>, name: &str) -> Answer<usize> {
     match asked {
         None => Ok(PAGE),
@@ -182,7 +185,7 @@ pub(super) fn most(asked: Option<i32>, name: &str) -> Answer<usize> {
     }
 }
 
-/// Whether names are to be encoded.
+/// Returns whether names must be encoded.
 pub(super) fn encoding(asked: Option<&EncodingType>) -> Answer<bool> {
     match asked.map(EncodingType::as_str) {
         None => Ok(false),
@@ -191,7 +194,7 @@ pub(super) fn encoding(asked: Option<&EncodingType>) -> Answer<bool> {
     }
 }
 
-/// A name as `encoding-type=url` has it: what is no letter, digit or one of `-_.~/*` by its bytes.
+/// Encodes a name for `encoding-type=url`: all bytes except letters, digits and `-_.~/*`.
 pub(super) fn encoded(name: &str) -> String {
     const KEPT: percent_encoding::AsciiSet = percent_encoding::NON_ALPHANUMERIC
         .remove(b'-')
@@ -209,7 +212,7 @@ pub(super) fn prefixes(prefixes: Vec<String>, url: bool) -> Vec<CommonPrefix> {
 }
 
 fn contents(objects: Vec<(String, records::Object)>, with_owner: bool, url: bool) -> Vec<Object> {
-    let told = |(name, object): (String, records::Object)| Object {
+    let to_output = |(name, object): (String, records::Object)| Object {
         checksum_algorithm: object
             .checksum
             .as_ref()
@@ -223,10 +226,10 @@ fn contents(objects: Vec<(String, records::Object)>, with_owner: bool, url: bool
         size: i64::try_from(object.size).ok(),
         storage_class: Some(ObjectStorageClass::from_static(ObjectStorageClass::STANDARD)),
     };
-    objects.into_iter().map(told).collect()
+    objects.into_iter().map(to_output).collect()
 }
 
-/// A position as clients carry it: opaque to them.
+/// Encodes a position as an opaque token.
 fn token(position: &[u8]) -> String {
     base64_simd::URL_SAFE_NO_PAD.encode_to_string(position)
 }

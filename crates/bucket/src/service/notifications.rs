@@ -1,4 +1,5 @@
-//! Which changes of a bucket are told: Put- and GetBucketNotificationConfiguration, for the one queue that there is.
+//! PutBucketNotificationConfiguration and GetBucketNotificationConfiguration: the rules that select changes with
+//! events. There is a single queue.
 
 use s3s::dto::*;
 
@@ -9,10 +10,10 @@ use crate::answer::{Answer, invalid_argument, not_implemented};
 use crate::records::{self, set};
 use crate::storage::{Kind, Table};
 
-/// Rules of one bucket: S3's.
-const MOST_RULES: usize = 100;
+/// S3's limit on the rules of a bucket.
+const MAX_RULES: usize = 100;
 
-/// Events that happen here. Others of S3's are accepted in a pattern only.
+/// The events that the store sends. S3's other events are accepted in a pattern only.
 const EVENTS: [&str; 5] = [
     "s3:ObjectCreated:Put",
     "s3:ObjectCreated:Copy",
@@ -22,7 +23,7 @@ const EVENTS: [&str; 5] = [
 ];
 
 impl Service {
-    pub(super) async fn notifications_set(
+    pub(super) async fn handle_put_bucket_notification(
         &self,
         input: PutBucketNotificationConfigurationInput,
     ) -> Answer<PutBucketNotificationConfigurationOutput> {
@@ -36,8 +37,8 @@ impl Service {
             return Err(not_implemented("a notification of a function or a topic"));
         }
         let queues = configuration.queue_configurations.unwrap_or_default();
-        if queues.len() > MOST_RULES {
-            return Err(invalid_argument(format!("at most {MOST_RULES} notifications")));
+        if queues.len() > MAX_RULES {
+            return Err(invalid_argument(format!("at most {MAX_RULES} notifications")));
         }
         let rules = queues.into_iter().enumerate().map(|(number, queue)| rule(number, queue));
         let rules = rules.collect::<Answer<Vec<_>>>()?;
@@ -50,12 +51,12 @@ impl Service {
         Ok(PutBucketNotificationConfigurationOutput {})
     }
 
-    pub(super) fn notifications_told(
+    pub(super) fn handle_get_bucket_notification(
         &self,
         input: &GetBucketNotificationConfigurationInput,
     ) -> Answer<GetBucketNotificationConfigurationOutput> {
         let rules = self.bucket(&self.snapshot()?, &input.bucket)?.notifications;
-        let told = |rule: records::Notification| {
+        let to_output = |rule: records::Notification| {
             let filters = [(FilterRuleName::PREFIX, rule.prefix), (FilterRuleName::SUFFIX, rule.suffix)];
             let filters: Vec<_> = filters
                 .into_iter()
@@ -75,7 +76,7 @@ impl Service {
                 queue_arn: rule.queue,
             }
         };
-        let queues: Vec<_> = rules.into_iter().map(told).collect();
+        let queues: Vec<_> = rules.into_iter().map(to_output).collect();
         Ok(GetBucketNotificationConfigurationOutput {
             queue_configurations: (!queues.is_empty()).then_some(queues),
             ..GetBucketNotificationConfigurationOutput::default()

@@ -1,25 +1,26 @@
-//! An object as rows: how it comes, how it goes, and what is told of it.
+//! An object as rows: storing it, removing it, and its events.
 
 use redb::StorageError;
 use s3s::dto::Timestamp;
 
 use super::conditions::WriteConditions;
 use super::ingest::Content;
-use super::{Caller, Stop};
+use super::{Caller, ChangeError};
 use crate::answer::{Answer, invalid_request, no_such_bucket};
 use crate::records::{self, Body, Bucket, Event, Headers, Moment, Object, find, key, release, set};
 use crate::storage::{Batch, Bodies, Table, View};
 
-/// Of a key, in UTF-8.
+/// The longest key in bytes of UTF-8.
 pub(crate) const LONGEST_KEY: usize = 1024;
 
-/// Of the user's metadata, names and values together.
-const MOST_METADATA: usize = 2 * 1024;
+/// The largest user metadata in bytes, names and values together.
+const MAX_METADATA: usize = 2 * 1024;
 
-/// Events that wait for their listener. A change that would make one more is refused, so that none is lost.
-const MOST_WAITING: u64 = 1_000_000;
+/// The largest number of events that wait for the listener. A change that would exceed it is refused, so that
+/// no event is lost.
+const MAX_WAITING: u64 = 1_000_000;
 
-/// Where an object goes, and on what terms.
+/// The destination of an object, with the conditions of the write.
 pub(crate) struct Destination {
     pub(crate) bucket: String,
     pub(crate) key: String,
@@ -27,13 +28,13 @@ pub(crate) struct Destination {
     pub(crate) caller: Caller,
 }
 
-/// The bucket, as changes see it.
-pub(crate) fn bucket(batch: &Batch<'_>, name: &str) -> Result<Bucket, Stop> {
+/// Returns the bucket as seen by the change.
+pub(crate) fn bucket(batch: &Batch<'_>, name: &str) -> Result<Bucket, ChangeError> {
     find(batch, Table::Buckets, name.as_bytes())?.ok_or_else(|| no_such_bucket().into())
 }
 
-/// Checks all that may refuse an object at its destination; gives what is there and the bucket.
-pub(crate) fn admit(batch: &Batch<'_>, to: &Destination) -> Result<(Bucket, Option<Object>), Stop> {
+/// Checks everything that may refuse an object at its destination. Returns the bucket and the existing object.
+pub(crate) fn admit(batch: &Batch<'_>, to: &Destination) -> Result<(Bucket, Option<Object>), ChangeError> {
     let bucket = bucket(batch, &to.bucket)?;
     let existing = find(batch, Table::Objects, &key::object(&to.bucket, to.key.as_bytes()))?;
     to.conditions.check(existing.as_ref())?;
@@ -43,7 +44,7 @@ pub(crate) fn admit(batch: &Batch<'_>, to: &Destination) -> Result<(Bucket, Opti
     Ok((bucket, existing))
 }
 
-/// Keeps a body; gives where.
+/// Stores a body. Returns its location.
 pub(crate) fn keep(batch: &mut Batch<'_>, ids: &Bodies, content: Content) -> Result<Body, StorageError> {
     match content {
         Content::Row(bytes) => {
@@ -60,7 +61,7 @@ pub(crate) fn keep(batch: &mut Batch<'_>, ids: &Bodies, content: Content) -> Res
     }
 }
 
-/// Puts an object in the place of what was there, and tells of it.
+/// Puts an object in place of an existing one, and writes the event.
 pub(crate) fn place(
     batch: &mut Batch<'_>,
     ids: &Bodies,
@@ -76,7 +77,7 @@ pub(crate) fn place(
     tell(batch, ids, (&to.bucket, &bucket), &to.key, event, Some(object), &to.caller)
 }
 
-/// Writes the event of a change, if the bucket's rules want it.
+/// Writes the event of a change, if a rule of the bucket selects it.
 pub(crate) fn tell(
     batch: &mut Batch<'_>,
     ids: &Bodies,
@@ -104,9 +105,9 @@ pub(crate) fn tell(
     Ok(())
 }
 
-/// Whether so many events wait that no more may.
+/// Returns whether the limit of waiting events is reached.
 fn is_full(waiting: u64) -> bool {
-    waiting >= MOST_WAITING
+    waiting >= MAX_WAITING
 }
 
 impl records::Notification {
@@ -122,7 +123,7 @@ impl records::Notification {
     }
 }
 
-/// A key that can be one.
+/// Checks that a key is valid.
 pub(crate) fn check_key(key: &str) -> Answer<()> {
     if key.is_empty() {
         return Err(invalid_request("The key is empty."));
@@ -133,19 +134,19 @@ pub(crate) fn check_key(key: &str) -> Answer<()> {
     Ok(())
 }
 
-/// The headers of an object to be, within S3's limit.
+/// Checks that the metadata of a new object is within S3's limit.
 pub(crate) fn check_metadata(headers: &Headers) -> Answer<()> {
     let size: usize = headers.metadata.iter().map(|(name, value)| name.len() + value.len()).sum();
-    if size > MOST_METADATA {
+    if size > MAX_METADATA {
         return Err(s3s::s3_error!(
             MetadataTooLarge,
-            "Your metadata headers exceed the maximum allowed metadata size ({MOST_METADATA} bytes)"
+            "Your metadata headers exceed the maximum allowed metadata size ({MAX_METADATA} bytes)"
         ));
     }
     Ok(())
 }
 
-/// The date of an `Expires` header, as it is kept.
+/// Formats the date of an `Expires` header for storing.
 pub(crate) fn expires(date: Option<&Timestamp>) -> Option<String> {
     let mut text = Vec::new();
     date?.format(s3s::dto::TimestampFormat::HttpDate, &mut text).ok()?;

@@ -1,4 +1,4 @@
-//! GetObject, HeadObject, GetObjectAttributes.
+//! GetObject, HeadObject and GetObjectAttributes.
 
 use std::ops::Range as Bytes;
 
@@ -18,27 +18,27 @@ use crate::answer::{Answer, coded, invalid_argument, invalid_request, time};
 use crate::checksum::{Algorithm, Checksum as StoredChecksum};
 use crate::records::{Layout, Object};
 
-/// What of an object is asked for.
+/// The part of an object that a request selects.
 struct Selection {
     bytes: Bytes<u64>,
-    /// Not the whole: answered 206 with its place.
+    /// The selection is not the whole object: the answer is 206 with a range.
     partial: bool,
-    /// Of which part.
+    /// The index of the selected part.
     part: Option<usize>,
 }
 
-/// What is told of an object that is read.
-struct Told {
+/// The data of an object for the headers of a response.
+struct ReadInfo {
     object: Object,
     selection: Selection,
     checksum: Option<StoredChecksum>,
-    /// Of the whole object, also where the checksum is a part's.
+    /// The checksum kind of the whole object, also if `checksum` is that of a part.
     checksum_kind: Option<ChecksumType>,
     parts_count: Option<i32>,
 }
 
-impl Told {
-    /// What of the object is asked for, and the checksum of that if it is asked for too.
+impl ReadInfo {
+    /// Selects the requested part of the object, and its checksum if that was requested too.
     fn new(
         object: &Object,
         layout: Option<&Layout>,
@@ -64,10 +64,10 @@ impl Told {
     }
 }
 
-/// The answer of a Get or a Head, which have these headers in common.
+/// Makes the response of a Get or a Head, which share these headers.
 macro_rules! answer {
-    ($output:ident, $told:expr $(, $field:ident: $value:expr)*) => {{
-        let Told { object, selection, checksum, checksum_kind, parts_count } = $told;
+    ($output:ident, $info:expr $(, $field:ident: $value:expr)*) => {{
+        let ReadInfo { object, selection, checksum, checksum_kind, parts_count } = $info;
         let sum = checksum.as_ref();
         $output {
             accept_ranges: Some("bytes".to_owned()),
@@ -96,7 +96,7 @@ macro_rules! answer {
 }
 
 impl Service {
-    pub(super) async fn object_read(
+    pub(super) async fn handle_get_object(
         &self,
         req: S3Request<GetObjectInput>,
     ) -> S3Result<S3Response<GetObjectOutput>> {
@@ -112,12 +112,12 @@ impl Service {
         conditions.check(&held.object).map_err(|error| with_validators(error, &held.object))?;
         let mode = input.checksum_mode.as_ref();
         let range = input.range.filter(|_| is_of_range(range_holds.as_ref(), &held.object));
-        let told = Told::new(&held.object, held.layout.as_ref(), range, input.part_number, mode)?;
-        let body = StreamingBlob::new(held.bytes(&self.storage, told.selection.bytes.clone())?);
-        Ok(S3Response::new(answer!(GetObjectOutput, told, body: Some(body))))
+        let info = ReadInfo::new(&held.object, held.layout.as_ref(), range, input.part_number, mode)?;
+        let body = StreamingBlob::new(held.bytes(&self.storage, info.selection.bytes.clone())?);
+        Ok(S3Response::new(answer!(GetObjectOutput, info, body: Some(body))))
     }
 
-    pub(super) fn object_looked_at(
+    pub(super) fn handle_head_object(
         &self,
         req: &S3Request<HeadObjectInput>,
     ) -> S3Result<S3Response<HeadObjectOutput>> {
@@ -137,10 +137,10 @@ impl Service {
         };
         let mode = input.checksum_mode.as_ref();
         let range = input.range.filter(|_| is_of_range(req.headers.get(IF_RANGE), &object));
-        let told = Told::new(&object, layout.as_ref(), range, input.part_number, mode)?;
-        let partial = told.selection.partial;
-        let mut response = S3Response::new(answer!(HeadObjectOutput, told));
-        // Those of a Get are `s3s`' to put there.
+        let info = ReadInfo::new(&object, layout.as_ref(), range, input.part_number, mode)?;
+        let partial = info.selection.partial;
+        let mut response = S3Response::new(answer!(HeadObjectOutput, info));
+        // For a Get, `s3s` adds these headers.
         let expires = input.response_expires.as_ref().and_then(|date| expires(Some(date)));
         for (name, value) in [
             (CACHE_CONTROL, input.response_cache_control.as_ref()),
@@ -159,14 +159,14 @@ impl Service {
         Ok(response)
     }
 
-    pub(super) fn object_attributes(
+    pub(super) fn handle_get_object_attributes(
         &self,
         input: &GetObjectAttributesInput,
     ) -> Answer<GetObjectAttributesOutput> {
         let snapshot = self.snapshot()?;
         let object = self.object(&snapshot, &input.bucket, &input.key)?;
         let layout = self.layout(&snapshot, &object)?;
-        // One header may name several, with commas.
+        // One header may name several attributes, separated by commas.
         let asked = |name: &str| {
             let mut named =
                 input.object_attributes.iter().flat_map(|attribute| attribute.as_str().split(','));
@@ -253,7 +253,7 @@ fn select(
                     "Part number must be an integer between 1 and 10000, inclusive",
                 ));
             }
-            // The n-th part of those that the object has, whatever numbers they were uploaded with.
+            // The n-th of the object's parts, whatever numbers they were uploaded with.
             let part = usize::try_from(number - 1).unwrap_or_default();
             let Some(layout) = layout else {
                 return match part {
@@ -268,7 +268,8 @@ fn select(
     }
 }
 
-/// Whether a range is of the object as it is: `If-Range` names an entity tag or a date, and otherwise the whole is meant.
+/// Returns whether a range applies. `If-Range` names an entity tag or a date; if it differs, the
+/// whole object is sent.
 fn is_of_range(condition: Option<&HeaderValue>, object: &Object) -> bool {
     let Some(condition) = condition else { return true };
     let condition = condition.to_str().unwrap_or_default().trim();
@@ -292,7 +293,7 @@ fn not_satisfiable(size: u64) -> S3Error {
     error
 }
 
-/// What a 304 tells besides.
+/// Adds the headers of a 304.
 fn with_validators(mut error: S3Error, object: &Object) -> S3Error {
     if *error.code() == S3ErrorCode::NotModified {
         let mut headers = HeaderMap::new();

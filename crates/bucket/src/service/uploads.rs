@@ -1,4 +1,5 @@
-//! Uploads in parts. A part is a body of its own; completing an upload writes the list of its parts, and copies nothing.
+//! Uploads in parts. A part is a body of its own. Completing an upload writes the list of its
+//! parts, and copies nothing.
 
 use hyper::StatusCode;
 use hyper::header::HOST;
@@ -8,10 +9,10 @@ use s3s::{S3Request, s3_error};
 
 use super::conditions::{ReadConditions, WriteConditions};
 use super::copies::source;
-use super::ingest::{Claims, Ingested, etag, ingest, is_too_large};
+use super::ingest::{ExpectedBody, Ingested, etag, ingest, is_too_large};
 use super::objects::{Destination, admit, bucket, check_key, check_metadata, expires, keep, place};
 use super::writes::{of, stored_encoding};
-use super::{Caller, Service, Stop};
+use super::{Caller, ChangeError, Service};
 use crate::answer::{Answer, coded, invalid_argument, invalid_request, no_such_upload, time, unreadable};
 use crate::checksum::{self, Algorithm};
 use crate::records::{
@@ -19,17 +20,17 @@ use crate::records::{
 };
 use crate::storage::{Batch, Kind, Table, View};
 
-/// Part numbers begin at 1: S3's.
-const MOST_PARTS: i32 = 10_000;
+/// S3's largest part number. The first is 1.
+const MAX_PARTS: i32 = 10_000;
 
-/// Every part but the last: S3's.
+/// S3's limit on the size of every part but the last.
 const SMALLEST_PART: u64 = 5 * 1024 * 1024;
 
-/// Random bytes of an upload's id.
+/// The number of random bytes in an upload's id.
 const ID_BYTES: usize = 16;
 
 impl Service {
-    pub(super) async fn upload_created(
+    pub(super) async fn handle_create_multipart_upload(
         &self,
         req: S3Request<CreateMultipartUploadInput>,
     ) -> Answer<CreateMultipartUploadOutput> {
@@ -89,7 +90,7 @@ impl Service {
         })
     }
 
-    /// The upload, or `NoSuchUpload`.
+    /// Returns the upload, or `NoSuchUpload`.
     pub(super) fn upload(&self, bucket: &str, object_key: &str, id: &str) -> Answer<records::Upload> {
         let snapshot = self.snapshot()?;
         self.bucket(&snapshot, bucket)?;
@@ -98,7 +99,10 @@ impl Service {
             .ok_or_else(no_such_upload)
     }
 
-    pub(super) async fn part_uploaded(&self, req: S3Request<UploadPartInput>) -> Answer<UploadPartOutput> {
+    pub(super) async fn handle_upload_part(
+        &self,
+        req: S3Request<UploadPartInput>,
+    ) -> Answer<UploadPartOutput> {
         let input = req.input;
         let number = part_number(input.part_number)?;
         let upload = self.upload(&input.bucket, &input.key, &input.upload_id)?;
@@ -115,10 +119,12 @@ impl Service {
                 named.map_or("null", Algorithm::name).to_ascii_lowercase()
             )));
         }
-        // A client that named no algorithm may check its parts by another one: they are then digested anew at the end.
-        let claims = Claims::of_request(&req.headers, req.trailing_headers.clone(), upload.algorithm)?;
+        // A client that named no algorithm may check its parts by another one. They are then digested
+        // again at the end.
+        let expected =
+            ExpectedBody::of_request(&req.headers, req.trailing_headers.clone(), upload.algorithm)?;
         let body = input.body.ok_or_else(|| s3_error!(IncompleteBody, "a body is missing"))?;
-        let ingested = ingest(&self.storage, claims, body).await?;
+        let ingested = ingest(&self.storage, expected, body).await?;
         let part = self.part_kept(input.bucket, input.key, input.upload_id, number, ingested).await?;
         let sum = Some(&part.checksum);
         Ok(UploadPartOutput {
@@ -132,7 +138,7 @@ impl Service {
         })
     }
 
-    pub(super) async fn part_copied(
+    pub(super) async fn handle_upload_part_copy(
         &self,
         req: S3Request<UploadPartCopyInput>,
     ) -> Answer<UploadPartCopyOutput> {
@@ -158,7 +164,7 @@ impl Service {
             return Err(s3_error!(EntityTooLarge, "Your proposed upload exceeds the maximum allowed size"));
         }
         let bytes = held.bytes(&self.storage, range)?;
-        let ingested = ingest(&self.storage, Claims::none(upload.algorithm), bytes).await?;
+        let ingested = ingest(&self.storage, ExpectedBody::none(upload.algorithm), bytes).await?;
         if ingested.size != length {
             return Err(s3_error!(InternalError, "the source's body is shorter than it should be"));
         }
@@ -176,7 +182,7 @@ impl Service {
         Ok(UploadPartCopyOutput { copy_part_result: Some(result), ..UploadPartCopyOutput::default() })
     }
 
-    /// Keeps a part in the place of an earlier one of its number.
+    /// Stores a part, in place of an earlier one with its number.
     async fn part_kept(
         &self,
         bucket: String,
@@ -203,7 +209,7 @@ impl Service {
         keep.await
     }
 
-    pub(super) async fn upload_completed(
+    pub(super) async fn handle_complete_multipart_upload(
         &self,
         req: S3Request<CompleteMultipartUploadInput>,
     ) -> Answer<CompleteMultipartUploadOutput> {
@@ -214,7 +220,7 @@ impl Service {
         conditions.check_form()?;
         let listed = input.multipart_upload.and_then(|upload| upload.parts).unwrap_or_default();
         let wanted = wanted(listed)?;
-        let claims = [
+        let expected = [
             (Algorithm::Crc32, input.checksum_crc32),
             (Algorithm::Crc32c, input.checksum_crc32c),
             (Algorithm::Crc64nvme, input.checksum_crc64nvme),
@@ -223,7 +229,7 @@ impl Service {
         ];
         let claim = Claim {
             kind: input.checksum_type.map(|kind| kind.as_str().to_owned()),
-            value: claims.into_iter().find_map(|(algorithm, value)| value.map(|value| (algorithm, value))),
+            value: expected.into_iter().find_map(|(algorithm, value)| value.map(|value| (algorithm, value))),
             size: input.mpu_object_size.map(|size| u64::try_from(size).unwrap_or_default()),
         };
         let (bucket, object_key) = (input.bucket.clone(), input.key.clone());
@@ -234,7 +240,7 @@ impl Service {
             let there = admit(batch, &to)?;
             let row = key::upload(&to.bucket, &to.key, &id);
             let Some(upload) = find::<records::Upload>(batch, Table::Uploads, &row)? else {
-                // Completed before, and still what is there: the answer may have been lost.
+                // The upload was completed before and the object is still there: the response may have been lost.
                 let existing = there.1;
                 return existing
                     .filter(|object| object.upload.as_ref() == Some(&id))
@@ -281,7 +287,7 @@ impl Service {
         })
     }
 
-    pub(super) async fn upload_aborted(
+    pub(super) async fn handle_abort_multipart_upload(
         &self,
         input: AbortMultipartUploadInput,
     ) -> Answer<AbortMultipartUploadOutput> {
@@ -298,21 +304,21 @@ impl Service {
     }
 }
 
-/// A part as the client lists it.
+/// A part in the client's list.
 struct Wanted {
     number: u16,
     etag: String,
     checksum: Option<(Algorithm, String)>,
 }
 
-/// What the client says of the whole.
+/// The client's data about the whole object.
 struct Claim {
     kind: Option<String>,
     value: Option<(Algorithm, String)>,
     size: Option<u64>,
 }
 
-/// An object made of parts.
+/// An object composed of parts.
 struct Chosen {
     layout: Layout,
     size: u64,
@@ -320,10 +326,10 @@ struct Chosen {
     checksum: Option<checksum::Checksum>,
 }
 
-/// The client's list: at least one part, in ascending order.
+/// Parses the client's list: at least one part, in ascending order.
 fn wanted(listed: Vec<CompletedPart>) -> Answer<Vec<Wanted>> {
-    if listed.is_empty() || listed.len() > usize::try_from(MOST_PARTS).unwrap_or_default() {
-        return Err(s3_error!(MalformedXML, "You must specify between 1 and {MOST_PARTS} parts"));
+    if listed.is_empty() || listed.len() > usize::try_from(MAX_PARTS).unwrap_or_default() {
+        return Err(s3_error!(MalformedXML, "You must specify between 1 and {MAX_PARTS} parts"));
     }
     let mut wanted: Vec<Wanted> = Vec::with_capacity(listed.len());
     for part in listed {
@@ -350,14 +356,14 @@ fn wanted(listed: Vec<CompletedPart>) -> Answer<Vec<Wanted>> {
     Ok(wanted)
 }
 
-/// Finds the parts that the client lists, and checks what it says of them.
+/// Finds the parts in the client's list, and checks the client's data about them.
 fn choose(
     batch: &Batch<'_>,
     id: &str,
     upload: &records::Upload,
     wanted: &[Wanted],
     claim: &Claim,
-) -> Result<Chosen, Stop> {
+) -> Result<Chosen, ChangeError> {
     let mut parts = Vec::with_capacity(wanted.len());
     let mut md5s = Vec::with_capacity(wanted.len());
     let last = wanted.last().map_or(0, |part| part.number);
@@ -427,7 +433,7 @@ fn choose(
     Ok(Chosen { layout: Layout { parts }, size, etag, checksum })
 }
 
-/// S3's ETag of parts: the MD5 of their MD5s, and how many they are.
+/// Computes S3's ETag of parts: the MD5 of their MD5s, and their number.
 fn combined(md5s: &[String]) -> String {
     use s3s::crypto::{Checksum as _, Md5};
     let digit = |byte: u8| {
@@ -443,12 +449,12 @@ fn combined(md5s: &[String]) -> String {
 }
 
 fn part_number(number: i32) -> Answer<u16> {
-    u16::try_from(number).ok().filter(|_| (1..=MOST_PARTS).contains(&number)).ok_or_else(|| {
-        invalid_argument(format!("Part number must be an integer between 1 and {MOST_PARTS}, inclusive"))
+    u16::try_from(number).ok().filter(|_| (1..=MAX_PARTS).contains(&number)).ok_or_else(|| {
+        invalid_argument(format!("Part number must be an integer between 1 and {MAX_PARTS}, inclusive"))
     })
 }
 
-/// `bytes=first-last`, both there and within the source.
+/// Parses `bytes=first-last`. Both must be given and lie within the source.
 fn copied_range(range: &str, size: u64) -> Answer<std::ops::Range<u64>> {
     let malformed = || {
         invalid_argument(
@@ -470,7 +476,7 @@ fn copied_range(range: &str, size: u64) -> Answer<std::ops::Range<u64>> {
     Ok(first..last + 1)
 }
 
-/// Where the object is that a request is about, as the client called it.
+/// Returns the URL of the request's object, with the host that the client used.
 fn location(req: &S3Request<CompleteMultipartUploadInput>) -> String {
     let named = req.headers.get(HOST).and_then(|host| host.to_str().ok());
     let host = named.or(req.uri.authority().map(Authority::as_str)).unwrap_or_default();
@@ -483,7 +489,7 @@ mod tests {
 
     #[test]
     fn the_etag_of_parts_is_as_s3_makes_it() {
-        // Of two parts, the MD5s of "a" and "b": as Python's hashlib has it.
+        // The MD5s of "a" and "b"; the result was computed with Python's hashlib.
         let parts =
             ["0cc175b9c0f1b6a831c399e269772661", "92eb5ffee6ae2fec3ad71c777531578f"].map(str::to_owned);
         assert_eq!(combined(&parts), "96e024ba2074fe77e8e965ba43a704be-2");

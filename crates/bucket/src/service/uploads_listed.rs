@@ -12,7 +12,7 @@ use crate::records::{self, decode, key};
 use crate::storage::{Table, View};
 
 impl Service {
-    pub(super) fn parts_listed(&self, input: &ListPartsInput) -> Answer<ListPartsOutput> {
+    pub(super) fn handle_list_parts(&self, input: &ListPartsInput) -> Answer<ListPartsOutput> {
         let most = most(input.max_parts, "max-parts")?;
         let after = input.part_number_marker.unwrap_or_default();
         let upload = self.upload(&input.bucket, &input.key, &input.upload_id)?;
@@ -66,8 +66,8 @@ impl Service {
         })
     }
 
-    /// Uploads in the order of their keys, and of their ids within one. Common prefixes are as in a listing of objects.
-    pub(super) fn uploads_listed(
+    /// Lists uploads in the order of keys, and of ids within a key. Common prefixes are as in a listing of objects.
+    pub(super) fn handle_list_multipart_uploads(
         &self,
         input: &ListMultipartUploadsInput,
     ) -> Answer<ListMultipartUploadsOutput> {
@@ -100,11 +100,11 @@ impl Service {
                 *name < *key_marker || (name == key_marker && (id_marker.is_empty() || *id <= *id_marker));
             let end = (!delimiter.is_empty()).then(|| name[prefix.len()..].find(delimiter)).flatten();
             let rolled = end.map(|end| name[..prefix.len() + end + delimiter.len()].to_owned());
-            let told = rolled.as_ref().is_some_and(|rolled| {
+            let already_listed = rolled.as_ref().is_some_and(|rolled| {
                 common.last() == Some(rolled)
                     || (!key_marker.is_empty() && key_marker.starts_with(rolled.as_str()))
             });
-            if seen || told {
+            if seen || already_listed {
                 continue;
             }
             if uploads.len() + common.len() == most {

@@ -1,6 +1,6 @@
-//! ListObjectVersions: buckets here keep one version of each object, the one that S3 calls `null`.
+//! ListObjectVersions: a bucket of this store keeps one version of each object, which S3 calls `null`.
 //!
-//! Clients that empty a bucket ask for its versions, whether it keeps any or not.
+//! Clients that empty a bucket request its versions, whether it keeps any or not.
 
 use s3s::dto::*;
 
@@ -10,11 +10,11 @@ use super::lists::{Query, after, encoded, encoding, most, prefixes};
 use crate::answer::{Answer, invalid_argument, time};
 use crate::records;
 
-/// The version of an object that was put while its bucket kept none.
+/// The version id of an object that was put into a bucket without versions.
 const ONLY: &str = "null";
 
 impl Service {
-    pub(super) async fn versions_listed(
+    pub(super) async fn handle_list_object_versions(
         &self,
         input: ListObjectVersionsInput,
     ) -> Answer<ListObjectVersionsOutput> {
@@ -25,7 +25,7 @@ impl Service {
         if marker.is_empty() && input.version_id_marker.as_ref().is_some_and(|version| !version.is_empty()) {
             return Err(invalid_argument("A version-id marker cannot be specified without a key marker."));
         }
-        // After its only version comes the next key, whether the version is named or not.
+        // After the only version comes the next key, whether the marker names a version or not.
         let from = after(&marker, &prefix, &delimiter);
         let query = Query { bucket: input.bucket.clone(), prefix, delimiter, most };
         let page = self.page(query, from).await?;

@@ -5,7 +5,7 @@ use s3s::dto::*;
 use s3s::{S3Request, s3_error};
 
 use super::conditions::WriteConditions;
-use super::ingest::{Claims, etag, ingest};
+use super::ingest::{ExpectedBody, etag, ingest};
 use super::objects::{Destination, admit, check_key, check_metadata, expires, keep, place};
 use super::{Caller, Service};
 use crate::answer::{Answer, invalid_argument};
@@ -15,12 +15,12 @@ use crate::records::{Headers, Moment, Object};
 use crate::storage::Kind;
 
 impl Service {
-    pub(super) async fn object_put(&self, req: S3Request<PutObjectInput>) -> Answer<PutObjectOutput> {
+    pub(super) async fn handle_put_object(&self, req: S3Request<PutObjectInput>) -> Answer<PutObjectOutput> {
         let is_form = req.extensions.get::<Gate>().is_some_and(|gate| gate.operation() == "PostObject");
-        let claims = if is_form {
-            Claims::of_request(&said_in_form(&req.input)?, None, Algorithm::Crc64nvme)?
+        let expected = if is_form {
+            ExpectedBody::of_request(&said_in_form(&req.input)?, None, Algorithm::Crc64nvme)?
         } else {
-            Claims::of_request(&req.headers, req.trailing_headers.clone(), Algorithm::Crc64nvme)?
+            ExpectedBody::of_request(&req.headers, req.trailing_headers.clone(), Algorithm::Crc64nvme)?
         };
         let caller = Caller::of(&req);
         let input = req.input;
@@ -39,7 +39,7 @@ impl Service {
         check_metadata(&headers)?;
         self.bucket_exists(&input.bucket)?;
         let body = input.body.ok_or_else(|| s3_error!(IncompleteBody, "a body is missing"))?;
-        let ingested = ingest(&self.storage, claims, body).await?;
+        let ingested = ingest(&self.storage, expected, body).await?;
 
         let (size, etag, checksum) = (ingested.size, etag(ingested.md5), ingested.checksum);
         let to = Destination { bucket: input.bucket, key: input.key, conditions, caller };
@@ -68,7 +68,7 @@ impl Service {
     }
 }
 
-/// What the fields of a browser's form say of its file, as a put says it in headers.
+/// Converts the fields of a browser's form to the headers of a put.
 fn said_in_form(input: &PutObjectInput) -> Answer<HeaderMap> {
     let length = input.content_length.unwrap_or_default().to_string();
     let algorithm = input.checksum_algorithm.as_ref().map(|name| name.as_str().to_owned());
@@ -91,7 +91,7 @@ fn said_in_form(input: &PutObjectInput) -> Answer<HeaderMap> {
     Ok(said)
 }
 
-/// `aws-chunked` is how the body travelled, not what it is.
+/// Returns the encoding without `aws-chunked`, which describes the transfer and not the content.
 pub(super) fn stored_encoding(encoding: Option<String>) -> Option<String> {
     let encoding = encoding?;
     let kept: Vec<&str> = encoding
@@ -102,7 +102,7 @@ pub(super) fn stored_encoding(encoding: Option<String>) -> Option<String> {
     (!kept.is_empty()).then(|| kept.join(", "))
 }
 
-/// The checksum's value, if it is of this algorithm.
+/// Returns the checksum's value if it has this algorithm.
 pub(super) fn of(checksum: Option<&Checksum>, algorithm: Algorithm) -> Option<String> {
     checksum.filter(|checksum| checksum.algorithm == algorithm).map(|checksum| checksum.value.clone())
 }

@@ -1,8 +1,8 @@
-//! Bodies that are files: too large for the database, each under an id that is never used again.
+//! Bodies in files: too large for the database, each under an id that is never used again.
 //!
-//! A body is written and synced before any row refers to it, and its file goes after the last row that did. A kill in
-//! between leaves files that belong to nobody; [`Bodies::collect`] removes those of earlier runs. Whoever reads a body pins
-//! it first: a pinned file outlives its row until the reading ends.
+//! A body is written and synced before a row refers to it, and its file is deleted after the last row that did. A
+//! kill in between leaves files without a row; [`Bodies::collect`] removes those of earlier runs. A reader pins a
+//! body first: a pinned file outlives its row until the reader is done.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -16,29 +16,30 @@ use serde::{Deserialize, Serialize};
 
 use crate::private;
 
-/// Ids of one run: its number above, a counter below.
+/// The bits of an id for the counter. The number of the run is above them.
 const COUNTER_BITS: u32 = 40;
 
-/// Files of one folder: few enough to be listed at once, enough that a batch seldom spans several folders.
+/// The bits of an id for the files of a folder: few enough to list at once, enough that a batch
+/// seldom spans several folders.
 const FOLDER_BITS: u32 = 12;
 
-/// A body's name: no two of a folder are the same, ever.
+/// The id of a body, which is unique in the store for all time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(transparent)]
 pub(crate) struct BodyId(u64);
 
 impl BodyId {
-    /// The key of its row.
+    /// Returns the key of the body's row.
     pub(crate) fn key(self) -> [u8; 8] {
         self.0.to_be_bytes()
     }
 
-    /// The run that gave it.
+    /// Returns the run that assigned the id.
     pub(super) fn run(self) -> u64 {
         self.0 >> COUNTER_BITS
     }
 
-    /// The id in the key of a row.
+    /// Reads the id from the key of a row.
     pub(crate) fn of_key(key: &[u8]) -> Option<Self> {
         key.try_into().ok().map(|key| Self(u64::from_be_bytes(key)))
     }
@@ -53,21 +54,21 @@ pub(crate) struct Bodies {
     pins: Mutex<BTreeMap<BodyId, Pinned>>,
 }
 
-/// How many read a body, and whether its row is gone.
+/// The number of readers of a body, and whether its row is gone.
 #[derive(Debug, Default)]
 struct Pinned {
     readers: usize,
     doomed: bool,
 }
 
-/// Bodies that stay while this lives.
+/// A guard that keeps bodies until it is dropped.
 #[derive(Debug)]
 pub(crate) struct Pins {
     bodies: Arc<Bodies>,
     ids: Vec<BodyId>,
 }
 
-/// A body's file until a row refers to it: it goes when dropped.
+/// The file of a body without a row. Dropping it deletes the file.
 #[derive(Debug)]
 pub(crate) struct NewBody {
     id: BodyId,
@@ -81,20 +82,20 @@ impl Bodies {
         Self { folder, run, next: AtomicU64::new(0), pins: Mutex::default() }
     }
 
-    /// A fresh id.
+    /// Returns a new id.
     pub(crate) fn id(&self) -> BodyId {
         BodyId(self.run << COUNTER_BITS | self.next.fetch_add(1, Ordering::Relaxed))
     }
 
-    /// Where a body's file is.
+    /// Returns the path of a body's file.
     pub(crate) fn path(&self, id: BodyId) -> PathBuf {
         self.folder.join(format!("{:013x}", id.0 >> FOLDER_BITS)).join(format!("{:016x}", id.0))
     }
 
-    /// A fresh, empty file.
+    /// Creates a new, empty file.
     ///
     /// # Errors
-    /// The system's.
+    /// Returns the error of the system.
     pub(crate) fn create(&self) -> io::Result<NewBody> {
         let id = self.id();
         let path = self.path(id);
@@ -112,8 +113,8 @@ impl Bodies {
         Ok(NewBody { id, path, file: Some(file), kept: false })
     }
 
-    /// Keeps these files, if they are still there, while the pins live. Rows that are read after this and refer to them
-    /// prove that they are.
+    /// Keeps these files while the pins live, if they still exist. They do if a row that refers to them is
+    /// read after this call.
     pub(crate) fn pin(self: &Arc<Self>, ids: Vec<BodyId>) -> Pins {
         let mut pins = self.pins();
         for id in &ids {
@@ -127,8 +128,8 @@ impl Bodies {
         self.pins.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Removes a file that no row refers to, when nobody reads it any more. One that cannot be removed now is found at the
-    /// next start.
+    /// Removes a file to which no row refers, as soon as it has no reader. If the removal fails, the
+    /// next start removes it.
     pub(super) fn remove(&self, id: BodyId) {
         if let Some(pinned) = self.pins().get_mut(&id) {
             pinned.doomed = true;
@@ -137,10 +138,10 @@ impl Bodies {
         let _ = fs::remove_file(self.path(id));
     }
 
-    /// Every file, with its id; `None` for one that has no body's name.
+    /// Lists every file with its id, or `None` if its name is not that of a body.
     ///
     /// # Errors
-    /// The system's.
+    /// Returns the error of the system.
     pub(crate) fn files(&self) -> io::Result<Vec<(PathBuf, Option<BodyId>)>> {
         let mut files = Vec::new();
         for folder in fs::read_dir(&self.folder)? {
@@ -155,10 +156,10 @@ impl Bodies {
         Ok(files)
     }
 
-    /// Removes the files of earlier runs that belong to nobody; says how many.
+    /// Removes the files of earlier runs to which no row refers. Returns their number.
     ///
     /// # Errors
-    /// The system's, or `belongs`'s.
+    /// Returns the error of the system, or of `belongs`.
     pub(super) fn collect<E: From<io::Error>>(
         &self,
         mut belongs: impl FnMut(BodyId) -> Result<bool, E>,
@@ -184,7 +185,7 @@ impl Bodies {
                 .and_then(|name| u64::from_str_radix(name.to_str()?, 16).ok())
                 .is_some_and(|number| number >> (COUNTER_BITS - FOLDER_BITS) < self.run);
             if !left && of_earlier_run {
-                // Not empty after all is no harm.
+                // This fails if the folder is not empty after all, which is harmless.
                 let _ = fs::remove_dir(&folder);
             }
         }
@@ -197,10 +198,10 @@ impl NewBody {
         self.id
     }
 
-    /// Appends bytes.
+    /// Appends bytes to the body.
     ///
     /// # Errors
-    /// The system's; a full disk among them.
+    /// Returns the error of the system, such as a full disk.
     pub(crate) fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         match &mut self.file {
             Some(file) => file.write_all(bytes),
@@ -208,10 +209,10 @@ impl NewBody {
         }
     }
 
-    /// Brings the content to the disk. Its name follows with the batch that adopts it.
+    /// Syncs the content to disk. The batch that adopts the body syncs its name.
     ///
     /// # Errors
-    /// The system's.
+    /// Returns the error of the system.
     pub(crate) fn finish(&mut self) -> io::Result<()> {
         self.file.take().map_or(Ok(()), |file| file.sync_all())
     }
@@ -242,10 +243,10 @@ impl Drop for NewBody {
     }
 }
 
-/// Brings the names of these bodies to the disk.
+/// Syncs the names of these bodies to disk.
 ///
 /// # Errors
-/// The system's.
+/// Returns the error of the system.
 pub(super) fn sync_names(bodies: &[NewBody]) -> io::Result<()> {
     let folders: BTreeSet<&Path> = bodies.iter().map(|body| parent(&body.path)).collect();
     folders.into_iter().try_for_each(sync_folder)
@@ -305,7 +306,7 @@ mod tests {
         let (orphan, owned) = (written(&first), written(&first));
         let second = Bodies::new(folder.path().to_owned(), 2);
         let fresh = written(&second);
-        // Where another request is just about to make a file.
+        // Another request is about to create a file in this folder.
         let empty = second.path(BodyId(second.id().0 + (1 << (COUNTER_BITS - FOLDER_BITS))));
         let empty = empty.parent().unwrap();
         fs::create_dir_all(empty).unwrap();

@@ -1,7 +1,7 @@
-//! A database whose rows have mostly gone is written anew, into a smaller file.
+//! Compaction: a database from which most rows were removed is copied to a smaller file.
 //!
-//! The copy is complete and on the disk before it takes the place of the database; its sums follow. Whoever reads the database
-//! at that time goes on reading the old file.
+//! The copy is complete and on disk before it replaces the database; its sums follow. A reader of the database
+//! continues to read the old file.
 
 use std::io;
 
@@ -12,13 +12,13 @@ use super::sums::Sums;
 use super::table::{Batch, Snapshot, Table, View};
 use crate::{Error, Result};
 
-/// Smaller databases are left alone.
+/// The size up to which a database is not compacted.
 pub(super) const SMALLEST: u64 = 4 * 1024 * 1024;
 
-/// Bytes of rows in one transaction of the copy.
+/// The size of the rows in one transaction of the copy.
 const BATCH_BYTES: usize = 8 * 1024 * 1024;
 
-/// Copies the rows into a fresh database that holds the changes up to entry `applied`, and puts it in the place of the old one.
+/// Copies the rows to a new database, which holds the changes up to entry `applied`, and replaces the old one by it.
 pub(super) fn compact(folder: &Folder, rows: &Snapshot, applied: u64) -> Result<Open> {
     let failed =
         |source: redb::Error| Error::Storage { path: folder.path().to_owned(), source: source.into() };
@@ -32,21 +32,21 @@ pub(super) fn compact(folder: &Folder, rows: &Snapshot, applied: u64) -> Result<
     match copied {
         Ok(fresh) => replace(folder).map(|()| fresh),
         Err(error) => {
-            // It may hold much of the room that is missing.
+            // The copy may take much of the missing space.
             discard(folder).map_err(Error::file(folder.new_database()))?;
             Err(error)
         }
     }
 }
 
-/// A fresh database beside the old one.
+/// Creates a new database beside the old one.
 pub(super) fn begin(folder: &Folder) -> Result<Open> {
     let path = folder.new_database();
     let failed =
         |source: redb::Error| Error::Storage { path: folder.path().to_owned(), source: source.into() };
     let disk = || {
         discard(folder)?;
-        // In this order: sums without a new database are those of one that took its place.
+        // The order matters: sums without a new database mean that the database has already replaced the old one.
         let rows = folder.open(&path)?;
         sync_folder(folder.path())?;
         let sums = Sums::open(folder.open(&folder.new_sums())?, &*rows)?;
@@ -74,7 +74,7 @@ fn copy(from: &Snapshot, to: &Open, applied: u64) -> Result<(), redb::Error> {
     to.commit_durably(transaction, applied)
 }
 
-/// Puts the new database in the place of the old one.
+/// Replaces the old database by the new one.
 pub(super) fn replace(folder: &Folder) -> Result<()> {
     let swap = || {
         folder.rename(&folder.new_database(), &folder.database())?;
@@ -94,7 +94,8 @@ pub(super) fn recover(folder: &Folder) -> Result<()> {
     settle().map_err(Error::file(folder.new_database()))
 }
 
-/// Removes the new database. Its sums go first: without it they would be taken for those of one that took its place.
+/// Removes the new database. Its sums go first: alone, they would mean that the database has already
+/// replaced the old one.
 pub(super) fn discard(folder: &Folder) -> io::Result<()> {
     folder.remove(&folder.new_sums())?;
     folder.remove(&folder.new_database())

@@ -1,7 +1,7 @@
-//! Random histories whose files are damaged at random: after a start either everything acknowledged is there, byte for byte, or
-//! the start, or the read of a damaged row, is refused; and nothing was deleted.
+//! Random histories whose files are damaged at random. After a start either everything acknowledged is there, byte
+//! for byte, or the start, or the read of a damaged row, is refused. Nothing is ever deleted.
 //!
-//! `RAYFOLD_BUCKET_DAMAGES=20000 cargo test -p rayfold-bucket --lib storage::damage` runs it at length.
+//! `RAYFOLD_BUCKET_DAMAGES=20000 cargo test -p rayfold-bucket --lib storage::damage` runs the long version.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,7 +12,7 @@ use fastrand::Rng;
 use super::*;
 use crate::Error;
 
-/// Damages of one history.
+/// The number of damages per history.
 const PER_HISTORY: usize = 40;
 
 /// The files of a folder, by name.
@@ -31,7 +31,7 @@ fn write(folder: &Path, files: &Files) {
     }
 }
 
-/// The files that a kill leaves after random changes, and what they must hold.
+/// Returns the files that a kill leaves after random changes, and the rows that they must hold.
 async fn history(rng: &mut Rng) -> (Files, Model) {
     let folder = tempfile::tempdir().unwrap();
     let mut model = Model::new();
@@ -66,7 +66,7 @@ async fn changes(rng: &mut Rng, storage: &Storage, model: &mut Model) {
     }
 }
 
-/// Damages one file; says how.
+/// Damages one file. Returns a description.
 fn damage(rng: &mut Rng, files: &mut Files) -> String {
     let name = ["journal", "journal", "database", "database", "database.sums"][rng.usize(0..5)];
     let Some(bytes) = files.get_mut(name) else { return String::new() };
@@ -105,7 +105,7 @@ fn damage(rng: &mut Rng, files: &mut Files) -> String {
     }
 }
 
-/// Whether everything could be read; what could must be right.
+/// Returns whether everything could be read. Everything that could must be right.
 fn judge(storage: &Storage, model: &Model) -> bool {
     let mut whole = true;
     for number in 0..60 {
@@ -153,7 +153,7 @@ async fn damage_is_noticed_wherever_it_is_and_deletes_nothing() {
                             "{how}: {name} was changed"
                         );
                     }
-                    // Nothing is gone: with the one file that was damaged in its first state everything is there.
+                    // Nothing is lost: after the damaged file is restored, everything is there.
                     let name = how.split(':').next().unwrap();
                     fs::write(folder.path().join(name), &undamaged[name]).unwrap();
                     let opened = Storage::open(folder.path());
@@ -168,7 +168,7 @@ async fn damage_is_noticed_wherever_it_is_and_deletes_nothing() {
                         true => whole += 1,
                         false => partly += 1,
                     }
-                    // Whatever it comes to, the thread that writes lives.
+                    // Whatever the outcome, the writing thread must survive.
                     let change = storage
                         .change(Kind::Grows, |batch| batch.put(Table::Objects, b"films\099", b""))
                         .await;
@@ -182,7 +182,7 @@ async fn damage_is_noticed_wherever_it_is_and_deletes_nothing() {
     assert!(refused > 0 && whole > 0);
 }
 
-/// A database that took an older root for the newest one would read pages that were used again.
+/// A database that mistook an older root for the newest would read pages that were reused.
 #[tokio::test]
 async fn no_flipped_bit_of_the_databases_header_hides_rows() {
     let every = std::env::var("RAYFOLD_BUCKET_DAMAGES").map_or(29, |_| 1);
@@ -193,7 +193,7 @@ async fn no_flipped_bit_of_the_databases_header_hides_rows() {
             break (files, model);
         }
     };
-    // As after a stop, too: then the journal has nothing that the database lacks.
+    // The second case is after a stop: the journal has nothing that the database lacks.
     for stopped in [false, true] {
         if stopped {
             let folder = tempfile::tempdir().unwrap();

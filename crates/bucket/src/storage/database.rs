@@ -1,12 +1,12 @@
-//! The database's file, what it does on a full disk, and how it is opened again after the disk failed.
+//! The file of the database, its behaviour on a full disk, and reopening it after a disk failure.
 //!
-//! After one failed write redb answers nothing more, not even reads. So a disk that is only full is kept from it: what
-//! finds no room stays in memory ([`Overlay`]), and whoever writes asks ([`Open::has_room`]) before it acknowledges
-//! anything. After another failure the file as it is on the disk is sound, and is opened once more: [`Disk`] takes no lock
-//! (the folder's does), and the old handle is dead before the new one reads.
+//! After one failed write redb answers nothing more, not even reads. So a full disk is hidden from it: data without
+//! space stays in memory ([`Overlay`]), and a writer checks [`Open::has_room`] before it acknowledges anything. After
+//! another failure the file on disk is consistent, and is opened again. [`Disk`] takes no lock (the folder has one),
+//! and the old handle is dead before the new one reads.
 //!
-//! Each block that is read is compared with its checksum ([`Sums`]). One that differs is an error of the read, and the
-//! database has to be opened anew after it.
+//! Each block that is read is compared with its checksum ([`Sums`]). If it differs, the read fails, and the
+//! database must be reopened.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -21,26 +21,26 @@ use super::sums::{BLOCK_BYTES, Sums};
 use super::table::{Batch, Snapshot, Table, View};
 use crate::error::report;
 
-/// Pages kept in memory. Most of a store of a hundred thousand objects.
+/// The size of the page cache in bytes. It holds most of a store of a hundred thousand objects.
 const CACHE_BYTES: usize = 64 * 1024 * 1024;
 
-/// The row of the last journal entry that the database holds durably.
+/// The row with the number of the last journal entry that the database holds durably.
 const APPLIED: &[u8] = b"applied";
 
-/// The open database.
+/// An open database.
 pub(super) struct Open {
     database: Database,
     disk: Arc<Disk>,
 }
 
 impl Open {
-    /// Opens or makes the database; gives the number of the journal's last entry that it holds. `verify` reads all of it and
-    /// compares the database's own checksums.
+    /// Opens or creates the database. Returns the number of the last journal entry that it holds. `verify` reads the
+    /// whole file and compares the database's own checksums.
     pub(super) fn at(disk: Arc<Disk>, verify: bool) -> Result<(Self, u64), redb::Error> {
         Self::with_cache(disk, verify, CACHE_BYTES)
     }
 
-    /// The same, with so many bytes of pages kept in memory.
+    /// Opens the database with a page cache of this many bytes.
     pub(super) fn with_cache(
         disk: Arc<Disk>,
         verify: bool,
@@ -66,7 +66,7 @@ impl Open {
         Ok(self.database.begin_read()?.list_tables()?.next().is_some())
     }
 
-    /// The rows as they are now.
+    /// Returns the current rows.
     pub(super) fn snapshot(&self) -> Result<Snapshot, redb::Error> {
         use redb::ReadableDatabase;
         Snapshot::of(&self.database.begin_read()?)
@@ -76,18 +76,18 @@ impl Open {
         Ok(self.database.begin_write()?)
     }
 
-    /// Makes a transaction visible; it is on the disk when the journal says so.
+    /// Makes a transaction visible. The journal makes it durable.
     pub(super) fn commit(&self, mut transaction: redb::WriteTransaction) -> Result<(), redb::Error> {
         transaction.set_durability(Durability::None)?;
         Ok(transaction.commit()?)
     }
 
-    /// The rows as they are, which can be read also when the store opens the database anew.
+    /// Returns the current rows. They stay readable also if the store reopens the database.
     pub(super) fn kept_snapshot(self: Arc<Self>) -> Result<Snapshot, redb::Error> {
         Ok(self.snapshot()?.keeping(self))
     }
 
-    /// Brings everything to the disk, in a state that opens at once; it is there if [`Open::has_room`].
+    /// Syncs everything to disk in a state that opens at once. It is on disk only if [`Open::has_room`].
     pub(super) fn commit_durably(
         &self,
         mut transaction: redb::WriteTransaction,
@@ -100,7 +100,7 @@ impl Open {
         Ok(transaction.commit()?)
     }
 
-    /// Whether less than half of the file is in use. Reads the whole tree.
+    /// Returns whether less than half of the file is in use. Reads the whole tree.
     pub(super) fn is_sparse(&self) -> Result<bool, redb::Error> {
         let transaction = self.begin()?;
         let stats = transaction.stats()?;
@@ -109,28 +109,29 @@ impl Open {
         Ok(used.saturating_mul(2) < self.file_bytes()?)
     }
 
-    /// The length of the file.
+    /// Returns the length of the file.
     pub(super) fn file_bytes(&self) -> Result<u64, redb::Error> {
         Ok(self.disk.file.len()?)
     }
 
-    /// Whether all that was written found room, now at the latest.
+    /// Writes the data that had no space so far, and returns whether everything is written.
     pub(super) fn has_room(&self) -> bool {
         self.disk.settle().is_ok()
     }
 
-    /// From now on nothing reaches the file through this handle.
+    /// Stops all writes to the file through this handle.
     pub(super) fn kill(&self) {
         self.disk.dead.store(true, Ordering::Release);
     }
 
-    /// Where a block was read that does not match its checksum: then this handle answers nothing more.
+    /// Returns the position of a block that did not match its checksum. If there is one, this
+    /// handle answers nothing more.
     pub(super) fn damage(&self) -> Option<u64> {
         self.disk.damage()
     }
 }
 
-/// The database's file and its sums.
+/// The file of the database and its sums.
 #[derive(Debug)]
 pub(super) struct Disk {
     file: Arc<dyn Medium>,
@@ -142,14 +143,14 @@ pub(super) struct Disk {
     held: AtomicBool,
 }
 
-/// What found no room on the disk: pages that hide those of the file, and the length that the file should have.
+/// The data without space on disk: pages that replace those of the file, and the length that the file should have.
 #[derive(Debug, Default)]
 struct Overlay {
     length: Option<u64>,
     pages: BTreeMap<u64, Box<[u8]>>,
 }
 
-/// Of the overlay.
+/// The size of a page of the overlay.
 const PAGE_BYTES: u64 = BLOCK_BYTES as u64;
 
 impl Overlay {
@@ -165,26 +166,26 @@ impl Disk {
         Arc::new(Self { file, sums: Mutex::new(sums), dead, overlay, damage, lenient, held })
     }
 
-    /// Keeps what is written in memory, until [`Disk::release`]: a start that is refused changes nothing.
+    /// Keeps writes in memory until [`Disk::release`], so that a refused start changes nothing.
     ///
     /// # Errors
-    /// The system's.
+    /// Returns the error of the system.
     pub(super) fn hold(&self) -> io::Result<()> {
         self.overlay().length = Some(self.file.len()?);
         self.held.store(true, Ordering::Release);
         Ok(())
     }
 
-    /// Writes what was held, now or, on a full disk, when there is room.
+    /// Writes the held data, now or, on a full disk, once there is space.
     ///
     /// # Errors
-    /// The system's.
+    /// Returns the error of the system.
     pub(super) fn release(&self) -> io::Result<()> {
         self.held.store(false, Ordering::Release);
         self.settle()
     }
 
-    /// Whether damaged blocks are read as they are.
+    /// Sets whether damaged blocks are returned as they are.
     pub(super) fn set_lenient(&self, lenient: bool) {
         self.lenient.store(lenient, Ordering::Release);
     }
@@ -197,12 +198,12 @@ impl Disk {
         self.sums.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Where a block was read that does not match its checksum.
+    /// Returns the position of a block that did not match its checksum.
     pub(super) fn damage(&self) -> Option<u64> {
         *self.damage.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Compares the whole blocks of what was read.
+    /// Compares the whole blocks that were read.
     fn compare(&self, offset: u64, bytes: &[u8]) -> io::Result<()> {
         if self.lenient.load(Ordering::Acquire) {
             return Ok(());
@@ -222,7 +223,7 @@ impl Disk {
         Ok(())
     }
 
-    /// Writes what found no room, if there is some now. The first page says which of the others count: it comes last.
+    /// Writes the data that had no space, if there is some now. The first page refers to the others, so it is written last.
     fn settle(&self) -> io::Result<()> {
         let mut overlay = self.overlay();
         if overlay.is_empty() {
@@ -250,16 +251,16 @@ impl Disk {
         Ok(())
     }
 
-    /// Brings what was written to the disk.
+    /// Syncs the written data to disk.
     fn sync(&self) -> io::Result<()> {
         self.file.sync()?;
         self.sums().header_synced();
         Ok(())
     }
 
-    /// Brings the sum of a header to the disk that will be written.
+    /// Syncs the sum of a header to disk before the header is written.
     fn announce(&self, header: &[u8]) -> io::Result<()> {
-        // Else there would be three headers that may be on the disk, for two sums.
+        // Otherwise there would be three headers that may be on disk, for two sums.
         let synced = self.sums().is_header_synced();
         if !synced {
             self.sync()?;
@@ -269,7 +270,7 @@ impl Disk {
         sums.save()
     }
 
-    /// A page as the file has it; zeros beyond its end.
+    /// Returns a page as it is in the file, with zeros beyond the end.
     fn page(&self, page: u64) -> io::Result<Box<[u8]>> {
         let mut bytes = vec![0; PAGE_BYTES as usize].into_boxed_slice();
         self.file.read_padded(&mut bytes, page * PAGE_BYTES)?;
@@ -288,7 +289,7 @@ impl Handle {
         Ok(&*self.0.file)
     }
 
-    /// The first block, which holds the header.
+    /// Returns the first block, which holds the header.
     fn first(&self) -> io::Result<Vec<u8>> {
         let mut first = vec![0; BLOCK_BYTES];
         let length = self.len()?.min(PAGE_BYTES) as usize;
@@ -296,7 +297,7 @@ impl Handle {
         Ok(first)
     }
 
-    /// Reads what was written, on the disk or in memory.
+    /// Reads the written data, from disk or memory.
     fn view(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
         let file = self.file()?;
         let end = offset + out.len() as u64;
@@ -349,8 +350,8 @@ impl StorageBackend for Handle {
         let file = self.file()?;
         let saved = self.0.settle().and_then(|()| self.0.sums().save());
         match saved {
-            // The disk keeps its older state, which is whole, and the journal what came after it. Where only the sums found no
-            // room, what is written next must wait for them.
+            // The disk keeps its older, consistent state, and the journal the later changes. If only the sums had no
+            // space, further writes must wait for them.
             Err(failed) if is_full(&failed) => {
                 let mut overlay = self.0.overlay();
                 if overlay.length.is_none() {
@@ -399,7 +400,7 @@ impl StorageBackend for Handle {
             done => done?,
         }
         drop(overlay);
-        // The database writes whole blocks, but for its header.
+        // The database writes whole blocks, except for its header.
         let mut partial = vec![0; BLOCK_BYTES];
         for (page, within, of_page) in pages(offset, data.len()) {
             let block = usize::try_from(page).map_err(io::Error::other)?;
@@ -416,14 +417,14 @@ impl StorageBackend for Handle {
     }
 }
 
-/// The whole blocks in a range of bytes. The database reads no other ones, but for its header in the first.
+/// Splits a range of bytes into whole blocks. The database reads only those, except for its header in the first.
 fn blocks(offset: u64, bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
     let first = usize::try_from(offset.div_ceil(BLOCK_BYTES as u64)).unwrap_or(usize::MAX);
     let skipped = (first as u64 * BLOCK_BYTES as u64 - offset) as usize;
     (first..).zip(bytes.get(skipped..).unwrap_or_default().chunks_exact(BLOCK_BYTES))
 }
 
-/// The pages that a range of bytes touches: each with its bytes in the range, and those of the page.
+/// Returns the pages that a range of bytes touches, each with its bytes within the range and within the page.
 fn pages(offset: u64, length: usize) -> impl Iterator<Item = (u64, Range<usize>, Range<usize>)> {
     let end = offset + length as u64;
     (offset / PAGE_BYTES..end.div_ceil(PAGE_BYTES)).map(move |page| {
@@ -435,7 +436,7 @@ fn pages(offset: u64, length: usize) -> impl Iterator<Item = (u64, Range<usize>,
     })
 }
 
-/// Whether there was no room.
+/// Returns whether the error means that there was no space.
 pub(super) fn is_full(error: &io::Error) -> bool {
     use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
     matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
@@ -468,7 +469,7 @@ mod tests {
         handle.set_len(8192).unwrap();
         handle.write(0, &[1; 4096]).unwrap();
         handle.write(4096, &[4; 4096]).unwrap();
-        // From here on as on a full disk.
+        // From here on it behaves as on a full disk.
         disk.overlay().length = Some(8192);
         handle.set_len(20_000).unwrap();
         handle.write(4000, &[2; 200]).unwrap();
@@ -506,7 +507,7 @@ mod tests {
         assert!(kept.iter().all(|byte| *byte == 7) && cut.iter().all(|byte| *byte == 0));
     }
 
-    /// A full disk is waited for; any other fault of it is told at once.
+    /// Only a full disk is waited for. Any other error is reported at once.
     #[test]
     fn faults_other_than_a_full_disk_are_told() {
         assert!(is_full(&full()) && !is_full(&io::Error::other("a fault")));

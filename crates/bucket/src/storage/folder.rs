@@ -1,4 +1,4 @@
-//! The folder: whose it is, which format it has, and that one process at a time uses it.
+//! The folder of a store: its format, and the lock by which only one process uses it.
 
 use std::fs::{self, File, TryLockError};
 use std::io;
@@ -9,11 +9,11 @@ use super::bodies::sync_folder;
 use super::medium::{Files, Medium, SystemFiles};
 use crate::{Error, Result, private};
 
-/// The newest format that is read here, and the one that is written. Format 1 had no sums beside the database, and a journal
-/// without a header.
+/// The newest format, which is also the one written. Format 1 had no sums beside the database, and a
+/// journal without a header.
 const FORMAT: u32 = 2;
 
-/// The file that says that a folder is a bucket's data, and its format.
+/// The file that marks a folder as a store, with its format.
 const MARKER: &str = "rayfold-bucket";
 
 /// The marker while it is written.
@@ -21,14 +21,14 @@ const NEW_MARKER: &str = "rayfold-bucket.new";
 
 const LOCK: &str = "lock";
 
-/// What may lie in a fresh folder: its lock, the marker of a start that was killed, and what the store's owner or the file
-/// system keeps beside it.
+/// The names that a new folder may contain: its lock, the marker of a start that was killed, and files that the owner
+/// or the file system keeps there.
 const HARMLESS: [&str; 4] = [LOCK, NEW_MARKER, "credentials.json", "lost+found"];
 
-/// Where MinIO keeps its own data, in the folder that it was given.
+/// The places where MinIO keeps its own data in its folder.
 const MINIO: [&str; 2] = [".minio.sys", "objects/.minio.sys"];
 
-/// A folder that is ours, until dropped.
+/// A folder that this process has locked until it is dropped.
 #[derive(Debug)]
 pub(super) struct Folder {
     path: PathBuf,
@@ -38,7 +38,7 @@ pub(super) struct Folder {
 }
 
 impl Folder {
-    /// Takes the folder; makes it when missing. Then it is closed to other users.
+    /// Takes the folder, which is created if missing, and removes the access of other users.
     ///
     /// # Errors
     /// [`Error::DataInUse`], [`Error::NotOurs`], [`Error::Newer`], [`Error::File`].
@@ -49,7 +49,7 @@ impl Folder {
     /// Takes a folder that a store has used before.
     ///
     /// # Errors
-    /// Those of [`Folder::take`]; [`Error::NotOurs`] also for a folder without a store.
+    /// The errors of [`Folder::take`], and [`Error::NotOurs`] for a folder without a store.
     pub(super) fn take_existing(path: &Path) -> Result<Self> {
         if recognise(path)? == Found::Nothing {
             return Err(Error::NotOurs { path: path.to_owned(), what: "nothing of a store".to_owned() });
@@ -57,7 +57,7 @@ impl Folder {
         Self::take(path)
     }
 
-    /// The same, with other files for the rows.
+    /// Takes the folder with another implementation of the files of rows.
     pub(super) fn take_with(path: &Path, files: Arc<dyn Files>) -> Result<Self> {
         let found = recognise(path)?;
         private::make(path).map_err(Error::file(path))?;
@@ -87,7 +87,7 @@ impl Folder {
         Ok(folder)
     }
 
-    /// Writes that the folder is ours, and of this format.
+    /// Writes the marker with the current format.
     fn mark(&self) -> Result<()> {
         let (marker, new) = (self.path.join(MARKER), self.path.join(NEW_MARKER));
         fs::write(&new, format!("format {FORMAT}\n"))
@@ -97,39 +97,39 @@ impl Folder {
             .map_err(Error::file(&marker))
     }
 
-    /// Whether an earlier version wrote it, and it was not brought to this format yet.
+    /// Returns whether an earlier version wrote the folder and it was not upgraded yet.
     pub(super) fn is_of_format_1(&self) -> bool {
         self.format == 1
     }
 
-    /// All in it is of this format now.
+    /// Marks the folder as upgraded to the current format.
     pub(super) fn upgraded(&mut self) -> Result<()> {
         self.mark()?;
         self.format = FORMAT;
         Ok(())
     }
 
-    /// The error that a file of it is damaged.
+    /// Makes the error that a file of the folder is damaged.
     pub(super) fn damaged(&self, file: &Path, offset: Option<u64>, what: impl Into<String>) -> Error {
         Error::Damaged { folder: self.path.clone(), file: file.to_owned(), offset, what: what.into() }
     }
 
-    /// Opens a file of rows, made when missing.
+    /// Opens a file of rows, which is created if missing.
     pub(super) fn open(&self, file: &Path) -> io::Result<Arc<dyn Medium>> {
         self.files.open(file)
     }
 
-    /// Gives a file of rows another name, in the place of one that has it; on the disk on return.
+    /// Renames a file of rows, replacing an existing one. It is on disk on return.
     pub(super) fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
         self.files.rename(from, to)
     }
 
-    /// Removes a file of rows if it is there.
+    /// Removes a file of rows if it exists.
     pub(super) fn remove(&self, file: &Path) -> io::Result<()> {
         self.files.remove(file)
     }
 
-    /// Whether a file of rows is there.
+    /// Returns whether a file of rows exists.
     pub(super) fn has(&self, file: &Path) -> bool {
         self.files.exists(file)
     }
@@ -142,12 +142,12 @@ impl Folder {
         self.path.join("database")
     }
 
-    /// A database that is being written, to take the place of the other one.
+    /// Returns the path of a new database that is to replace the current one.
     pub(super) fn new_database(&self) -> PathBuf {
         self.path.join("database.new")
     }
 
-    /// Its sums.
+    /// Returns the path of the sums of the new database.
     pub(super) fn new_sums(&self) -> PathBuf {
         self.path.join("database.new.sums")
     }
@@ -168,11 +168,11 @@ impl Folder {
 #[derive(PartialEq, Eq)]
 enum Found {
     Nothing,
-    /// Of this format.
+    /// A store of this format.
     Ours(u32),
 }
 
-/// Looks without touching anything.
+/// Examines the folder without changing anything.
 fn recognise(path: &Path) -> Result<Found> {
     let not_ours = |what: &str| Err(Error::NotOurs { path: path.to_owned(), what: what.to_owned() });
     let marker = path.join(MARKER);
@@ -183,7 +183,7 @@ fn recognise(path: &Path) -> Result<Found> {
                     Err(Error::Newer { path: path.to_owned(), found, known: FORMAT })
                 }
                 Some(found) => Ok(Found::Ours(found)),
-                // A kill on the very first start leaves the file empty.
+                // A kill during the very first start leaves the file empty.
                 None if text.is_empty() => Ok(Found::Nothing),
                 None => not_ours(&format!("a file {MARKER} of another kind")),
             };
@@ -205,7 +205,7 @@ fn recognise(path: &Path) -> Result<Found> {
     for entry in entries {
         let name = entry.map_err(Error::file(path))?.file_name();
         let shown = name.to_string_lossy();
-        // What a start that was killed before it wrote the marker leaves.
+        // A start that was killed before it wrote the marker leaves this.
         let ours =
             shown == "bodies" && fs::read_dir(path.join("bodies")).is_ok_and(|mut all| all.next().is_none());
         if !ours && !HARMLESS.contains(&shown.as_ref()) {
@@ -238,7 +238,7 @@ mod tests {
         let data = folder.path().join("new");
         drop(Folder::take(&data).unwrap());
         assert_eq!(mode(&data), 0o700);
-        // As an earlier version made it.
+        // An earlier version created the folder like this.
         set(&data);
         drop(Folder::take(&data).unwrap());
         assert_eq!(mode(&data), 0o700);

@@ -1,8 +1,9 @@
-//! Acknowledged changes that are not in the database's durable state yet: one entry a batch, in one file.
+//! The journal: acknowledged changes that are not yet in the database's durable state, one entry per
+//! batch, in one file.
 //!
-//! An entry is written and synced before its batch is acknowledged; the database follows without a sync of its own, and
-//! catches up when the journal has grown ([`Journal::is_long`]) or when nothing else is to be done. So a batch costs one
-//! sync, and what a kill leaves to be done at the next start is bounded.
+//! An entry is written and synced before its batch is acknowledged. The database follows without a sync of its own,
+//! and catches up when the journal has grown ([`Journal::is_long`]) or when there is nothing else to do. So a batch
+//! costs one sync, and the work after a kill is bounded.
 //!
 //! ```text
 //! header (32 bytes, twice)   magic, salt, number of the last entry before the journal, CRC-64 of these
@@ -10,12 +11,13 @@
 //! entry                      length, number, CRC-64 of the content, CRC-64 of salt and these (8 bytes each), content
 //! ```
 //!
-//! Each entry is on the disk before the next one is written. So an entry that cannot be read is a torn write, and was never
-//! acknowledged, only if it is the last one and the mark does not name it. Everything else is damage: the journal is left as
-//! it is, and [`read`] says where. The salt is random and never leaves the file, so that no client can put bytes into a body
-//! that look like an entry.
+//! Each entry is on disk before the next one is written. So an unreadable entry is a torn write, which was never
+//! acknowledged, only if it is the last one and the mark does not name it. Everything else is damage: the journal is
+//! left unchanged, and [`read`] reports the position. The salt is random and never leaves the file, so no client can
+//! put bytes into a body that look like an entry.
 //!
-//! Journals of format 1 have no header and no mark; their entries are length, number, CRC-64 of number and content, content.
+//! Journals of format 1 have no header and no mark. Their entries are length, number, CRC-64 of
+//! number and content, content.
 
 use std::io;
 use std::ops::Range;
@@ -28,61 +30,61 @@ use super::medium::Medium;
 /// The first bytes of a journal.
 const MAGIC: &[u8; 8] = b"rfjrnl2\n";
 
-/// Bytes of one copy of the header.
+/// The length of one copy of the header in bytes.
 const HEADER: usize = 32;
 
-/// Where the mark is: behind both copies of the header.
+/// The position of the mark: after both copies of the header.
 const MARK: usize = 2 * HEADER;
 
-/// Where the first entry is.
+/// The position of the first entry.
 const START: usize = MARK + 16;
 
-/// Beyond this length the database catches up: some thousand small changes, some ten milliseconds of replay.
+/// The length from which the database catches up: some thousand small changes, some ten milliseconds of replay.
 const LONG: u64 = 8 * 1024 * 1024;
 
-/// See the module.
+/// The journal, open for writing, see the module.
 pub(super) struct Journal {
     file: Arc<dyn Medium>,
     salt: u64,
     length: u64,
     last: u64,
-    /// Changes that nobody waits for: they go with the next entry.
+    /// Changes that no caller waits for. They are written with the next entry.
     deferred: Vec<u8>,
-    /// [`Journal::clear`] failed: it must succeed before anything is appended.
+    /// [`Journal::clear`] failed and must succeed before anything is appended.
     uncleared: bool,
 }
 
-/// A journal as it was read.
+/// The content of a journal that was read.
 pub(super) struct Contents {
     bytes: Vec<u8>,
     format: Format,
-    /// The number of the last entry before the journal; `None` where format 1 does not say.
+    /// The number of the last entry before the journal; `None` if format 1 does not contain it.
     pub(super) base: Option<u64>,
-    /// The entries that can be read, in order: number and place of the content.
+    /// The readable entries, in order: number and range of the content.
     entries: Vec<(u64, Range<usize>)>,
-    /// Where the last whole entry ends.
+    /// The end of the last whole entry.
     end: usize,
-    /// Damaged places. A torn end is none.
+    /// The damaged places, without a torn end.
     pub(super) faults: Vec<Fault>,
 }
 
 /// A place in the journal that cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Fault {
-    /// Its first byte.
+    /// The position of its first byte.
     pub(super) offset: u64,
-    /// What is wrong there.
+    /// A description of the damage.
     pub(super) what: String,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Format {
-    /// Of format 1.
+    /// The entries are of format 1.
     Plain,
     Salted(u64),
 }
 
-/// A whole entry.
+/// An entry that is whole.
 struct Entry {
     number: u64,
     content: Range<usize>,
@@ -96,7 +98,7 @@ impl Format {
         }
     }
 
-    /// The entry that begins at a byte, if it is whole.
+    /// Returns the entry that begins at a byte, if it is whole.
     fn entry(self, bytes: &[u8], at: usize) -> Option<Entry> {
         let header = bytes.get(at..at + self.header())?;
         let (length, number) = (number_at(header, 0), number_at(header, 8));
@@ -113,12 +115,12 @@ impl Format {
         whole.then_some(Entry { number, content })
     }
 
-    /// The first whole entry from a byte on that has a higher number, and where it begins.
+    /// Returns the first whole entry from a byte on that has a higher number, and its position.
     fn later(self, bytes: &[u8], from: usize, last: Option<u64>) -> Option<(usize, Entry)> {
         let most = (bytes.len() / self.header()) as u64 + 1;
         (from..bytes.len().saturating_sub(self.header() - 1)).find_map(|at| {
             let number = number_at(bytes, at + 8);
-            // Cheap, and true of nearly no byte that is not an entry's first.
+            // A fast test, which fails for nearly all bytes that do not begin an entry.
             let plausible = last.map_or(number > 0, |last| {
                 number.checked_sub(last).is_some_and(|ahead| (1..=most).contains(&ahead))
             });
@@ -128,10 +130,10 @@ impl Format {
     }
 }
 
-/// Reads a journal, and changes nothing. `format_1` allows for one of format 1.
+/// Reads a journal without changing anything. `format_1` allows one of format 1.
 ///
 /// # Errors
-/// The system's.
+/// Returns the error of the system.
 pub(super) fn read(file: &dyn Medium, format_1: bool) -> io::Result<Contents> {
     let bytes = file.read_all()?;
     let header = [0, HEADER].into_iter().find_map(|at| header(&bytes, at));
@@ -168,13 +170,13 @@ pub(super) fn read(file: &dyn Medium, format_1: bool) -> io::Result<Contents> {
         }
         let shown = expected.map_or_else(|| "the first entry".to_owned(), |number| format!("entry {number}"));
         let from = found.as_ref().map_or(at + 1, |entry| entry.content.end);
-        // A whole entry of another number is no torn write, wherever it stands.
+        // A whole entry with a wrong number is no torn write, wherever it is.
         let next = match &found {
             Some(entry) if last.is_some_and(|last| entry.number > last) => Some(at),
             _ => format.later(&bytes, from, last).map(|(next, _)| next),
         };
         let what = match (&found, next) {
-            (Some(entry), _) => Some(format!("entry {} stands where {shown} belongs", entry.number)),
+            (Some(entry), _) => Some(format!("found entry {} in place of {shown}", entry.number)),
             (None, Some(next)) => Some(format!(
                 "{shown} cannot be read, but a later one at byte {next} is whole: this is damage, not the end of an \
                  interrupted write"
@@ -216,7 +218,7 @@ pub(super) fn read(file: &dyn Medium, format_1: bool) -> io::Result<Contents> {
     Ok(Contents { bytes, format, base, entries, end, faults })
 }
 
-/// Salt and base of a copy of the header.
+/// Returns salt and base of a copy of the header.
 fn header(bytes: &[u8], at: usize) -> Option<(u64, u64)> {
     let header = bytes.get(at..at + HEADER)?;
     let whole = header.starts_with(MAGIC) && sum(&[&header[..24]]) == header[24..];
@@ -224,22 +226,22 @@ fn header(bytes: &[u8], at: usize) -> Option<(u64, u64)> {
 }
 
 impl Contents {
-    /// Numbers and contents of the entries that can be read.
+    /// Returns numbers and contents of the readable entries.
     pub(super) fn entries(&self) -> impl Iterator<Item = (u64, &[u8])> {
         self.entries.iter().map(|(number, content)| (*number, &self.bytes[content.clone()]))
     }
 
-    /// Whether it ends within what a first start writes at once.
+    /// Returns whether it is shorter than what the first start writes at once.
     pub(super) fn is_unfinished(&self) -> bool {
         self.bytes.len() < START
     }
 
-    /// The number of the last entry, of those that can be read and those that the database has.
+    /// Returns the number of the last entry that can be read or is in the database.
     pub(super) fn last(&self, applied: u64) -> u64 {
         self.entries.last().map_or(applied, |(number, _)| applied.max(*number))
     }
 
-    /// Why the journal does not belong to a database that has the changes up to entry `applied`.
+    /// Returns the reason why the journal does not belong to a database with the changes up to entry `applied`.
     pub(super) fn mismatch(&self, applied: u64) -> Option<String> {
         let of_database = format!("the database holds the changes up to entry {applied}");
         let first = self.base.map(|base| base + 1).or(self.entries.first().map(|(number, _)| *number));
@@ -257,8 +259,8 @@ impl Contents {
         }
     }
 
-    /// Goes on behind the last entry; removes what an interrupted write left behind it. A journal of format 1 is written anew:
-    /// the database must hold all its entries durably.
+    /// Continues after the last entry, and removes the remains of an interrupted write. A journal of format 1 is
+    /// rewritten: the database must hold all its entries durably.
     pub(super) fn resume(self, file: Arc<dyn Medium>, applied: u64) -> io::Result<Journal> {
         let last = self.last(applied);
         let Format::Salted(salt) = self.format else { return Journal::create(file, last) };
@@ -271,7 +273,7 @@ impl Contents {
 }
 
 impl Journal {
-    /// Writes an empty journal, on the disk on return, whose first entry will follow number `base`.
+    /// Writes an empty journal whose first entry will follow number `base`. It is on disk on return.
     pub(super) fn create(file: Arc<dyn Medium>, base: u64) -> io::Result<Self> {
         let mut journal =
             Self { file, salt: 0, length: 0, last: base, deferred: Vec::new(), uncleared: true };
@@ -279,7 +281,7 @@ impl Journal {
         Ok(journal)
     }
 
-    /// Appends an entry, on the disk on return, with all that was deferred before. When that fails, the journal is as before.
+    /// Appends an entry with all deferred changes. It is on disk on return. If that fails, the journal is unchanged.
     pub(super) fn append(&mut self, content: &[u8]) -> io::Result<()> {
         if self.uncleared {
             self.clear()?;
@@ -306,12 +308,12 @@ impl Journal {
         Ok(())
     }
 
-    /// Keeps changes that nobody waits for until the next entry. A kill before that undoes them.
+    /// Keeps changes that no caller waits for until the next entry. A kill before that loses them.
     pub(super) fn defer(&mut self, content: &[u8]) {
         self.deferred.extend(content);
     }
 
-    /// The number of the last entry.
+    /// Returns the number of the last entry.
     pub(super) fn last(&self) -> u64 {
         self.last
     }
@@ -324,8 +326,9 @@ impl Journal {
         self.length == START as u64 && self.deferred.is_empty() && !self.uncleared
     }
 
-    /// Removes all entries: the database holds them durably. Their last number stands in the new header, which has a new salt
-    /// and is on the disk before the file is cut: a kill or a power cut between the two leaves a torn end.
+    /// Removes all entries, because the database holds them durably. Their last number is in the new header,
+    /// which has a new salt and is on disk before the file is truncated. A kill or power cut between the two
+    /// leaves a torn end.
     pub(super) fn clear(&mut self) -> io::Result<()> {
         self.uncleared = true;
         let mut salt = [0; 8];
@@ -353,7 +356,7 @@ fn mark(salt: u64, number: u64) -> [u8; 16] {
     mark
 }
 
-/// The number at an offset; 0 behind the end.
+/// Returns the number at an offset, or 0 beyond the end.
 fn number_at(bytes: &[u8], at: usize) -> u64 {
     bytes.get(at..).and_then(<[u8]>::first_chunk).map_or(0, |bytes| u64::from_le_bytes(*bytes))
 }
@@ -366,7 +369,7 @@ fn sum(pieces: &[&[u8]]) -> [u8; 8] {
     sum.finalize()
 }
 
-/// The entries of a journal as format 1 wrote them.
+/// Rewrites the entries of a journal in format 1.
 #[cfg(test)]
 pub(super) fn of_format_1(path: &std::path::Path) -> Vec<u8> {
     let contents = read(&std::fs::File::open(path).unwrap(), false).unwrap();
@@ -396,7 +399,7 @@ mod tests {
         contents.entries().map(|(_, content)| content.to_vec()).collect()
     }
 
-    /// A journal of three entries; the last one is not marked as acknowledged where `acknowledged` says so.
+    /// A journal of three entries. `acknowledged` says whether the last one is marked as acknowledged.
     fn three(path: &Path, acknowledged: bool) -> Vec<u8> {
         let mut journal = Journal::create(open(path), 7).unwrap();
         journal.append(b"first").unwrap();
@@ -410,7 +413,7 @@ mod tests {
         bytes
     }
 
-    /// As format 1 wrote them.
+    /// Three entries in format 1.
     fn three_of_format_1(number: u64) -> Vec<u8> {
         let entry = |number: u64, content: &[u8]| {
             let length = (content.len() as u64).to_le_bytes();
@@ -443,7 +446,7 @@ mod tests {
         assert!(contents(&path, false).mismatch(8).is_some(), "entries 9 and 10 are gone");
     }
 
-    /// An interrupted write of the last entry is no damage, however much of it there is.
+    /// An interrupted write of the last entry is no damage, whatever its length.
     #[test]
     fn a_torn_last_entry_ends_the_journal() {
         let folder = tempfile::tempdir().unwrap();
@@ -468,7 +471,7 @@ mod tests {
         }
     }
 
-    /// Once an entry is acknowledged, it is there or the journal is damaged.
+    /// An acknowledged entry is there, or the journal is damaged.
     #[test]
     fn no_flipped_bit_and_no_cut_hides_an_acknowledged_entry() {
         let folder = tempfile::tempdir().unwrap();
@@ -532,7 +535,7 @@ mod tests {
         assert_eq!(faults, [Fault { offset: START as u64 + 69, what: what.to_owned() }]);
     }
 
-    /// A body that looks like an entry of a higher number must not make damage of a torn end.
+    /// A body that looks like an entry of a higher number must not turn a torn end into damage.
     #[test]
     fn a_client_cannot_forge_an_entry() {
         let folder = tempfile::tempdir().unwrap();
@@ -565,7 +568,7 @@ mod tests {
         journal.append(b"fourth").unwrap();
         let read = contents(&path, false);
         assert_eq!((entries(&read), read.base), (vec![b"fourth".to_vec()], Some(10)));
-        // A last entry that is cut off was never acknowledged, as far as it can be known.
+        // A last entry that is cut off may never have been acknowledged.
         for cut in whole.len() - 28..whole.len() {
             std::fs::write(&path, &whole[..cut]).unwrap();
             let read = contents(&path, true);

@@ -1,4 +1,4 @@
-//! The files that rows are kept in, behind a trait, so that a test can cut the power.
+//! The files of rows, behind a trait, so that a test can simulate a power cut.
 
 use std::fs::{self, File};
 use std::io;
@@ -11,18 +11,18 @@ use crate::private;
 
 /// An open file.
 pub(super) trait Medium: std::fmt::Debug + Send + Sync {
-    /// The length in bytes.
+    /// Returns the length in bytes.
     fn len(&self) -> io::Result<u64>;
-    /// Reads up to so many bytes at an offset; gives how many. 0 at the end.
+    /// Reads at most `out.len()` bytes at an offset. Returns their number, which is 0 at the end.
     fn read_at(&self, out: &mut [u8], offset: u64) -> io::Result<usize>;
     /// Writes all bytes at an offset.
     fn write_all_at(&self, bytes: &[u8], offset: u64) -> io::Result<()>;
-    /// Cuts the file, or extends it by zeros.
+    /// Truncates the file, or extends it with zeros.
     fn set_len(&self, length: u64) -> io::Result<()>;
-    /// Returns when all that was written is on the disk.
+    /// Syncs all writes to disk.
     fn sync(&self) -> io::Result<()>;
 
-    /// Fills `out` from an offset on; bytes beyond the end are zeros.
+    /// Fills `out` from an offset on. Bytes beyond the end are zeros.
     fn read_padded(&self, out: &mut [u8], offset: u64) -> io::Result<()> {
         let mut done = 0;
         while done < out.len() {
@@ -37,7 +37,7 @@ pub(super) trait Medium: std::fmt::Debug + Send + Sync {
         Ok(())
     }
 
-    /// The whole content.
+    /// Returns the whole content.
     fn read_all(&self) -> io::Result<Vec<u8>> {
         let length = usize::try_from(self.len()?).map_err(io::Error::other)?;
         let mut bytes = vec![0; length];
@@ -68,15 +68,15 @@ impl Medium for File {
     }
 }
 
-/// Opens files by their path.
+/// A source of files by their paths.
 pub(super) trait Files: std::fmt::Debug + Send + Sync {
-    /// Opens a file, made when missing.
+    /// Opens a file, which is created if missing.
     fn open(&self, path: &Path) -> io::Result<Arc<dyn Medium>>;
-    /// Whether there is one.
+    /// Returns whether the file exists.
     fn exists(&self, path: &Path) -> bool;
-    /// Gives a file another name, in the place of one that has it; on the disk on return.
+    /// Renames a file, replacing an existing one. It is on disk on return.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
-    /// Removes a file if it is there.
+    /// Removes a file if it exists.
     fn remove(&self, path: &Path) -> io::Result<()>;
 }
 

@@ -1,7 +1,8 @@
-//! Opens journal and database as they are on the disk, and checks that they belong together.
+//! Opens the journal and the database on disk, and checks that they belong together.
 //!
-//! What an interrupted start or write left is completed or removed. Where a file is damaged, missing or older than another
-//! one, that is an error, and nothing is changed: what a damaged file no longer names must not be taken for garbage.
+//! The remains of an interrupted start or write are completed or removed. A file that is damaged, missing or
+//! older than another is an error, and nothing is changed: bodies that a damaged file no longer names must not
+//! be taken for garbage.
 
 use std::fs;
 use std::io;
@@ -50,7 +51,7 @@ pub(super) fn open(folder: &mut Folder) -> Result<(Open, Journal)> {
         open.commit(transaction).map_err(&failed)?;
     }
     match disk.release() {
-        // It goes on without the room, but needs it for another format.
+        // The store runs without space, but an upgrade of the format needs it.
         Err(error) if format_1 || !is_full(&error) => return Err(Error::file(&database)(error)),
         _ => {}
     }
@@ -61,7 +62,7 @@ pub(super) fn open(folder: &mut Folder) -> Result<(Open, Journal)> {
     Ok((open, resumed))
 }
 
-/// The journal, without damage; made when this is the first start.
+/// Returns the undamaged journal. Creates it on the first start.
 fn journal_of(folder: &Folder) -> Result<(Arc<dyn Medium>, Contents)> {
     let path = folder.journal();
     let is_new = !folder.has(&path);
@@ -73,7 +74,7 @@ fn journal_of(folder: &Folder) -> Result<(Arc<dyn Medium>, Contents)> {
     let file = folder.open(&path).map_err(failed)?;
     let read = || journal::read(&*file, folder.is_of_format_1());
     let mut contents = read().map_err(failed)?;
-    // The first start writes the journal before all else, and may have been killed meanwhile.
+    // The first start writes the journal before anything else, and may have been killed meanwhile.
     if is_first_start && contents.is_unfinished() && (is_new || !folder.is_of_format_1()) {
         Journal::create(file.clone(), 0).and_then(|_| sync_folder(folder.path())).map_err(failed)?;
         contents = read().map_err(failed)?;
@@ -88,7 +89,7 @@ fn journal_of(folder: &Folder) -> Result<(Arc<dyn Medium>, Contents)> {
     }
 }
 
-/// The database's file with its sums.
+/// Returns the database's file with its sums.
 fn disk_of(folder: &Folder) -> Result<Arc<Disk>> {
     let (database, path) = (folder.database(), folder.sums());
     if !has_rows(folder)? {
@@ -99,7 +100,7 @@ fn disk_of(folder: &Folder) -> Result<Arc<Disk>> {
                 "it is missing or empty beside bodies that belong to it",
             ));
         }
-        // Complete before it has its name: what a kill leaves of it is no damage.
+        // It is complete before it gets its name: the remains after a kill are no damage.
         drop(compaction::begin(folder)?);
         compaction::replace(folder)?;
     }
@@ -118,7 +119,7 @@ fn disk_of(folder: &Folder) -> Result<Arc<Disk>> {
     open().map_err(Error::file(&database))
 }
 
-/// Whether this is an error about what the database's file holds, not about the disk.
+/// Returns whether the error is about the content of the database's file, not about the disk.
 fn is_damage(error: &redb::Error) -> bool {
     match error {
         redb::Error::Corrupted(_) | redb::Error::UpgradeRequired(_) => true,
@@ -129,14 +130,14 @@ fn is_damage(error: &redb::Error) -> bool {
     }
 }
 
-/// Whether there is a database with anything in it.
+/// Returns whether there is a database that is not empty.
 fn has_rows(folder: &Folder) -> Result<bool> {
     let path = folder.database();
     let length = || if folder.has(&path) { folder.open(&path)?.len() } else { Ok(0) };
     Ok(length().map_err(Error::file(&path))? > 0)
 }
 
-/// Whether there are large bodies.
+/// Returns whether there are large bodies.
 fn has_bodies(folder: &Folder) -> Result<bool> {
     let bodies = folder.bodies();
     let any = |path: &Path| -> io::Result<bool> {

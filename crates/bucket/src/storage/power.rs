@@ -1,6 +1,6 @@
-//! The power is cut at any moment, and a disk keeps any part of what was not synced: everything acknowledged is there.
+//! Power cuts at any moment on a disk that keeps any part of the unsynced data: everything acknowledged is there.
 //!
-//! `RAYFOLD_BUCKET_POWER_CUTS=20000 cargo test -p rayfold-bucket --lib storage::power` runs it at length.
+//! `RAYFOLD_BUCKET_POWER_CUTS=20000 cargo test -p rayfold-bucket --lib storage::power` runs the long version.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -14,16 +14,16 @@ use super::folder::Folder;
 use super::medium::{Files, Medium};
 use super::*;
 
-/// What a disk writes as a whole.
+/// The unit that a disk writes as a whole, in bytes.
 const SECTOR: usize = 512;
 
-/// Files that lose what was not synced when the power is cut.
+/// Files that lose unsynced data when the power is cut.
 #[derive(Debug, Default)]
 struct Disk {
     files: Mutex<BTreeMap<PathBuf, Arc<LossyFile>>>,
-    /// Operations until the power is cut.
+    /// The number of operations until the power is cut.
     fuse: Arc<AtomicU64>,
-    /// No room for the database.
+    /// There is no space for the database.
     full: Arc<AtomicBool>,
     syncs: Arc<AtomicU64>,
 }
@@ -63,7 +63,7 @@ impl Operation {
         }
     }
 
-    /// The sectors of a write, each of which may be lost alone.
+    /// Returns the sectors of a write, each of which may be lost alone.
     fn sectors(self) -> Vec<Self> {
         let Self::Write(at, written) = self else { return vec![self] };
         let mut sectors = Vec::new();
@@ -166,7 +166,7 @@ impl Disk {
         Arc::new(LossyFile { content: Mutex::new(content), fuse, full, syncs })
     }
 
-    /// The disk after a power cut: of what was not synced each sector and each length is there or not.
+    /// Returns the disk after a power cut: each unsynced sector and each unsynced length is there or not.
     fn after_a_cut(&self, rng: &mut Rng) -> Arc<Self> {
         let after = Self::new(u64::MAX);
         for (path, file) in &*self.files.lock().unwrap() {
@@ -184,7 +184,7 @@ impl Disk {
         after
     }
 
-    /// The disk after a kill: everything that was written is there.
+    /// Returns the disk after a kill: everything written is there.
     fn after_a_kill(&self) -> Arc<Self> {
         let after = Self::new(u64::MAX);
         for (path, file) in &*self.files.lock().unwrap() {
@@ -202,7 +202,7 @@ fn start(folder: &Path, disk: &Arc<Disk>) -> crate::Result<(Storage, Writing)> {
 
 type Model = BTreeMap<Vec<u8>, Option<Vec<u8>>>;
 
-/// Changes rows until the power is cut; gives the last change if it was not acknowledged.
+/// Changes rows until the power is cut. Returns the last change if it was not acknowledged.
 async fn work(
     rng: &mut Rng,
     folder: &Path,
@@ -268,7 +268,7 @@ async fn a_power_cut_at_any_moment_loses_nothing_that_was_acknowledged() {
     }
 }
 
-/// A sync a batch, no more and no fewer.
+/// Each batch has exactly one sync.
 #[tokio::test]
 async fn each_awaited_change_is_synced_once() {
     let folder = tempfile::tempdir().unwrap();
@@ -284,7 +284,7 @@ async fn each_awaited_change_is_synced_once() {
     writing.end();
 }
 
-/// The journal keeps what the database has no room for.
+/// The journal keeps the changes for which the database has no space.
 #[tokio::test]
 async fn a_journal_is_not_cleared_while_the_database_finds_no_room() {
     let folder = tempfile::tempdir().unwrap();
@@ -292,7 +292,7 @@ async fn a_journal_is_not_cleared_while_the_database_finds_no_room() {
     let (storage, writing) = start(folder.path(), &disk).unwrap();
     storage.change(Kind::Grows, |batch| batch.put(Table::Objects, b"a", &[1; 100_000])).await.unwrap();
     disk.full.store(true, Ordering::SeqCst);
-    // It tries to catch up, and cannot.
+    // The database tries to catch up and cannot.
     writing.end();
     let (storage, writing) = start(folder.path(), &disk.after_a_kill()).unwrap();
     let found = storage.snapshot().unwrap().get(Table::Objects, b"a").unwrap();

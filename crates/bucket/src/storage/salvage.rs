@@ -1,7 +1,7 @@
-//! Reads what can be read of a damaged folder into a fresh database beside it.
+//! Salvage: reads the readable rows of a damaged folder into a new database beside it.
 //!
-//! The database's blocks are compared as always; rows of blocks that do not match are left out. A table is read from its start
-//! and from its end, and what lies between the damaged places is looked for by keys halfway.
+//! Blocks of the database are compared as always, and rows in blocks that do not match are left out. A table is read
+//! from its start and from its end. Rows between damaged places are searched by keys halfway.
 
 use std::collections::VecDeque;
 use std::fs;
@@ -20,34 +20,35 @@ use super::sums::Sums;
 use super::table::{Batch, Snapshot, Table, View};
 use crate::{Error, Result};
 
-/// How often a table is cut in two to find rows between damaged blocks: in all, and since a row was found.
+/// The number of times that a table is bisected to find rows between damaged blocks: in total, and since the
+/// last row was found.
 const MAX_CUTS: usize = 200;
 const MAX_VAIN_CUTS: usize = 30;
 
-/// Damage that was found.
+/// A finding of damage.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Damage {
     /// The file, or the object as `bucket/key`.
     pub place: String,
-    /// What is wrong with it.
+    /// A description of the damage.
     pub what: String,
 }
 
-/// A folder whose readable rows stand in a fresh database beside the others. Nothing else was changed.
+/// A folder whose readable rows are in a new database beside the old one. Nothing else was changed.
 pub(crate) struct Salvage {
     folder: Folder,
     fresh: Open,
     last: u64,
     bodies: Arc<Bodies>,
-    /// What could not be read.
+    /// The places that could not be read.
     pub(crate) damages: Vec<Damage>,
 }
 
 impl Salvage {
-    /// Reads the folder of a store that does not run.
+    /// Reads the folder of a stopped store.
     ///
     /// # Errors
-    /// As for [`super::Storage::open`], but for damage.
+    /// The errors of [`super::Storage::open`] except damage.
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let folder = Folder::take_existing(path)?;
         let mut damages = Vec::new();
@@ -125,15 +126,15 @@ impl Salvage {
         Ok(Self { folder, fresh, last, bodies, damages })
     }
 
-    /// The readable rows.
+    /// Returns the readable rows.
     ///
     /// # Errors
-    /// [`Error::Storage`].
+    /// Returns [`Error::Storage`] if the new database cannot be read.
     pub(crate) fn rows(&self) -> Result<Snapshot> {
         self.fresh.snapshot().map_err(|source| self.failed(source))
     }
 
-    /// Large bodies.
+    /// Returns the store of large bodies.
     pub(crate) fn bodies(&self) -> &Arc<Bodies> {
         &self.bodies
     }
@@ -141,7 +142,7 @@ impl Salvage {
     /// Changes the rows that are kept.
     ///
     /// # Errors
-    /// [`Error::Storage`].
+    /// Returns [`Error::Storage`] if the new database cannot be written.
     pub(crate) fn change(
         &self,
         function: impl FnOnce(&mut Batch<'_>) -> Result<(), StorageError>,
@@ -156,10 +157,10 @@ impl Salvage {
         change().map_err(|source| self.failed(source))
     }
 
-    /// A fresh folder in the store's, for what is set aside.
+    /// Creates a new folder inside the store for damaged files.
     ///
     /// # Errors
-    /// [`Error::File`].
+    /// Returns [`Error::File`] if it cannot be created.
     pub(crate) fn aside(&self) -> Result<PathBuf> {
         let free = (1..)
             .map(|number| self.folder.path().join(format!("set-aside-{number}")))
@@ -169,11 +170,11 @@ impl Salvage {
         Ok(path)
     }
 
-    /// Puts the readable rows in the place of the database and the journal, which stay in `aside`. After a kill in between, a
-    /// repair can be begun again.
+    /// Replaces the database and the journal, which are kept in `aside`, by the readable rows. After a kill in
+    /// between, a repair can be started again.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Storage`].
+    /// [`Error::File`] and [`Error::Storage`].
     pub(crate) fn keep(mut self, aside: &Path) -> Result<()> {
         let transaction = self.fresh.begin().map_err(|source| self.failed(source))?;
         self.fresh.commit_durably(transaction, self.last).map_err(|source| self.failed(source))?;
@@ -197,10 +198,10 @@ impl Salvage {
         self.folder.upgraded()
     }
 
-    /// Leaves everything as it was.
+    /// Discards the new database and leaves everything unchanged.
     ///
     /// # Errors
-    /// [`Error::File`].
+    /// Returns [`Error::File`] if it cannot be removed.
     pub(crate) fn leave(self) -> Result<()> {
         drop(self.fresh);
         compaction::discard(&self.folder).map_err(Error::file(self.folder.new_database()))
@@ -211,7 +212,7 @@ impl Salvage {
     }
 }
 
-/// The last run that gave an id which is still in use.
+/// Returns the last run that assigned an id which is still in use.
 fn last_run(batch: &Batch<'_>, folder: &Folder) -> std::result::Result<u64, redb::Error> {
     let mut run = 0;
     for table in [Table::Bodies, Table::Files, Table::Layouts, Table::Outbox] {
@@ -223,14 +224,14 @@ fn last_run(batch: &Batch<'_>, folder: &Folder) -> std::result::Result<u64, redb
     Ok(files.into_iter().filter_map(|(_, id)| id).map(BodyId::run).fold(run, u64::max))
 }
 
-/// A copy of a damaged database, which is opened again after each damaged block.
+/// A copy of a damaged database, which is reopened after each damaged block.
 struct Old {
-    // Its files go with it.
+    // Its files are deleted with it.
     copy: Copy,
     disk: Arc<Disk>,
     rows: Snapshot,
     applied: u64,
-    /// Damaged blocks that were met.
+    /// The damaged blocks that were found.
     damaged: Vec<u64>,
 }
 
@@ -247,7 +248,7 @@ impl Drop for Copy {
     }
 }
 
-/// Bounds of rows that cannot be read, for people.
+/// The bounds of rows that cannot be read, for messages.
 type Lost = (String, String);
 
 impl Old {
@@ -267,7 +268,7 @@ impl Old {
         Ok(Self { copy, disk, rows, applied, damaged: Vec::new() })
     }
 
-    /// Copies the readable rows of a table; gives the bounds of those that cannot be read.
+    /// Copies the readable rows of a table. Returns the bounds of the unreadable ones.
     fn copy(&mut self, table: Table, to: &Open) -> std::result::Result<Vec<Lost>, redb::Error> {
         let mut lost = Vec::new();
         let mut ranges = VecDeque::from([(Vec::new(), None::<Vec<u8>>)]);
@@ -292,7 +293,7 @@ impl Old {
             }
         }
         lost.sort();
-        // Neighbours are one gap.
+        // Adjacent gaps are merged.
         lost.dedup_by(|next, last| {
             let touches = last.1.as_ref() == Some(&next.0);
             if touches {
@@ -305,8 +306,8 @@ impl Old {
         Ok(lost.into_iter().map(|(from, before)| (shown(&from), end(before))).collect())
     }
 
-    /// Copies rows from one end of a range until a damaged block; says whether it came to the other end. The range shrinks to
-    /// what is left.
+    /// Copies rows from one end of a range up to a damaged block. Returns whether it reached the other end. The range
+    /// shrinks to the rest.
     fn read(
         &mut self,
         table: Table,
@@ -326,7 +327,7 @@ impl Old {
             };
             if let Ok(mut range) = range {
                 loop {
-                    // A damaged block that was read while the database was opened may have misled it.
+                    // A damaged block that was read when the database was opened may have corrupted its state.
                     let next = catch_unwind(AssertUnwindSafe(|| {
                         if backwards { range.next_back() } else { range.next() }
                     }));
@@ -371,7 +372,7 @@ impl Copy {
         self.reopen(true)
     }
 
-    /// Opens the database. `lenient` takes its own records as they are, and compares rows alone.
+    /// Opens the database. With `lenient`, its own records are not checked, only the rows.
     fn reopen(&self, lenient: bool) -> std::result::Result<(Arc<Disk>, Snapshot, u64), String> {
         use super::medium::{Files, SystemFiles};
         let open = || {
@@ -379,7 +380,7 @@ impl Copy {
             let sums = Sums::open(SystemFiles.open(&self.sums)?, &*rows)?;
             let disk = Disk::new(rows, sums);
             disk.set_lenient(lenient);
-            // Nothing is kept in memory, so that each read is compared.
+            // There is no cache, so that each read is compared.
             let (open, applied) = Open::with_cache(disk.clone(), !lenient, 0)?;
             let rows = Arc::new(open).kept_snapshot()?;
             disk.set_lenient(false);
@@ -392,11 +393,11 @@ impl Copy {
     }
 }
 
-/// A key between two others, if there is one that is not too long.
+/// Returns a key between two others, if there is one that is not too long.
 fn halfway(from: &[u8], before: Option<&[u8]>) -> Option<Vec<u8>> {
     let length = from.len().max(before.map_or(0, <[u8]>::len)).min(1100) + 2;
     let digit = |key: &[u8], at: usize| u32::from(key.get(at).copied().unwrap_or_default());
-    // The sum, from the last digit on; a missing upper bound is 1 followed by zeros.
+    // Adds from the last digit on. A missing upper bound is 1 followed by zeros.
     let mut sum = vec![0; length];
     let mut carry = 0;
     for at in (0..length).rev() {
@@ -411,7 +412,7 @@ fn halfway(from: &[u8], before: Option<&[u8]>) -> Option<Vec<u8>> {
         middle.push(u8::try_from(halved / 2).unwrap_or(u8::MAX));
         carry = halved % 2;
     }
-    // Short keys are easier to read.
+    // The key is shortened, because short keys are easier to read.
     let differs = (0..length).find(|at| digit(&middle, *at) != digit(from, *at))?;
     middle.truncate(differs + 1);
     (middle.as_slice() > from && before.is_none_or(|before| middle.as_slice() < before)).then_some(middle)

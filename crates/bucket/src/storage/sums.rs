@@ -1,18 +1,18 @@
 //! A checksum for each block of the database's file, in a file beside it.
 //!
-//! The database compares its own checksums only when it repairs itself: a flipped bit would otherwise be served as a row, or
-//! hide rows. Here every block is compared whenever it is read.
+//! The database checks its own checksums only when it repairs itself. A flipped bit would otherwise be returned as a
+//! row, or hide rows. With these sums, every block is checked at every read.
 //!
-//! The first block, the database's header, is overwritten in place. It has two sums: of the header that is on the disk, and of
-//! the one that is being written.
+//! The first block, the database's header, is overwritten in place. It has two sums: one of the header on disk, and
+//! one of the header that is being written.
 //!
 //! ```text
 //! sums of the header (8 bytes each)     as it is on the disk, as it was written last
 //! sums of all blocks (8 bytes each)     the first one is not used
 //! ```
 //!
-//! The sums of a commit are on the disk before the commit's header is. Blocks that no durable state refers to may have sums
-//! of earlier contents after a kill; nothing reads them before it has written them.
+//! The sums of a commit are on disk before the header of the commit. After a kill, blocks to which no durable state
+//! refers may have sums of earlier contents. They are written before they are read.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -22,31 +22,31 @@ use s3s::crypto::{Checksum, Crc64Nvme};
 
 use super::medium::Medium;
 
-/// Bytes that have a sum together: a page of the database.
+/// The size of a block, which is a page of the database, in bytes.
 pub(super) const BLOCK_BYTES: usize = 4096;
 
-/// Bytes of a sum.
+/// The size of a sum in bytes.
 const SUM: usize = 8;
 
-/// Bytes of the sums of the header.
+/// The size of the header's sums in bytes.
 const HEADER: usize = 2 * SUM;
 
-/// What is written at a time.
+/// The number of bytes that are written at a time.
 const PIECE: usize = 4096;
 
-/// What is read at a time when all sums are computed.
+/// The number of blocks that are read at a time when all sums are computed.
 const SCAN_BLOCKS: usize = 256;
 
-/// See the module.
+/// The sums of a database, see the module.
 #[derive(Debug)]
 pub(super) struct Sums {
     file: Arc<dyn Medium>,
-    /// By block; 0 stands for a block of zeros.
+    /// The sums by block; 0 means a block of zeros.
     sums: Vec<u64>,
-    /// Of the header as it is on the disk, and as it was written last.
+    /// The sums of the header on disk and of the header that was written last.
     header: [u64; 2],
     header_changed: bool,
-    /// Pieces of the file that differ from `sums`.
+    /// The pieces of the file that differ from `sums`.
     changed: BTreeSet<usize>,
     length_changed: bool,
 }
@@ -64,7 +64,7 @@ impl Sums {
         opened.header = header;
         let mut first = vec![0; BLOCK_BYTES];
         database.read_padded(&mut first, 0)?;
-        // Which of the two it is.
+        // Find out which of the two headers it is.
         if opened.matches(0, &first) {
             opened.header = [sum(0, &first); 2];
         }
@@ -77,7 +77,7 @@ impl Sums {
         Self { file, sums, header, header_changed: false, changed, length_changed: false }
     }
 
-    /// Computes the sums of a database as it is, and writes them.
+    /// Computes the sums of the current database, and writes them.
     pub(super) fn compute(file: Arc<dyn Medium>, database: &dyn Medium) -> io::Result<Self> {
         let length = database.len()?;
         let mut computed = Self::of(file, Vec::new());
@@ -95,7 +95,7 @@ impl Sums {
         Ok(computed)
     }
 
-    /// Whether this is what a block should hold.
+    /// Returns whether a block has the expected content.
     pub(super) fn matches(&self, block: usize, bytes: &[u8]) -> bool {
         let found = sum(block, bytes);
         match block {
@@ -104,7 +104,7 @@ impl Sums {
         }
     }
 
-    /// A block now holds these bytes. Of the header this must be on the disk before the header is written.
+    /// Records the new bytes of a block. For the header, the sum must be on disk before the header is written.
     pub(super) fn set(&mut self, block: usize, bytes: &[u8]) {
         if block == 0 {
             self.header[1] = sum(block, bytes);
@@ -121,17 +121,17 @@ impl Sums {
         }
     }
 
-    /// Whether the header that was written last is on the disk.
+    /// Returns whether the header that was written last is on disk.
     pub(super) fn is_header_synced(&self) -> bool {
         self.header[0] == self.header[1]
     }
 
-    /// The header that was written last is on the disk.
+    /// Records that the header that was written last is on disk.
     pub(super) fn header_synced(&mut self) {
         self.header[0] = self.header[1];
     }
 
-    /// The database now has this length.
+    /// Records the new length of the database.
     pub(super) fn resize(&mut self, database_bytes: u64) {
         let blocks = usize::try_from(database_bytes.div_ceil(BLOCK_BYTES as u64)).unwrap_or(usize::MAX);
         if blocks == self.sums.len() {
@@ -139,14 +139,14 @@ impl Sums {
         }
         self.length_changed = true;
         self.sums.resize(blocks, 0);
-        // The last piece may have held sums of blocks that are gone.
+        // The last piece may have held sums of removed blocks.
         self.changed.retain(|piece| piece * PIECE < blocks * SUM);
         if let Some(last) = blocks.checked_sub(1) {
             self.changed.insert(last * SUM / PIECE);
         }
     }
 
-    /// Brings what changed to the disk.
+    /// Syncs the changed sums to disk.
     pub(super) fn save(&mut self) -> io::Result<()> {
         if self.changed.is_empty() && !self.length_changed && !self.header_changed {
             return Ok(());
@@ -169,7 +169,7 @@ impl Sums {
     }
 }
 
-/// Of a block's number and bytes, so that a block in another's place is noticed.
+/// Computes the sum of a block's number and bytes, so that a block in a wrong place is noticed.
 fn sum(block: usize, bytes: &[u8]) -> u64 {
     if bytes.iter().all(|byte| *byte == 0) {
         return 0;
@@ -202,7 +202,7 @@ mod tests {
             assert!(sums.matches(number, &block(number)), "block {number}");
         }
         assert!(!sums.matches(252, &block(253)) && !sums.matches(1500, &block(0)));
-        // 251 is a block of zeros; 502 another one with the same bytes as 753.
+        // Block 251 consists of zeros; 502 is another block with the same bytes as 753.
         assert!(!sums.matches(251, &block(252)) && sums.matches(753, &block(502)));
         sums.set(700, &block(1));
         sums.save().unwrap();
@@ -222,7 +222,7 @@ mod tests {
             flipped[bit / 8] ^= 1 << (bit % 8);
             assert!(!sums.matches(42, &flipped));
         }
-        // While the header is written, both the one before and the new one are right.
+        // While the header is written, both the old and the new one are right.
         sums.set(0, &block(1));
         sums.save().unwrap();
         for (header, other) in [(1, 2), (0, 1)] {

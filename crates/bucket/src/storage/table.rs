@@ -1,7 +1,8 @@
-//! The database's tables, as bytes under bytes, and the two views of them: a snapshot, and a batch that is being written.
+//! The tables of the database, which map bytes to bytes, and two views of them: a snapshot, and a batch
+//! that is being written.
 //!
-//! Knows no record: what a row means is `records`' business. A batch remembers every row that it changes, so that the
-//! journal can be written before the database.
+//! Knows no record: `records` interprets the rows. A batch remembers every row that it changes, so that the journal
+//! can be written before the database.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -10,18 +11,18 @@ use redb::{ReadOnlyTable, ReadTransaction, ReadableTable, StorageError, TableDef
 
 use super::bodies::{BodyId, NewBody};
 
-/// A row's key and value.
+/// The key and value of a row.
 pub(crate) type Row = (Vec<u8>, Vec<u8>);
 
 type Definition = TableDefinition<'static, &'static [u8], &'static [u8]>;
 type Written<'t> = redb::Table<'t, &'static [u8], &'static [u8]>;
 type Read = ReadOnlyTable<&'static [u8], &'static [u8]>;
 
-/// A table. The discriminants stand in the journal: they never change their meaning.
+/// A table. The discriminants are stored in the journal, so they never change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Table {
-    /// What there is one of, by name.
+    /// Single values, by name.
     Settings = 0,
     /// Buckets by name.
     Buckets = 1,
@@ -29,17 +30,17 @@ pub(crate) enum Table {
     Objects = 2,
     /// Small bodies by id.
     Bodies = 3,
-    /// The bodies that are files, by id: a file without a row belongs to nobody.
+    /// Bodies in files, by id. A file without a row is garbage.
     Files = 4,
     /// The parts of objects that were uploaded in parts, by id.
     Layouts = 5,
     /// Unfinished uploads by bucket, key and upload id.
     Uploads = 6,
-    /// Their parts by upload id and number.
+    /// The parts of unfinished uploads, by upload id and number.
     Parts = 7,
-    /// Events that are not delivered yet, in their order.
+    /// Events that are not delivered yet, in order.
     Outbox = 8,
-    /// Temporary identities by access key.
+    /// Temporary identities, by access key.
     Sessions = 9,
 }
 
@@ -77,7 +78,7 @@ impl Table {
     }
 }
 
-/// Rows, wherever they are read.
+/// A view of the rows.
 pub(crate) trait View {
     #[doc(hidden)]
     type Opened: ReadableTable<&'static [u8], &'static [u8]> + redb::ReadableTableMetadata;
@@ -85,12 +86,12 @@ pub(crate) trait View {
     #[doc(hidden)]
     fn opened(&self, table: Table) -> &Self::Opened;
 
-    /// The value at a key.
+    /// Returns the value at a key.
     fn get(&self, table: Table, key: &[u8]) -> Result<Option<Vec<u8>>, StorageError> {
         Ok(self.opened(table).get(key)?.map(|value| value.value().to_vec()))
     }
 
-    /// The rows from a key on, in the order of their keys' bytes.
+    /// Returns the rows from a key on, in the order of their keys' bytes.
     fn from(
         &self,
         table: Table,
@@ -100,7 +101,7 @@ pub(crate) trait View {
         Ok(rows.map(|row| row.map(|(key, value)| (key.value().to_vec(), value.value().to_vec()))))
     }
 
-    /// The rows whose keys begin with these bytes.
+    /// Returns the rows whose keys begin with these bytes.
     fn beginning_with(
         &self,
         table: Table,
@@ -110,17 +111,17 @@ pub(crate) trait View {
         Ok(rows.take_while(move |row| row.as_ref().map_or(true, |(key, _)| key.starts_with(prefix))))
     }
 
-    /// How many rows there are.
+    /// Returns the number of rows.
     fn count(&self, table: Table) -> Result<u64, StorageError> {
         use redb::ReadableTableMetadata;
         self.opened(table).len()
     }
 }
 
-/// The rows as they were at one moment.
+/// The rows at one moment.
 pub(crate) struct Snapshot {
     tables: [Read; Table::ALL.len()],
-    /// Its database: closed, it would answer nothing more.
+    /// The database, which must stay open while the snapshot is read.
     _database: Option<Arc<dyn Any + Send + Sync>>,
 }
 
@@ -132,7 +133,7 @@ impl Snapshot {
         Ok(Self { tables, _database: None })
     }
 
-    /// Keeps the database open for as long as this snapshot is read, also when the store opens it anew.
+    /// Keeps the database open as long as this snapshot is in use, also if the store reopens it.
     pub(super) fn keeping(self, database: Arc<dyn Any + Send + Sync>) -> Self {
         Self { _database: Some(database), ..self }
     }
@@ -146,7 +147,7 @@ impl View for Snapshot {
     }
 }
 
-/// A batch that is being written: its reads see its own changes.
+/// A batch that is being written. Its reads see its own changes.
 pub(crate) struct Batch<'t> {
     tables: [Written<'t>; Table::ALL.len()],
     changes: Vec<u8>,
@@ -155,15 +156,15 @@ pub(crate) struct Batch<'t> {
     removed_bytes: u64,
 }
 
-/// What is left of a batch when all was applied.
+/// The results of a batch after all its changes were applied.
 pub(super) struct Applied {
-    /// The changed rows, as the journal keeps them.
+    /// The changed rows, in the journal's format.
     pub(super) changes: Vec<u8>,
-    /// Bodies in files that rows now refer to.
+    /// Bodies in files to which rows now refer.
     pub(super) adopted: Vec<NewBody>,
-    /// Bodies in files that no row refers to any more.
+    /// Bodies in files to which no row refers any more.
     pub(super) discarded: Vec<BodyId>,
-    /// Bytes of values that were removed or replaced.
+    /// The size in bytes of the values that were removed or replaced.
     pub(super) removed_bytes: u64,
 }
 
@@ -176,7 +177,7 @@ impl<'t> Batch<'t> {
         Ok(Self { tables, changes, adopted, discarded, removed_bytes: 0 })
     }
 
-    /// Sets a row.
+    /// Writes a row.
     pub(crate) fn put(&mut self, table: Table, key: &[u8], value: &[u8]) -> Result<(), StorageError> {
         let replaced = self.tables[table as usize].insert(key, value)?;
         self.removed_bytes += replaced.map_or(0, |value| value.value().len() as u64);
@@ -184,7 +185,7 @@ impl<'t> Batch<'t> {
         Ok(())
     }
 
-    /// Removes a row; says whether it was there.
+    /// Removes a row. Returns whether it existed.
     pub(crate) fn remove(&mut self, table: Table, key: &[u8]) -> Result<bool, StorageError> {
         let removed = self.tables[table as usize].remove(key)?.map(|value| value.value().len() as u64);
         if let Some(bytes) = removed {
@@ -194,12 +195,12 @@ impl<'t> Batch<'t> {
         Ok(removed.is_some())
     }
 
-    /// A body's file now belongs to a row of this batch. Were the batch to fail, the file goes.
+    /// Binds a body's file to a row of this batch. If the batch fails, the file is deleted.
     pub(crate) fn adopt(&mut self, body: NewBody) {
         self.adopted.push(body);
     }
 
-    /// A body's file belongs to no row any more. It goes when the batch is on the disk.
+    /// Releases a body's file from its row. It is deleted when the batch is on disk.
     pub(crate) fn discard(&mut self, body: BodyId) {
         self.discarded.push(body);
     }
@@ -214,7 +215,7 @@ impl<'t> Batch<'t> {
         Applied { changes, adopted, discarded, removed_bytes }
     }
 
-    /// Applies rows that a journal kept.
+    /// Applies rows from a journal.
     pub(super) fn replay(&mut self, mut changes: &[u8]) -> Result<(), StorageError> {
         while !changes.is_empty() {
             let (table, key, value) = noted(&mut changes)
@@ -236,10 +237,10 @@ impl<'t> View for Batch<'t> {
     }
 }
 
-/// What stands for the length of the value of a row that was removed.
+/// The value length that marks a removed row.
 const REMOVED: u32 = u32::MAX;
 
-/// Table, key's length, value's length, key, value.
+/// Encodes a change: table, length of the key, length of the value, key, value.
 fn note(changes: &mut Vec<u8>, table: Table, key: &[u8], value: Option<&[u8]>) {
     let length = |bytes: &[u8]| u32::try_from(bytes.len()).unwrap_or(REMOVED - 1);
     changes.push(table as u8);
@@ -249,7 +250,7 @@ fn note(changes: &mut Vec<u8>, table: Table, key: &[u8], value: Option<&[u8]>) {
     changes.extend(value.unwrap_or_default());
 }
 
-/// Table, key, and the value of a row that was not removed.
+/// A decoded change: table, key, and the value unless the row was removed.
 type Noted<'a> = (Table, &'a [u8], Option<&'a [u8]>);
 
 fn noted<'a>(changes: &mut &'a [u8]) -> Option<Noted<'a>> {

@@ -1,8 +1,8 @@
-//! The one thread that changes rows: what is waiting becomes one batch, and a batch costs one sync.
+//! The writer, the only thread that changes rows. It commits all waiting changes as one batch with one sync.
 //!
-//! Changes are functions on the tables, run one after the other, each seeing what those before it did: a condition that
-//! is checked in one holds when its change is made. A batch reaches the journal as a whole or not at all, and nothing is
-//! acknowledged before. When the disk fails, the batch is gone and the database is opened anew from disk and journal.
+//! Changes are functions on the tables that run one after the other. Each sees the effects of those before it, so a
+//! condition that it checks holds when it writes. A batch reaches the journal as a whole or not at all, and nothing
+//! is acknowledged before. If the disk fails, the batch is lost, and the database is reopened from disk and journal.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError};
@@ -22,43 +22,43 @@ use super::opening::open;
 use super::table::{Applied, Batch};
 use crate::Error;
 
-/// Changes of one batch: enough that a sync is shared by all who wait, few enough that none waits long.
+/// The largest number of changes in a batch: enough to share a sync, few enough that no change waits long.
 const BATCH_JOBS: usize = 1000;
 
-/// Changed bytes of one batch.
+/// The largest size of the changed rows in a batch.
 const BATCH_BYTES: usize = 8 * 1024 * 1024;
 
-/// So long without work the database catches up with the journal.
+/// The idle time after which the database catches up with the journal.
 const IDLE: Duration = Duration::from_millis(500);
 
-/// So long a disk that failed is left alone.
+/// The pause after a disk failure.
 const RECOVERY_PAUSE: Duration = Duration::from_millis(200);
 
-/// Free bytes that are left to changes that make room, and to the journal and the database while they catch up.
+/// The free bytes reserved for changes that free space, and for the journal and the database while they catch up.
 pub(super) const RESERVE: u64 = 64 * 1024 * 1024;
 
-/// Why nothing was changed, or why that is not known.
+/// The reason why nothing was changed, or why that is not certain.
 #[derive(Clone, Debug, thiserror::Error)]
 pub(crate) enum Unavailable {
-    /// The disk is full.
+    /// There is no space on the disk.
     #[error("the disk is full")]
     Full,
     /// The disk failed, or the database is damaged.
     #[error("the storage failed: {0}")]
     Failed(Arc<str>),
-    /// The store is ending.
+    /// The store is shutting down.
     #[error("the store is ending")]
     Ending,
 }
 
-/// What a change does to the room on the disk, and who waits for it.
+/// The effect of a change on the disk space, and whether a caller waits for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// It takes room.
+    /// It needs disk space.
     Grows,
-    /// It makes room: done also when the disk is nearly full.
+    /// It frees disk space, so it also runs when the disk is nearly full.
     Shrinks,
-    /// Nobody waits for it, and a kill may undo it.
+    /// No caller waits for it, and a kill may undo it.
     Lazy,
 }
 
@@ -69,17 +69,17 @@ pub(super) trait Job: Send {
     fn answer(self: Box<Self>, outcome: Result<(), Unavailable>);
 }
 
-/// What the thread is told.
+/// A message to the writing thread.
 pub(super) enum Message {
-    /// Do this.
+    /// Run this change.
     Change(Box<dyn Job>),
-    /// Open the database anew if damage was found in it, and drop this.
+    /// Reopen the database if it has damage, then drop the sender.
     Reopen(Sender<()>),
-    /// Do what came before this, and no more.
+    /// Finish the earlier messages, then end.
     End,
 }
 
-/// A function on the tables, and who waits for what it gives.
+/// A function on the tables, and the receiver of its result.
 pub(super) struct Change<F, T> {
     pub(super) kind: Kind,
     pub(super) function: Option<F>,
@@ -105,29 +105,29 @@ where
 
     fn answer(self: Box<Self>, outcome: Result<(), Unavailable>) {
         let Self { value, answer, .. } = *self;
-        // Whoever asked may be gone.
+        // The caller may have gone.
         let _ = answer.send(outcome.and_then(|()| value.ok_or(Unavailable::Ending)));
     }
 }
 
-/// The database that readers find.
+/// The database that readers use.
 pub(super) type Current = Arc<RwLock<Result<Arc<Open>, Unavailable>>>;
 
-/// See the module.
+/// The state of the writing thread, see the module.
 pub(super) struct Writer {
     pub(super) folder: Folder,
     pub(super) bodies: Arc<Bodies>,
     pub(super) current: Current,
     pub(super) journal: Journal,
-    /// Bytes of rows that were removed or replaced since the database was last looked at.
+    /// The size of the rows removed or replaced since the last check for compaction.
     pub(super) removed_bytes: u64,
-    /// Bytes that are left free.
+    /// The number of bytes that must stay free.
     pub(super) reserve: u64,
     pub(super) on_commit: Box<dyn Fn() + Send>,
 }
 
 impl Writer {
-    /// Works until it is told to end; then leaves a database that has caught up.
+    /// Handles messages until the end. Leaves a database that has caught up.
     pub(super) fn work(mut self, messages: &Receiver<Message>) {
         let mut ending = false;
         while !ending {
@@ -246,7 +246,7 @@ impl Writer {
         Ok(())
     }
 
-    /// The open database; when the last try failed, one more.
+    /// Returns the open database. Tries to open it if the last attempt failed.
     fn opened(&mut self) -> Result<Arc<Open>, Failure> {
         let current = read(&self.current).clone();
         match current {
@@ -259,7 +259,7 @@ impl Writer {
         }
     }
 
-    /// Opens the database from what is on the disk: its durable state and the journal.
+    /// Opens the database from its durable state and the journal on disk.
     fn open_anew(&mut self) {
         if let Ok(open) = read(&self.current).as_ref() {
             open.kill();
@@ -276,14 +276,14 @@ impl Writer {
         });
     }
 
-    /// Writes the database into a smaller file when it has shrunk by half.
+    /// Compacts the database if it has shrunk by half.
     fn compact_when_sparse(&mut self) {
         let Ok(open) = read(&self.current).clone() else { return };
         let due = |bytes: u64| bytes >= compaction::SMALLEST && self.removed_bytes >= bytes / 2;
         if !self.journal.is_empty() || !open.file_bytes().is_ok_and(due) {
             return;
         }
-        // Where it fails (for want of room, for one), it is tried again when as much has been removed once more.
+        // If it fails, for example for lack of space, it is tried again after as much has been removed once more.
         self.removed_bytes = 0;
         if !open.is_sparse().unwrap_or_default() {
             return;
@@ -294,7 +294,7 @@ impl Writer {
                 let mut current = self.current.write().unwrap_or_else(std::sync::PoisonError::into_inner);
                 *current = Ok(Arc::new(compacted));
             }
-            // The new database may have taken the place of the one that is open.
+            // The new database may have replaced the open one.
             Err(_) => self.open_anew(),
         }
     }
@@ -316,7 +316,7 @@ impl Writer {
         let started = Instant::now();
         let done = open.begin().and_then(|transaction| open.commit_durably(transaction, self.journal.last()));
         match done {
-            // What cannot be cleared is skipped at the next start.
+            // If the journal cannot be cleared, its entries are skipped at the next start.
             Ok(()) if open.has_room() => drop(self.journal.clear()),
             Ok(()) => {}
             Err(_) => {
@@ -335,7 +335,7 @@ impl Writer {
     }
 }
 
-/// Whether somebody waits until these changes are on the disk.
+/// Returns whether a caller waits until these changes are on disk.
 fn is_awaited(mut kinds: impl Iterator<Item = Kind>) -> bool {
     kinds.any(|kind| kind != Kind::Lazy)
 }
@@ -343,7 +343,7 @@ fn is_awaited(mut kinds: impl Iterator<Item = Kind>) -> bool {
 enum Failure {
     /// Nothing was changed.
     Refused(Unavailable),
-    /// The database has to be opened anew.
+    /// The database must be reopened.
     Database(redb::Error),
 }
 

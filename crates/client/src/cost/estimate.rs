@@ -1,103 +1,103 @@
-//! What is billed for an animation and for the stack that it is made on, line by line.
+//! An estimate of the bill for an animation and for its stack, line by line.
 //!
-//! Invariants: free allowances are left out, so that a bill is never higher for them; what is not known beforehand
-//! (requests a frame, sizes) is a named constant with its reason, or the caller's.
+//! Invariants: free allowances are not subtracted, so a bill is never higher because of them. A quantity that is not
+//! known beforehand (requests per frame, sizes) is a named constant with its reason, or comes from the caller.
 
 use rayfold_scene::Screen;
 use serde::Serialize;
 
 use super::prices::Prices;
 
-/// Memory with which a function has one processor, in MB, and that of the render function.
+/// The memory in MB with which a function has one processor, and that of the render function.
 const PROCESSOR_MB: f64 = 1769.0;
 
-/// Memory of the assemble function, in MB.
+/// The memory of the assemble function, in MB.
 const ASSEMBLE_MEMORY_MB: f64 = 3008.0;
 
-/// Minutes between two sweeps.
+/// The minutes between two sweeps.
 const SWEEP_MINUTES: f64 = 15.0;
 
-/// What an invocation waits for requests and pauses, in milliseconds, which Lambda bills: measured at these numbers of
-/// frames (`docs/reports/simulation.md`), and in between taken to grow evenly.
+/// The time that an invocation waits for requests and pauses, in milliseconds, which Lambda bills. Measured at these
+/// numbers of frames (`docs/reports/simulation.md`), and interpolated linearly in between.
 const WAITING_MS: [(f64, f64); 2] = [(50.0, 258.0), (1_000.0, 427.0)];
 
-/// Bytes of a frame's PNG, a pixel: about twice what `scenes/hello` gives.
+/// The size of a frame's PNG in bytes per pixel: about twice that of `scenes/hello`.
 const FRAME_BYTES_A_PIXEL: f64 = 0.15;
 
-/// Bytes of the GIF, a pixel of a frame: about twice what `scenes/hello` gives.
+/// The size of the GIF in bytes per pixel of a frame: about twice that of `scenes/hello`.
 const GIF_BYTES_A_PIXEL: f64 = 0.06;
 
-/// Time that the assemble function takes for a pixel: decoding, quantising, encoding. Measured: 14 to 23 ns of a
-/// processor, more for small frames (`docs/decisions/gif-in-one-piece.md`); Lambda's may be slower.
+/// The time of the assemble function per pixel: decoding, quantising, encoding. Measured: 14 to 23 ns of processor
+/// time, more for small frames (`docs/decisions/gif-in-one-piece.md`); Lambda's processors may be slower.
 const ASSEMBLE_NS_A_PIXEL: f64 = 30.0;
 
-/// Requests a frame while it is made, of the kind that is billed as PUT, COPY, POST or LIST: the upload, the look for
-/// a result, the result, and the listings, manifests and claims of a fold, of which many frames share one. Measured with
-/// the upload, at 50 frames and more: 3.5 to 5.2 (`docs/reports/simulation.md`, `pipeline.md`).
+/// The requests per frame that are billed as PUT, COPY, POST or LIST: the upload, the check for a result, the result,
+/// and a share of the listings, manifests and claims of a fold. Measured with the upload, at 50 frames and more: 3.5
+/// to 5.2 (`docs/reports/simulation.md`, `pipeline.md`).
 const PUTS_AND_LISTS_A_FRAME: f64 = 6.0;
 
-/// The same, of the kind that is billed as GET: the script, the manifest before and after the pause, and the assembler's
-/// reading of the frame. Measured: 4.2 to 4.7.
+/// The requests per frame that are billed as GET: the script, the manifest before and after the pause, and the
+/// assembler's read of the frame. Measured: 4.2 to 4.7.
 const GETS_A_FRAME: f64 = 5.0;
 
-/// Keys in a page of a listing.
+/// The number of keys in a page of a listing.
 const PAGE: f64 = 1000.0;
 
-/// The part of a GIF that one request uploads.
+/// The size of the part of a GIF that one request uploads.
 const UPLOAD_PART_MB: f64 = 8.0;
 
-/// The quiet before the assembler starts, or its rounds of listings.
+/// The quiet period before the assembler starts, or its rounds of listings.
 const ASSEMBLE_OVERHEAD_MS: f64 = 1000.0;
 
-/// Log lines of an invocation, the platform's own among them.
+/// The log lines of an invocation in bytes, including the platform's own.
 const LOG_BYTES: f64 = 1500.0;
 
-/// Of the invocations that X-Ray samples by its default rule, beyond the first of each second.
+/// The share of invocations that X-Ray samples by its default rule, beyond the first of each second.
 const TRACED: f64 = 0.05;
 
-/// Metrics that the stack's 21 alarms look at; each is billed. `infra/terraform` tests the number.
+/// The metrics that the stack's 21 alarms watch; each is billed. A test of `infra/terraform` checks the number.
 const ALARMS: f64 = 24.0;
 
-/// A sweep of a bucket in which nothing is amiss.
+/// The seconds of a sweep of a bucket in which nothing is wrong.
 const SWEEP_S: f64 = 0.5;
 
-/// Lambda keeps five readers waiting at a queue, each asking every 20 s.
+/// Lambda polls a queue with five readers, each every 20 s.
 const QUEUE_POLLS_A_MONTH: f64 = 5.0 * MINUTES_A_MONTH * 3.0;
 
 const MINUTES_A_MONTH: f64 = 30.0 * 24.0 * 60.0;
 
-/// What is to be made, and on what.
+/// The animation and the stack for which a bill is estimated.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Workload {
-    /// How many frames.
+    /// The number of frames.
     pub frames: u64,
-    /// Milliseconds of the render function, a frame.
+    /// The time of the render function per frame, in milliseconds.
     pub ms: f64,
-    /// Of a frame, in pixels.
+    /// The width of a frame in pixels.
     pub width: usize,
-    /// Of a frame, in pixels.
+    /// The height of a frame in pixels.
     pub height: usize,
-    /// Memory of the render function.
+    /// The memory of the render function.
     pub memory_mb: f64,
-    /// Memory of the assemble function.
+    /// The memory of the assemble function.
     pub assemble_memory_mb: f64,
-    /// Whether the functions run on arm64, or on x86_64.
+    /// The functions run on arm64, not on x86_64.
     pub arm64: bool,
-    /// Milliseconds of the assemble function, a frame.
+    /// The time of the assemble function per frame, in milliseconds.
     pub assemble_ms: f64,
-    /// A frame's PNG, in the mean.
+    /// The mean size of a frame's PNG.
     pub frame_kb: f64,
-    /// The GIF.
+    /// The size of the GIF.
     pub gif_mb: f64,
-    /// Between two sweeps.
+    /// The minutes between two sweeps.
     pub sweep_minutes: f64,
-    /// Whether the stack has a key of its own.
+    /// The stack has a customer-managed key.
     pub customer_managed_key: bool,
 }
 
 impl Workload {
-    /// Frames of one size, each of which takes the render function so many milliseconds, on a stack as it is set up when
-    /// nobody says otherwise. Sizes of files are guessed from the pixels.
+    /// Makes a workload of frames of one size, each of which takes the render function `ms` milliseconds, on a stack
+    /// with default settings. File sizes are estimated from the pixels.
     pub fn new(frames: u64, size: Screen, ms: f64) -> Self {
         let pixels = size.pixels() as f64;
         Self {
@@ -116,33 +116,33 @@ impl Workload {
         }
     }
 
-    /// How long the assemble function runs, in seconds.
+    /// Returns the running time of the assemble function, in seconds.
     pub fn assembling_s(&self) -> f64 {
         (self.frames as f64 * self.assemble_ms + ASSEMBLE_OVERHEAD_MS) / 1e3
     }
 }
 
-/// Lines under one heading.
+/// The lines under one heading.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Section {
-    /// What it is about.
+    /// The heading of the section.
     pub title: &'static str,
-    /// What is billed.
+    /// The items that are billed.
     pub lines: Vec<Line>,
-    /// Together, in US dollars.
+    /// The sum in US dollars.
     pub usd: f64,
 }
 
-/// So much of something, and what it costs.
+/// A billed quantity and its price.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Line {
-    /// What is billed.
+    /// The item that is billed.
     pub item: &'static str,
-    /// How much of it.
+    /// The amount of the item.
     pub amount: f64,
-    /// What that counts; empty for pieces.
+    /// The unit of the amount; empty for pieces.
     pub unit: &'static str,
-    /// In US dollars.
+    /// The price of the amount in US dollars.
     pub usd: f64,
 }
 
@@ -153,19 +153,20 @@ impl Section {
     }
 }
 
-/// What an invocation waits for requests and pauses, in milliseconds, while so many frames are made.
+/// Returns the time that an invocation waits for requests and pauses, in milliseconds, for an
+/// animation of `frames` frames.
 pub fn waiting_ms(frames: u64) -> f64 {
     let [(few, short), (many, long)] = WAITING_MS;
     short + (long - short) * ((frames as f64 - few) / (many - few)).clamp(0.0, 1.0)
 }
 
-/// Milliseconds that the render function takes for one of so many frames, if drawing it takes `drawing_ms` on one
-/// processor and the function has `memory_mb`.
+/// Returns the milliseconds that the render function takes per frame of an animation of `frames` frames, if drawing a
+/// frame takes `drawing_ms` on one processor and the function has `memory_mb`.
 pub fn render_ms(frames: u64, drawing_ms: f64, memory_mb: f64) -> f64 {
     drawing_ms * PROCESSOR_MB / memory_mb + waiting_ms(frames)
 }
 
-/// Everything, in the order in which it is asked about.
+/// Estimates all sections: making the animation, keeping it, and the stack.
 pub fn estimate(work: &Workload, prices: &Prices) -> Vec<Section> {
     vec![making(work, prices), keeping(work, prices), stack(work, prices)]
 }
@@ -178,7 +179,7 @@ fn gb_second(work: &Workload, prices: &Prices) -> f64 {
     if work.arm64 { prices.lambda.gb_second_arm64 } else { prices.lambda.gb_second_x86_64 }
 }
 
-/// Lambda counts a GB as 1,024 MB.
+/// Returns the GB-seconds of `ms` milliseconds. Lambda counts a GB as 1,024 MB.
 fn gb_seconds(memory_mb: f64, ms: f64) -> f64 {
     memory_mb / 1024.0 * ms / 1000.0
 }
@@ -217,7 +218,7 @@ fn keeping(work: &Workload, prices: &Prices) -> Section {
     let frames = work.frames as f64;
     let sweeps = MINUTES_A_MONTH / work.sweep_minutes;
     let pages = (frames / PAGE).ceil();
-    // Its scripts among everybody's, its scripts, and its frames; then its manifest and the head of its GIF.
+    // The listings of all scripts, of its scripts and of its frames; then its manifest and the head of its GIF.
     let (lists, gets) = (frames / PAGE + 2.0 * pages, 2.0);
     Section::new(
         "Keeping it, each month",
@@ -311,7 +312,7 @@ mod tests {
         near(cost(&arm) / cost(&x86), 0.000_013_333_4 / 0.000_016_666_7);
     }
 
-    /// By hand: 16 MB in parts of 8, begun and completed: 4 requests beside the frames'.
+    /// By hand: 16 MB in parts of 8 MB, begun and completed: 4 requests besides the frames'.
     #[test]
     fn requests_grow_with_frames() {
         let small = making(&work(100, 1.0), &prices());
@@ -319,7 +320,8 @@ mod tests {
         near(find(&small, "S3: gets").amount, 100.0 * GETS_A_FRAME);
     }
 
-    /// By hand: 2,880 sweeps a month, each lists its 2 pages of scripts and 2 of frames and is 1.5 pages of all scripts.
+    /// By hand: 2,880 sweeps per month. Each lists its 2 pages of scripts and 2 of frames, and its share of the
+    /// listing of all scripts is 1.5 pages.
     #[test]
     fn a_kept_animation_is_visited_by_each_sweep() {
         let keeping = keeping(&work(1500, 1.0), &prices());

@@ -1,5 +1,5 @@
-//! What an animation costs on AWS before it is made, and what the stack costs. Asks nobody: the prices are a data file,
-//! the rest is arithmetic.
+//! The cost of an animation on AWS before it is made, and the cost of the stack. Makes no requests: the prices are a
+//! data file, the rest is arithmetic.
 
 mod estimate;
 mod prices;

@@ -1,82 +1,82 @@
-//! What AWS asks, from one data file with its date.
+//! The prices of AWS, from one data file with its date.
 
 use serde::Deserialize;
 
-/// The prices that come with the program: those of `infra/prices.json`.
+/// The built-in prices: those of `infra/prices.json`.
 const BUILT_IN: &str = include_str!("../../../../infra/prices.json");
 
-/// US dollars, each for one of what its name says.
+/// The prices in US dollars, each for one unit of what the field's name says.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Prices {
-    /// The day on which they were so, as `2026-03-14`.
+    /// The date of the prices, as `2026-03-14`.
     pub as_of: String,
-    /// The region.
+    /// The region of the prices.
     pub region: String,
-    /// Always `USD`.
+    /// The currency, which is always `USD`.
     pub currency: String,
-    /// The pages that say so.
+    /// The pages from which the prices were taken.
     pub sources: Vec<String>,
-    /// Functions.
+    /// The prices of Lambda functions.
     pub lambda: Lambda,
-    /// Objects.
+    /// The prices of S3 objects.
     pub s3: S3,
-    /// Downloads.
+    /// A GB transferred out to the internet.
     pub transfer_out_gb: f64,
-    /// Logs, alarms, dashboards.
+    /// The prices of logs, alarms and dashboards.
     pub cloudwatch: CloudWatch,
-    /// Traces.
+    /// A trace recorded by X-Ray.
     pub xray_trace: f64,
-    /// Queues.
+    /// A request to an SQS queue.
     pub sqs_request: f64,
-    /// Schedules.
+    /// An invocation by the scheduler.
     pub scheduler_invocation: f64,
-    /// Keys.
+    /// A KMS key for a month.
     pub kms_key_month: f64,
 }
 
 impl Prices {
-    /// Those that come with the program.
+    /// Returns the prices that are built into the program.
     ///
     /// # Errors
-    /// When the program was built with a file that holds no prices.
+    /// An error if the program was built with a file that holds no prices.
     pub fn built_in() -> Result<Self, serde_json::Error> {
         serde_json::from_str(BUILT_IN)
     }
 }
 
-/// What Lambda asks.
+/// The prices of Lambda.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Lambda {
-    /// An invocation.
+    /// An invocation of a function.
     pub request: f64,
-    /// Memory times time.
+    /// A GB-second of memory on x86_64.
     pub gb_second_x86_64: f64,
-    /// The same, on arm64.
+    /// A GB-second of memory on arm64.
     pub gb_second_arm64: f64,
 }
 
-/// What S3 asks.
+/// The prices of S3.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct S3 {
-    /// A request of these.
+    /// A PUT, COPY, POST or LIST request.
     pub put_copy_post_list: f64,
-    /// Any other request.
+    /// A request of any other kind.
     pub get_and_other: f64,
-    /// Storage.
+    /// A GB of standard storage for a month.
     pub standard_gb_month: f64,
 }
 
-/// What CloudWatch asks.
+/// The prices of CloudWatch.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CloudWatch {
-    /// Logs that come in.
+    /// A GB of logs ingested.
     pub log_gb: f64,
-    /// An alarm's metric.
+    /// A metric of an alarm for a month.
     pub alarm_month: f64,
-    /// A dashboard.
+    /// A dashboard for a month.
     pub dashboard_month: f64,
 }

@@ -49,7 +49,7 @@ fn a_new_file_replaces_no_other() {
     OutputFile::write_new(&path, b"first").unwrap();
     assert!(OutputFile::write_new(&path, b"second").unwrap_err().is_taken());
     assert_eq!((text(&path).as_str(), folder.count()), ("first", 1));
-    // Whoever comes between the look and the writing.
+    // Another program writes the file between the check and the rename.
     let out = OutputFile::with(&folder.join("b.txt"), b"ours").unwrap();
     std::fs::write(folder.join("b.txt"), "theirs").unwrap();
     let put = |temporary: &Path, place: &Path| std::fs::hard_link(temporary, place);
@@ -57,7 +57,7 @@ fn a_new_file_replaces_no_other() {
     assert_eq!((text(folder.join("b.txt")).as_str(), folder.count()), ("theirs", 2));
 }
 
-/// Hidden names that held the file's own name left no room for it.
+/// Hidden names that contained the file's own name left no room for it.
 #[test]
 fn names_of_every_length_that_the_system_takes_are_written() {
     let folder = Folder::new();
@@ -72,7 +72,7 @@ fn names_of_every_length_that_the_system_takes_are_written() {
     assert_eq!(folder.count(), 5);
 }
 
-/// In a container every run has the number 1.
+/// In a container every run has the process id 1.
 #[test]
 fn what_another_run_left_under_an_old_name_blocks_nothing() {
     let folder = Folder::new();
@@ -128,7 +128,7 @@ mod unix {
         assert_eq!(text(&real), "new");
     }
 
-    /// The link was replaced by the file.
+    /// Once the link itself was replaced by the file.
     #[test]
     fn links_to_a_file_that_is_not_there_yet_are_followed() {
         let folder = Folder::new();

@@ -1,4 +1,4 @@
-//! The numbers of a line, as they are read and written.
+//! Reading and writing the numbers of a line.
 
 use std::fmt::{self, Formatter};
 
@@ -7,18 +7,18 @@ use glam::{DVec2, DVec3};
 use super::Scripted;
 use crate::model::Material;
 
-/// The numbers of a line, taken parameter by parameter; those that were left out are 0.
+/// A reader of the numbers of a line, parameter by parameter. Omitted numbers are 0.
 pub(crate) struct Numbers<'a> {
     rest: &'a [f64],
-    /// How many of the rest were written.
+    /// The count of remaining numbers that the script contains.
     written: usize,
-    /// The material that was named in the place of numbers.
+    /// The material whose name replaces numbers.
     surface: Option<&'a Material>,
 }
 
 impl<'a> Numbers<'a> {
-    /// At least as many as the form has, of which the first `written` were; `surface` if a material was named in the
-    /// place of the others.
+    /// Makes a reader of at least as many numbers as the form has. The first `written` were in the script. `surface`
+    /// is the material whose name replaces the others.
     pub(crate) fn new(values: &'a [f64], written: usize, surface: Option<&'a Material>) -> Self {
         Self { rest: values, written, surface }
     }
@@ -36,17 +36,17 @@ impl<'a> Numbers<'a> {
         DVec3::from_array(self.take())
     }
 
-    /// `None` if it was left out.
+    /// Returns the next number, or `None` if it was omitted.
     pub(crate) fn optional_number(&mut self) -> Option<f64> {
         (self.written > 0).then(|| self.number())
     }
 
-    /// `None` if it was left out.
+    /// Returns the next vector, or `None` if it was omitted.
     pub(crate) fn optional_vector(&mut self) -> Option<DVec3> {
         (self.written > 0).then(|| self.vector())
     }
 
-    /// The material that stands for all further numbers, if one was named.
+    /// Returns the material that replaces all further numbers, if one was named.
     pub(crate) fn surface(&self) -> Option<&'a Material> {
         self.surface
     }
@@ -64,7 +64,7 @@ impl<'a> Numbers<'a> {
 /// A line that is being written.
 pub(crate) struct Line<'a, 'b> {
     f: &'a mut Formatter<'b>,
-    /// The name of the material that is written in the place of its numbers.
+    /// The name of the material that is written in place of its numbers.
     surface: Option<&'a str>,
 }
 
@@ -73,7 +73,7 @@ impl<'a, 'b> Line<'a, 'b> {
         Self { f, surface }
     }
 
-    /// A blank and the shortest decimal that reads back as `x`.
+    /// Writes a space and the shortest decimal that reads back as `x`.
     pub(crate) fn number(&mut self, x: f64) -> fmt::Result {
         self.f.write_str(" ")?;
         write_number(self.f, x)
@@ -91,18 +91,18 @@ impl<'a, 'b> Line<'a, 'b> {
         write!(self.f, " {word}")
     }
 
-    /// The name that is written in the place of a material's numbers.
+    /// Returns the name that is written in place of a material's numbers.
     pub(crate) fn surface(&self) -> Option<&'a str> {
         self.surface
     }
 }
 
-/// The shortest decimal that reads back as `x`.
+/// Writes the shortest decimal that reads back as `x`.
 pub(crate) fn write_number(f: &mut Formatter<'_>, x: f64) -> fmt::Result {
     if x == 0.0 || (1e-5..1e16).contains(&x.abs()) { write!(f, "{x}") } else { write!(f, "{x:e}") }
 }
 
-/// A line of a script, with its end; `surface` is the name of its material, if it has one.
+/// Writes a line of a script with its end. `surface` is the name of its material, if it has one.
 pub(crate) fn write_line<T: Scripted>(f: &mut Formatter<'_>, item: &T, surface: Option<&str>) -> fmt::Result {
     f.write_str(T::FORM.name)?;
     item.write(&mut Line::new(f, surface))?;

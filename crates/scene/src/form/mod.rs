@@ -1,10 +1,10 @@
-//! How a command is written: its name and its parameters, apart from what they do.
+//! The syntax of a command: its name and its parameters, apart from its effect.
 //!
-//! Each thing that a line of a script can hold says here once how ([`Scripted`]): that is all that the parser, the
-//! writer, the hints, editors and the documentation's test know of it. The list of all commands is [`crate::Command`].
-//! Knows no command itself.
+//! Each type that a line of a script can hold defines its syntax once ([`Scripted`]). The parser, the writer, the
+//! hints, editors and the documentation's test use only this definition. [`crate::Command`] lists all commands;
+//! this module knows none.
 //!
-//! Invariants: what may be left out stands behind what may not; what is written reads back bit for bit.
+//! Invariants: optional parameters follow required ones. Written numbers read back bit for bit.
 
 mod line;
 
@@ -15,79 +15,79 @@ pub(crate) use line::{Line, Numbers, write_line, write_number};
 
 use crate::model::{Faults, Parameter};
 
-/// How a command, or a clause of a material, is written.
+/// The syntax of a command, or of a clause of a material.
 #[derive(Debug)]
 pub struct Form {
-    /// Its name; scripts may write it in any letter case.
+    /// The name. Scripts may write it in any letter case.
     pub name: &'static str,
-    /// The name that stands before its numbers, if one does.
+    /// The name before the numbers, if there is one.
     pub subject: Option<Subject>,
-    /// Its parameters in their order, the optional ones last.
+    /// The parameters in order, the optional ones last.
     pub fields: &'static [Field],
-    /// What several of its numbers must keep together.
-    pub together: &'static [Together],
-    /// Whether its numbers may be curves.
+    /// The constraints on several numbers.
+    pub constraints: &'static [Constraint],
+    /// Whether the numbers may be curves.
     pub curves: bool,
-    /// The name that stands behind its numbers, if one does.
+    /// The name after the numbers, if there is one.
     pub ends_with: Option<Names>,
-    /// How many numbers must stand.
+    /// The count of required numbers.
     required: usize,
-    /// How many numbers may stand.
+    /// The largest count of numbers.
     most: usize,
-    /// The number in whose place, and that of all that follow, the name of a material may stand.
+    /// The first number that the name of a material may replace, together with all that follow.
     surface: Option<usize>,
 }
 
-/// A name that a line starts with, behind its command.
+/// A name that follows the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Subject {
-    /// It is given here.
+    /// The line defines the name.
     Defines(Names),
-    /// It has been given before.
+    /// The line refers to a name defined before.
     Refers(Names),
 }
 
-/// What has names; those of one kind are apart from those of the other.
+/// A kind of named items. Each kind has its own names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Names {
-    /// Of materials.
+    /// The names of materials.
     Materials,
-    /// Of groups.
+    /// The names of groups.
     Groups,
 }
 
 /// A parameter of a command: a number or the components of a vector.
 #[derive(Debug)]
 pub struct Field {
-    /// What it is.
+    /// The meaning of the parameter.
     pub parameter: Parameter,
     /// The names of its numbers.
     pub names: &'static [&'static str],
-    /// What its numbers measure.
+    /// The quantity that its numbers measure.
     pub kind: Kind,
-    /// Which values it may have; all are finite.
+    /// The allowed values, all of which are finite.
     pub values: Values,
-    /// Whether it may be left out.
+    /// Whether the parameter is optional.
     pub presence: Presence,
 }
 
-/// Whether a parameter may be left out, and what holds then.
+/// Whether a parameter is optional, and its default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Presence {
-    /// It must stand.
+    /// The parameter is required.
     Required,
-    /// It stands whole or not at all.
+    /// The parameter is given whole or omitted.
     Optional(&'static str),
-    /// Its numbers may be left out one by one, from the end.
+    /// Its numbers may be omitted one by one, from the end.
     FromTheEnd(&'static str),
 }
 
-/// What numbers measure.
+/// The quantity that numbers measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// How many of something.
+    /// A count in this unit.
     Count(Unit),
-    /// A length.
+    /// A length in world units.
     Length,
     /// A position in the world.
     Position,
@@ -95,30 +95,30 @@ pub enum Kind {
     WindowPosition,
     /// A direction, of any length.
     Direction,
-    /// An angle.
+    /// An angle in degrees.
     Angle,
-    /// Angles about the axes.
+    /// Angles about the three axes.
     Rotation,
-    /// A plain number.
+    /// A number without unit.
     Plain,
     /// Red, green and blue.
     Color,
-    /// What share of the light a surface sends on, for red, green and blue.
+    /// The share of the light that a surface sends on, for red, green and blue.
     Coefficients,
     /// An error of a picture.
     Error,
-    /// A word.
+    /// A word instead of a number.
     Word,
 }
 
-/// What a number counts by.
+/// The unit of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
     /// Pixels of the image.
     Pixels,
     /// Rays of a pixel.
     Rays,
-    /// Times that a ray is sent on.
+    /// Reflections and refractions of a ray.
     Bounces,
     /// Frames of the animation.
     Frames,
@@ -130,47 +130,48 @@ pub enum Unit {
     Display,
     /// Degrees of an angle.
     Degrees,
-    /// A plain number.
+    /// A number without unit.
     One,
 }
 
-/// Which values a parameter may have.
+/// The allowed values of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Values {
-    /// Any.
+    /// All numbers.
     Any,
-    /// Any; taken as 0 below 0 and as 1 above 1.
+    /// All numbers; below 0 they count as 0, and above 1 as 1.
     Clamped,
-    /// Greater than 0.
+    /// Numbers greater than 0.
     Positive,
-    /// At least 0.
+    /// Numbers of at least 0.
     NotNegative,
-    /// At least 1.
+    /// Numbers of at least 1.
     AtLeastOne,
-    /// From 0 to 1.
+    /// Numbers from 0 to 1.
     Share,
-    /// From 0 to below 180.
+    /// Numbers from 0 to below 180.
     HalfTurn,
-    /// Above 0 and below 180.
+    /// Numbers above 0 and below 180.
     FieldOfView,
-    /// Not all components 0.
+    /// Vectors with a component other than 0.
     NotZero,
     /// Whole numbers in a range.
     Whole(u32, u32),
-    /// One of some words, in any letter case; its number is its place among them.
+    /// One of some words, in any letter case. It is stored as its index.
     OneOf(&'static [&'static str]),
 }
 
-/// A condition on several parameters, which it names by their place among the fields.
+/// A constraint on several parameters, given by their field indices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Together {
-    /// Two positions or numbers are not the same.
+pub enum Constraint {
+    /// Two positions or numbers differ.
     Differ(usize, usize),
     /// Two positions differ in every component.
     DifferEverywhere(usize, usize),
     /// Two directions are not parallel.
     NotParallel(usize, usize),
-    /// From the first position to the second is not parallel to the third, a direction, where that is given.
+    /// The direction from the first position to the second is not parallel to the third field, if
+    /// that direction is given.
     LooksAside(usize, usize, usize),
     /// The first number is greater than the second.
     Greater(usize, usize),
@@ -180,15 +181,15 @@ pub enum Together {
     InOrder(usize, usize),
 }
 
-/// A thing of the model that a line of a script holds.
+/// An item of the model that a line of a script holds.
 pub(crate) trait Scripted: Sized {
-    /// The line's command.
+    /// The syntax of the line.
     const FORM: Form;
 
-    /// From the numbers of a line; all that is wrong with them.
+    /// Makes the item from the numbers of a line, or returns all errors in them.
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults>;
 
-    /// Its numbers, in the order of the form.
+    /// Writes the numbers in the order of the form.
     fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result;
 }
 
@@ -206,36 +207,36 @@ impl Form {
             most += count;
             i += 1;
         }
-        let (subject, together, curves, ends_with) = (None, &[], true, None);
-        Self { name, subject, fields, together, curves, ends_with, required, most, surface }
+        let (subject, constraints, curves, ends_with) = (None, &[], true, None);
+        Self { name, subject, fields, constraints, curves, ends_with, required, most, surface }
     }
 
-    /// The same, with a name before its numbers.
+    /// Adds a name before the numbers.
     pub(crate) const fn with_subject(self, subject: Subject) -> Self {
         Self { subject: Some(subject), ..self }
     }
 
-    /// The same, with the name of a material behind its numbers.
+    /// Adds the name of a material after the numbers.
     pub(crate) const fn ending_with(self, names: Names) -> Self {
         Self { ends_with: Some(names), ..self }
     }
 
-    /// The same, with conditions on several parameters.
-    pub(crate) const fn with(self, together: &'static [Together]) -> Self {
-        Self { together, ..self }
+    /// Adds constraints on several parameters.
+    pub(crate) const fn with(self, constraints: &'static [Constraint]) -> Self {
+        Self { constraints, ..self }
     }
 
-    /// The same, without curves.
+    /// Forbids curves.
     pub(crate) const fn fixed(self) -> Self {
         Self { curves: false, ..self }
     }
 
-    /// The least and the most numbers that it takes.
+    /// Returns the least and the largest count of numbers.
     pub const fn arity(&self) -> (usize, usize) {
         (self.required, self.most)
     }
 
-    /// Whether it takes as many numbers.
+    /// Returns whether this count of numbers is allowed.
     pub fn takes(&self, count: usize) -> bool {
         if self.required == self.most {
             return count == self.most;
@@ -251,38 +252,38 @@ impl Form {
             })
     }
 
-    /// All counts of numbers that it takes.
+    /// Returns all allowed counts of numbers.
     pub fn counts(&self) -> impl Iterator<Item = usize> {
         (self.required..=self.most).filter(|count| self.takes(*count))
     }
 
-    /// The number in whose place, and that of all that follow, the name of a material may stand.
+    /// Returns the first number that the name of a material may replace, together with all that follow.
     pub const fn surface(&self) -> Option<usize> {
         self.surface
     }
 
-    /// Its numbers in their order, each with its name and its field.
+    /// Returns the numbers in order, each with its name and its field.
     pub fn numbers(&self) -> impl Iterator<Item = (&'static str, &'static Field)> {
         self.fields.iter().flat_map(|field| field.names.iter().map(move |name| (*name, field)))
     }
 
-    /// The name of number `i`, and the field that it belongs to.
+    /// Returns the name of number `i`, and its field.
     ///
     /// # Panics
-    /// When there are not as many.
+    /// Panics if there are not as many numbers.
     pub(crate) fn number(&self, i: usize) -> (&'static str, &'static Field) {
         let number = self.numbers().nth(i);
         number.unwrap_or_else(|| unreachable!("`{}` has no number {i}", self.name))
     }
 
-    /// Where the numbers of field `i` stand among all.
+    /// Returns the range of field `i`'s numbers among all.
     pub(crate) fn span(&self, i: usize) -> Range<usize> {
         let start = self.fields[..i].iter().map(|field| field.names.len()).sum();
         start..start + self.fields[i].names.len()
     }
 
-    /// From the first to the last of the numbers for which `concerns` holds, given their name and parameter; all of
-    /// them if it holds for none.
+    /// Returns the range from the first to the last number for which `concerns` holds, given their name and
+    /// parameter. Returns all if it holds for none.
     pub(crate) fn place(&self, concerns: impl Fn(&str, Parameter) -> bool) -> Range<usize> {
         let mut concerned =
             self.numbers().enumerate().filter(|(_, (name, field))| concerns(name, field.parameter));
@@ -291,7 +292,7 @@ impl Form {
     }
 }
 
-/// `Sphere R cx cy cz ar ag ab rr rg rb [sr sg sb]`.
+/// Writes the usage: `Sphere R cx cy cz ar ag ab rr rg rb [sr sg sb]`.
 impl Display for Form {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         f.write_str(self.name)?;
@@ -320,19 +321,19 @@ impl Field {
         Self { parameter, names, kind, values, presence: Presence::Required }
     }
 
-    /// The same, but it may be left out, as a whole; what holds then.
+    /// Makes the field optional as a whole, with a default.
     pub(crate) const fn optional(self, default: &'static str) -> Self {
         Self { presence: Presence::Optional(default), ..self }
     }
 
-    /// The same, but its numbers may be left out from the end; what holds then.
+    /// Makes the numbers of the field optional from the end, with a default.
     pub(crate) const fn omittable(self, default: &'static str) -> Self {
         Self { presence: Presence::FromTheEnd(default), ..self }
     }
 }
 
 impl Presence {
-    /// What holds where it is left out.
+    /// Returns the default of an omitted parameter.
     pub fn default(self) -> Option<&'static str> {
         match self {
             Self::Required => None,
@@ -342,7 +343,7 @@ impl Presence {
 }
 
 impl Values {
-    /// Whether a number may have all values from `low` to `high`; conditions on several components are not looked at.
+    /// Returns whether a number may have all values from `low` to `high`. Ignores constraints on several components.
     pub(crate) fn take(self, low: f64, high: f64) -> bool {
         match self {
             Self::Any | Self::Clamped | Self::NotZero => low.is_finite() && high.is_finite(),
@@ -361,7 +362,7 @@ impl Values {
 }
 
 impl Kind {
-    /// What its numbers count by.
+    /// Returns the unit of the numbers.
     pub fn unit(self) -> Unit {
         match self {
             Self::Count(unit) => unit,
@@ -435,8 +436,8 @@ impl Display for Presence {
 }
 
 impl Names {
-    /// One thing that has such a name.
-    pub fn thing(self) -> &'static str {
+    /// Returns the noun for an item with such a name.
+    pub fn noun(self) -> &'static str {
         match self {
             Self::Materials => "material",
             Self::Groups => "group",
@@ -444,9 +445,9 @@ impl Names {
     }
 }
 
-impl Together {
-    /// As a person reads it, of the names of the parameters of `form`.
-    pub fn told(self, form: &Form) -> String {
+impl Constraint {
+    /// Describes the constraint in words, with the names of the parameters of `form`.
+    pub fn describe(self, form: &Form) -> String {
         let names = |field: usize| format!("`{}`", form.fields[field].names.join(" "));
         match self {
             Self::Differ(a, b) => format!("{} and {} differ", names(a), names(b)),

@@ -1,4 +1,4 @@
-//! What a ray sees that hits nothing.
+//! The background: the colour of rays that hit nothing.
 
 use std::fmt;
 
@@ -7,7 +7,8 @@ use glam::DVec3;
 use super::invalid::{Faults, InvalidValue, Parameter, finite};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 
-/// A colour, or two between which the height of a ray chooses, each channel in 0..=1; black unless it is set.
+/// One colour, or a gradient between two by the height of the ray direction. Each channel is
+/// in 0..=1. Default: black.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Background {
     low: DVec3,
@@ -15,33 +16,33 @@ pub struct Background {
 }
 
 impl Background {
-    /// Each channel is clamped to 0..=1, and a zero is without a sign.
+    /// Makes a background of one colour. Clamps each channel to 0..=1, and makes zeros positive.
     ///
     /// # Errors
-    /// When a channel is not finite.
+    /// Fails if a channel is not finite.
     pub fn new(color: DVec3) -> Result<Self, InvalidValue> {
         Ok(Self { low: clamped(color)?, high: None })
     }
 
-    /// From one colour, seen straight down, to another, seen straight up.
+    /// Makes a gradient from one colour, seen straight down, to another, seen straight up.
     ///
     /// # Errors
-    /// When a channel is not finite.
+    /// Fails if a channel is not finite.
     pub fn sky(low: DVec3, high: DVec3) -> Result<Self, InvalidValue> {
         Ok(Self { low: clamped(low)?, high: Some(clamped(high)?) })
     }
 
-    /// Of all rays; `None` where it depends on their height.
+    /// Returns the colour of all rays, or `None` if it depends on their height.
     pub fn color(self) -> Option<DVec3> {
         if self.high.is_none() { Some(self.low) } else { None }
     }
 
-    /// The first colour and, if there is one, the second.
+    /// Returns the first colour and, if there is one, the second.
     pub fn colors(self) -> (DVec3, Option<DVec3>) {
         (self.low, self.high)
     }
 
-    /// What a ray of this unit direction sees: first + (second - first)·(½ + ½·y).
+    /// Returns the colour in this unit direction: first + (second - first)·(½ + ½·y).
     pub fn along(self, direction: DVec3) -> DVec3 {
         match self.high {
             Some(high) => self.low + (high - self.low) * (0.5 + 0.5 * direction.y),
@@ -50,7 +51,7 @@ impl Background {
     }
 }
 
-/// Each channel clamped to 0..=1; a zero is without a sign.
+/// Clamps each channel to 0..=1, and makes zeros positive.
 fn clamped(color: DVec3) -> Result<DVec3, InvalidValue> {
     Ok(finite(Parameter::Background, color)?.clamp(DVec3::ZERO, DVec3::ONE) + 0.0)
 }

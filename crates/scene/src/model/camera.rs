@@ -1,4 +1,4 @@
-//! Cameras: which ray a pixel is.
+//! Cameras: the mapping from pixels to rays.
 
 use std::fmt::{self, Formatter};
 
@@ -8,12 +8,12 @@ use super::invalid::{Faults, InvalidValue, Parameter, direction, finite, positiv
 use super::look::Look;
 use super::screen::Screen;
 use super::vector::{cross, is_parallel, level, unit};
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values, write_line};
+use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values, write_line};
 
 /// The command of the orthographic camera.
 pub(crate) const ORTHOCAMERA: Form = Form::new("Orthocamera", &[]);
 
-/// Where the ray of a pixel starts and where it goes.
+/// The mapping from a pixel to the origin and the direction of its ray.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum Camera {
     /// The ray of column i, row j (from the bottom) starts at (i, j, 0) and goes (0, 0, -1).
@@ -21,12 +21,12 @@ pub enum Camera {
     Orthographic,
     /// All rays start at the eye.
     Pinhole(Pinhole),
-    /// All rays start at the eye, and the middle one meets a target.
+    /// All rays start at the eye, and the middle one points at a target.
     Look(Look),
 }
 
 impl Camera {
-    /// As a line of a script.
+    /// Writes a line of a script.
     pub(crate) fn write(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {
             Self::Orthographic => writeln!(f, "{}", ORTHOCAMERA.name),
@@ -48,7 +48,7 @@ impl From<Look> for Camera {
     }
 }
 
-/// A pinhole camera: the window lies at a distance in front of the eye, square to the gaze.
+/// A pinhole camera: the window is perpendicular to the view direction, at a distance in front of the eye.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pinhole {
     eye: DVec3,
@@ -60,13 +60,13 @@ pub struct Pinhole {
 }
 
 impl Pinhole {
-    /// `eye` is a position, `gaze` and `up` directions of any length, `distance` that of the window from the eye;
-    /// `lower_left` (au, av) and `upper_right` (bu, bv) are the window's corners in its own plane. A window whose
-    /// corners are swapped mirrors the image.
+    /// Makes a camera. `eye` is a position. `gaze` and `up` are directions of any length. `distance` is that of the
+    /// window from the eye. `lower_left` (au, av) and `upper_right` (bu, bv) are the window's corners in its own
+    /// plane. A window with swapped corners mirrors the image.
     ///
     /// # Errors
-    /// When a number is not finite, gaze or up is zero, the two are parallel, the distance is not positive, or the
-    /// window is empty.
+    /// Fails if a number is not finite, gaze or up is zero, the two are parallel, the distance is not positive, or
+    /// the window is empty.
     pub fn new(
         eye: DVec3,
         gaze: DVec3,
@@ -78,7 +78,7 @@ impl Pinhole {
         Self::checked(eye, gaze, up, distance, lower_left, upper_right).map_err(|faults| faults[0])
     }
 
-    /// As [`Pinhole::new`], but says everything that is wrong.
+    /// Checks like [`Pinhole::new`], but returns all errors.
     fn checked(
         eye: DVec3,
         gaze: DVec3,
@@ -110,49 +110,49 @@ impl Pinhole {
         }
     }
 
-    /// Where the rays start.
+    /// Returns the origin of the rays.
     pub fn eye(&self) -> DVec3 {
         self.eye
     }
 
-    /// Direction of the gaze, of any length.
+    /// Returns the view direction, of any length.
     pub fn gaze(&self) -> DVec3 {
         self.gaze
     }
 
-    /// View-up, of any length.
+    /// Returns the view-up direction, of any length.
     pub fn up(&self) -> DVec3 {
         self.up
     }
 
-    /// Distance of the window from the eye, greater than zero.
+    /// Returns the distance of the window from the eye, greater than 0.
     pub fn distance(&self) -> f64 {
         self.distance
     }
 
-    /// The window's lower-left corner (au, av).
+    /// Returns the window's lower-left corner (au, av).
     pub fn lower_left(&self) -> DVec2 {
         self.lower_left
     }
 
-    /// The window's upper-right corner (bu, bv).
+    /// Returns the window's upper-right corner (bu, bv).
     pub fn upper_right(&self) -> DVec2 {
         self.upper_right
     }
 
-    /// The window (au, av, bu, bv) that would show things in their shape on a screen, as high and around the same middle; `None`
-    /// where this one does, to 2 %.
+    /// Returns the window (au, av, bu, bv) with square pixels on a screen, with the same height and centre. Returns
+    /// `None` if this window has square pixels already, to within 2 %.
     pub fn unsquashed(&self, screen: Screen) -> Option<[f64; 4]> {
         let (a, b) = (self.lower_left, self.upper_right);
         unsquashed([a.x, a.y, b.x, b.y], screen)
     }
 
-    /// The orthonormal frame (u, v, w): u to the right, v up, w against the gaze.
+    /// Returns the orthonormal frame (u, v, w): u to the right, v up, w against the view direction.
     ///
     /// w = -g/|g|, u = (up x w)/|up x w|, v = w x u.
     pub fn basis(&self) -> (DVec3, DVec3, DVec3) {
         let w = -unit(self.gaze);
-        // The same as up x w, but from the numbers of the script, which are exact.
+        // Equal to up x w, but computed from the exact numbers of the script.
         let u = unit(cross(level(self.gaze), level(self.up)));
         (u, w.cross(u), w)
     }
@@ -170,7 +170,7 @@ impl Scripted for Pinhole {
             Field::new(Parameter::WindowCorner, &["bu", "bv"], Kind::WindowPosition, Values::Any),
         ],
     )
-    .with(&[Together::NotParallel(1, 2), Together::DifferEverywhere(4, 5)]);
+    .with(&[Constraint::NotParallel(1, 2), Constraint::DifferEverywhere(4, 5)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let [eye, gaze, up] = [numbers.vector(), numbers.vector(), numbers.vector()];
@@ -185,11 +185,11 @@ impl Scripted for Pinhole {
     }
 }
 
-/// How far a window's shape may be from the image's. A window's outer pixels lie on its border, so that its shape is
-/// between nx : ny and (nx - 1) : (ny - 1); and people round the shape that they write.
+/// The largest relative difference between the shapes of window and image. A window's outer pixels lie on its border,
+/// so its shape is between nx : ny and (nx - 1) : (ny - 1). Users also round the numbers that they write.
 const TOLERANCE: f64 = 0.02;
 
-/// The window that would show things in their shape, if this one does not: as high, and around the same middle.
+/// Returns the window with square pixels, with the same height and centre, or `None` if this one has them.
 pub(crate) fn unsquashed([au, av, bu, bv]: [f64; 4], screen: Screen) -> Option<[f64; 4]> {
     let (nx, ny) = (f64::from(screen.width()), f64::from(screen.height()));
     // A single column or row shows the middle of the window, whatever its shape.
@@ -274,7 +274,7 @@ mod tests {
             factor in prop_oneof![-1000..=-1i32, 1..=1000i32],
             scale in -300..=300i32,
         ) {
-            // The decimals that a script would hold: parallel on paper, rounded one by one when they are read.
+            // The decimals that a script holds: parallel on paper, but each rounded when it is read.
             let read = |n: i32, exponent: i32| format!("{n}e{exponent}").parse::<f64>().unwrap();
             let gaze = DVec3::new(read(x, -3), read(y, -3), read(z, -3));
             let up = DVec3::new(read(x * factor, scale), read(y * factor, scale), read(z * factor, scale));

@@ -1,39 +1,39 @@
-//! Clauses: what a `Material` says of a surface.
+//! The clauses of a `Material`.
 
 use glam::DVec3;
 
 use super::invalid::{Faults, InvalidValue, Parameter, finite};
 use super::material::{Coefficients, Finish, Glass, Material, Pattern, Shine, Weight};
 use super::surface::{AMBIENT, DIFFUSE, MIRROR};
-use crate::form::{Field, Form, Kind, Names, Numbers, Presence, Subject, Together, Values};
+use crate::form::{Constraint, Field, Form, Kind, Names, Numbers, Presence, Subject, Values};
 
-/// The command that names a material.
+/// The command that defines a material.
 pub(crate) const MATERIAL: Form = Form::new("Material", &[]).with_subject(Subject::Defines(Names::Materials));
 
-/// Defines [`Clause`] from its names, so that the list of all is whole.
+/// Defines [`Clause`] from its names, so that the list of all clauses is complete.
 macro_rules! clauses {
-    ($($clause:ident: $form:expr, $about:literal;)*) => {
-        /// What a `Material` can say of a surface, each at most once.
+    ($($clause:ident: $form:expr, $summary:literal;)*) => {
+        /// A clause of a `Material`, each at most once.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Clause {
-            $(#[doc = $about] $clause,)*
+            $(#[doc = $summary] $clause,)*
         }
 
         impl Clause {
-            /// All of them, in the order of the documentation.
+            /// All clauses, in the order of the documentation.
             pub const ALL: &[Self] = &[$(Self::$clause,)*];
 
-            /// How it is written.
+            /// Returns the syntax of the clause.
             pub const fn form(self) -> &'static Form {
                 match self {
                     $(Self::$clause => &const { $form },)*
                 }
             }
 
-            /// What it says, in a few words.
-            pub const fn about(self) -> &'static str {
+            /// Returns a one-line summary of the clause.
+            pub const fn summary(self) -> &'static str {
                 match self {
-                    $(Self::$clause => $about,)*
+                    $(Self::$clause => $summary,)*
                 }
             }
         }
@@ -57,35 +57,35 @@ const ENDS: &[Field] = &[
 ];
 
 clauses! {
-    Ambient: Form::new("ambient", &[AMBIENT]), "The colour that needs no light.";
-    Diffuse: Form::new("diffuse", &[DIFFUSE]), "What is scattered of the light that arrives.";
-    Mirror: Form::new("mirror", WHOLE_MIRROR), "What is mirrored of the colour along the reflected ray.";
-    Shine: Form::new("shine", SHINE), "Highlights.";
-    Glass: Form::new("glass", GLASS), "Light goes through.";
+    Ambient: Form::new("ambient", &[AMBIENT]), "The colour without light.";
+    Diffuse: Form::new("diffuse", &[DIFFUSE]), "The diffuse reflectance.";
+    Mirror: Form::new("mirror", WHOLE_MIRROR), "The share of the colour along the reflected ray.";
+    Shine: Form::new("shine", SHINE), "Specular highlights.";
+    Glass: Form::new("glass", GLASS), "The transmitted share of light, and the index of refraction.";
     Checker: Form::new("checker", SIZE).ending_with(Names::Materials), "Another material in every other cell.";
     Stripes: Form::new("stripes", SIZE).ending_with(Names::Materials), "Another material in every other stripe along x.";
-    Noise: Form::new("noise", SIZE).ending_with(Names::Materials), "Another material here and there.";
-    Gradient: Form::new("gradient", ENDS).with(&[Together::Differ(0, 1)]).ending_with(Names::Materials), "Another material from height a to height b.";
+    Noise: Form::new("noise", SIZE).ending_with(Names::Materials), "Another material in a random pattern.";
+    Gradient: Form::new("gradient", ENDS).with(&[Constraint::Differ(0, 1)]).ending_with(Names::Materials), "Another material from height a to height b.";
 }
 
 impl Clause {
-    /// Its name.
+    /// Returns the name of the clause.
     pub const fn name(self) -> &'static str {
         self.form().name
     }
 
-    /// The clause of this name, in any letter case.
+    /// Returns the clause with this name, in any letter case.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|c| c.name().eq_ignore_ascii_case(name))
     }
 
-    /// Whether it is a pattern, of which a material has at most one.
+    /// Returns whether the clause is a pattern. A material has at most one.
     pub(crate) fn is_pattern(self) -> bool {
         self.form().ends_with.is_some()
     }
 }
 
-/// A material that is put together from its clauses.
+/// A material that is assembled from its clauses.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Clauses {
     ambient: DVec3,
@@ -95,7 +95,7 @@ pub(crate) struct Clauses {
 }
 
 impl Clauses {
-    /// Adds a clause; `other` is the material that a pattern names.
+    /// Adds a clause. `other` is the material that a pattern names.
     pub(crate) fn add(
         &mut self,
         clause: Clause,
@@ -120,7 +120,7 @@ impl Clauses {
         Ok(())
     }
 
-    /// The whole.
+    /// Returns the assembled material.
     pub(crate) fn material(self) -> Result<Material, InvalidValue> {
         let coefficients = Coefficients::new(self.ambient, self.diffuse, self.mirror)?;
         Ok(Material::finished(coefficients, self.finish))

@@ -1,22 +1,22 @@
-//! Why a value cannot be built, and the checks that say so.
+//! The reasons why a value cannot be built, and the checks that return them.
 
 use std::fmt;
 
 use glam::DVec3;
 
-/// Why a value cannot be part of a scene or of an animation's settings.
+/// The reason why a value cannot be part of a scene or of an animation's settings.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum InvalidValue {
     /// A component is infinite or not a number.
     #[error("{0} must be finite")]
     NotFinite(Parameter),
-    /// A length that must be positive is zero or negative.
+    /// A number that must be positive is zero or negative.
     #[error("{0} must be greater than zero")]
     NotPositive(Parameter),
     /// A direction has no length.
     #[error("{0} must not be zero")]
     ZeroDirection(Parameter),
-    /// Gaze and view-up span no plane.
+    /// Gaze and view-up are parallel.
     #[error("the gaze and the view-up must not be parallel")]
     GazeParallelToUp,
     /// The window has no width: au equals bu.
@@ -28,32 +28,32 @@ pub enum InvalidValue {
     /// A count is zero.
     #[error("{0} must be at least 1")]
     Zero(Parameter),
-    /// A number is not one of the whole numbers of a range.
+    /// A number is not a whole number in the allowed range.
     #[error("{0} must be a whole number from {1} to {2}")]
     NotWhole(Parameter, u32, u32),
-    /// A number lies outside the range that makes sense for it.
+    /// A number is outside of its allowed range.
     #[error("{0} must be from {1} to {2}")]
     OutOfRange(Parameter, f64, f64),
-    /// A number that must not be negative is.
+    /// A number that must not be negative is negative.
     #[error("{0} must not be negative")]
     Negative(Parameter),
-    /// A number is below the least that it may be.
+    /// A number is below its minimum.
     #[error("{0} must be at least {1}")]
     TooSmall(Parameter, f64),
     /// The ends of an axis are the same.
     #[error("the ends of the axis must differ")]
     NoAxis,
-    /// A cone has no radius at either end.
+    /// A cone has radius zero at both ends.
     #[error("the radii must not both be zero")]
     NoRadius,
-    /// The tube of a torus is as thick as its circle is wide.
+    /// The tube of a torus is at least as thick as its circle is wide.
     #[error("the thickness r must be less than the radius R")]
     ThickTorus,
-    /// A camera looks at the place where it is.
+    /// Eye and target of a camera are the same.
     #[error("the eye and the target must differ")]
     NoGaze,
     /// The last frame comes before the first.
-    #[error("the first frame must not be behind the last")]
+    #[error("the first frame must not be greater than the last")]
     FramesBackwards,
     /// A gradient has no width.
     #[error("the ends of the gradient must differ")]
@@ -61,7 +61,7 @@ pub enum InvalidValue {
 }
 
 impl InvalidValue {
-    /// Whether it is about the number `name` of a parameter.
+    /// Returns whether it is about the number `name` of a parameter.
     pub(crate) fn is_about(self, parameter: Parameter, name: &str) -> bool {
         match self {
             Self::NotFinite(about)
@@ -85,7 +85,7 @@ impl InvalidValue {
     }
 }
 
-/// All that is wrong with the numbers of a line.
+/// All errors in the numbers of a line.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Faults(pub(crate) Vec<InvalidValue>);
 
@@ -95,15 +95,15 @@ impl From<InvalidValue> for Faults {
     }
 }
 
-/// What is allowed, but hardly meant.
+/// A valid value that is probably a mistake; reported as a warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Doubt {
-    /// A triangle without area is never hit.
+pub(crate) enum Lint {
+    /// A triangle has no area, so it is never hit.
     DegenerateTriangle,
 }
 
-impl Doubt {
-    /// What it is about.
+impl Lint {
+    /// Returns the parameter that the lint is about.
     pub(crate) fn parameter(self) -> Parameter {
         match self {
             Self::DegenerateTriangle => Parameter::Vertex,
@@ -111,108 +111,108 @@ impl Doubt {
     }
 }
 
-/// What an [`InvalidValue`] is about.
+/// The parameter that an [`InvalidValue`] is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parameter {
-    /// nx of `Screen`.
+    /// The number nx of `Screen`.
     ScreenWidth,
-    /// ny of `Screen`.
+    /// The number ny of `Screen`.
     ScreenHeight,
-    /// Colour of a ray that hits nothing.
+    /// The colour of a ray that hits nothing.
     Background,
-    /// Where the rays of a pinhole camera start.
+    /// The origin of a pinhole camera's rays.
     Eye,
-    /// Direction of the camera's gaze.
+    /// The view direction of the camera.
     Gaze,
-    /// The camera's view-up.
+    /// The camera's view-up direction.
     Up,
-    /// Distance of the camera's window from the eye.
+    /// The distance of the camera's window from the eye.
     WindowDistance,
-    /// Corner (au, av) or (bu, bv) of the camera's window.
+    /// The corner (au, av) or (bu, bv) of the camera's window.
     WindowCorner,
-    /// Radius of a sphere.
+    /// The radius of a sphere.
     Radius,
-    /// Centre of a sphere.
+    /// The centre of a sphere.
     Center,
     /// A corner of a triangle.
     Vertex,
     /// A corner of a box.
     Corner,
-    /// What a surface shows without light.
+    /// The colour of a surface without light.
     Ambient,
-    /// What a surface scatters.
+    /// The diffuse reflectance of a surface.
     Diffuse,
-    /// What a surface mirrors.
+    /// The specular reflectance of a surface.
     Mirror,
-    /// Colour of a light.
+    /// The colour of a light.
     LightColor,
     /// The direction in which a light travels.
     LightDirection,
-    /// Where a camera looks.
+    /// The point that a camera looks at.
     Target,
     /// A camera's vertical angle of view.
     FieldOfView,
-    /// Radius of a lens.
+    /// The radius of a lens.
     LensRadius,
-    /// The distance at which a lens is sharp.
+    /// The distance at which a lens is in focus.
     FocusDistance,
-    /// Rays a pixel.
+    /// The number of rays per pixel.
     Samples,
     /// The error that a picture may have.
     SamplingError,
-    /// How long the shutter is open.
+    /// The time that the shutter is open.
     Shutter,
-    /// Bounces that are followed.
+    /// The largest number of bounces.
     Depth,
     /// A point of a plane.
     PlanePoint,
-    /// What a flat or round thing is square to.
+    /// The normal of a flat or round shape.
     Normal,
     /// An end of an axis.
     AxisEnd,
-    /// Radius of a cone at a.
+    /// The radius of a cone at a.
     RadiusA,
-    /// Radius of a cone at b.
+    /// The radius of a cone at b.
     RadiusB,
-    /// Radius of a torus's tube.
+    /// The radius of a torus's tube.
     Thickness,
-    /// Where a group is drawn.
+    /// The translation of a group.
     Translation,
-    /// How a group is turned.
+    /// The rotation of a group.
     Rotation,
-    /// How a group is scaled.
+    /// The scale of a group.
     Scale,
-    /// The angle that a sun spans.
+    /// The apparent diameter of a sun.
     SunAngle,
-    /// Where a lamp is.
+    /// The position of a lamp.
     LampPosition,
-    /// Radius of a lamp.
+    /// The radius of a lamp.
     LampRadius,
-    /// The distance at which a lamp's colour arrives.
+    /// The distance at which a lamp has its given colour.
     Reach,
-    /// Colour of a highlight.
+    /// The colour of a highlight.
     Shine,
-    /// How sharp a highlight is.
+    /// The exponent of a highlight.
     ShineExponent,
-    /// What glass lets through.
+    /// The transmittance of glass.
     Glass,
-    /// Index of refraction.
+    /// The index of refraction.
     Ior,
-    /// Size of a pattern's cells.
+    /// The size of a pattern's cells.
     CellSize,
-    /// Where a gradient starts.
+    /// The start of a gradient.
     GradientStart,
-    /// Where a gradient ends.
+    /// The end of a gradient.
     GradientEnd,
-    /// From a colour to the levels of a pixel.
+    /// The conversion of a colour to the levels of a pixel.
     Tone,
     /// The number of the first frame.
     FirstFrame,
     /// The number of the last frame.
     LastFrame,
-    /// How many frames an animation waits for.
+    /// The number of frames that an animation waits for.
     FrameCount,
-    /// Frames a second.
+    /// The number of frames per second.
     FrameRate,
 }
 

@@ -6,10 +6,10 @@ use glam::DVec3;
 
 use super::invalid::{Faults, InvalidValue, Parameter, finite};
 use super::vector::{cross, is_parallel, level, unit};
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
+use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 
-/// A pinhole camera at an eye that looks at a target, with square pixels: the ray of column i and row j goes
-/// tan(fov/2)·((2i + 1 - nx)·u + (2j + 1 - ny)·v)/ny - w, in the frame of [`Look::basis`].
+/// A pinhole camera at an eye that looks at a target, with square pixels. The ray of column i and row j has the
+/// direction tan(fov/2)·((2i + 1 - nx)·u + (2j + 1 - ny)·v)/ny - w, in the frame of [`Look::basis`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     eye: DVec3,
@@ -19,12 +19,13 @@ pub struct Look {
 }
 
 impl Look {
-    /// `eye` and `target` are positions, `field_of_view` is the vertical angle in degrees; `up` a direction of any
-    /// length: if it is not given, y, or -z for a gaze that is parallel to y, which is then drawn as if it were exactly so.
+    /// Makes a camera. `eye` and `target` are positions, and `field_of_view` is the vertical angle in degrees. `up`
+    /// is a direction of any length. Default: y, or -z if the view direction is parallel to y, which is then
+    /// treated as exactly parallel.
     ///
     /// # Errors
-    /// When eye and target are the same, the angle is not above 0 and below 180, up is given and zero or parallel to the
-    /// gaze, or a number is not finite.
+    /// Fails if eye and target are the same, the angle is not above 0 and below 180, `up` is zero or parallel to the
+    /// view direction, or a number is not finite.
     pub fn new(
         eye: DVec3,
         target: DVec3,
@@ -57,38 +58,39 @@ impl Look {
         if faults.is_empty() { Ok(look) } else { Err(faults) }
     }
 
-    /// Where the rays start.
+    /// Returns the origin of the rays.
     pub fn eye(&self) -> DVec3 {
         self.eye
     }
 
-    /// Where it looks.
+    /// Returns the target of the camera.
     pub fn target(&self) -> DVec3 {
         self.target
     }
 
-    /// The vertical angle in degrees, above 0 and below 180.
+    /// Returns the vertical angle in degrees, above 0 and below 180.
     pub fn field_of_view(&self) -> f64 {
         self.field_of_view
     }
 
-    /// From the eye to the target, in a scale of its own.
+    /// Returns the vector from the eye to the target, at half length.
     pub fn gaze(&self) -> DVec3 {
         // Halves, so that the difference of two finite numbers is finite.
         0.5 * self.target - 0.5 * self.eye
     }
 
-    /// From the eye to the target, in world units.
+    /// Returns the distance from the eye to the target, in world units.
     pub fn distance(&self) -> f64 {
         2.0 * self.gaze().length()
     }
 
-    /// View-up, of any length.
+    /// Returns the view-up direction, of any length.
     pub fn up(&self) -> DVec3 {
         self.gaze_and_up().1
     }
 
-    /// The orthonormal frame (u, v, w): u to the right, v up, w against the gaze, as [`super::Pinhole::basis`].
+    /// Returns the orthonormal frame (u, v, w): u to the right, v up, w against the
+    /// view direction, like [`super::Pinhole::basis`].
     pub fn basis(&self) -> (DVec3, DVec3, DVec3) {
         let (gaze, up) = self.gaze_and_up();
         let w = -unit(gaze);
@@ -96,7 +98,8 @@ impl Look {
         (u, w.cross(u), w)
     }
 
-    /// Without an up of its own a gaze that is parallel to y is turned into y, so that rounding has no say in the frame.
+    /// Without an own `up`, a view direction parallel to y is replaced by y, so that rounding does
+    /// not affect the frame.
     fn gaze_and_up(&self) -> (DVec3, DVec3) {
         let gaze = self.gaze();
         match self.up {
@@ -118,7 +121,7 @@ impl Scripted for Look {
                 .optional("0 1 0, or 0 0 -1 for a gaze along y"),
         ],
     )
-    .with(&[Together::Differ(0, 1), Together::LooksAside(0, 1, 3)]);
+    .with(&[Constraint::Differ(0, 1), Constraint::LooksAside(0, 1, 3)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let (eye, target, field_of_view) = (numbers.vector(), numbers.vector(), numbers.number());
@@ -159,7 +162,7 @@ mod tests {
 
     #[test]
     fn frames_beside_the_pole_of_an_orbit_look_as_the_orbit_does() {
-        // Over the pole from +z to -z, as near as is not parallel: the picture's right is that of the orbit.
+        // Over the pole from +z to -z, as close as is not parallel: the picture's right is that of the orbit.
         for sine in [1e-3, 1e-9, 1.01 / (1u64 << 40) as f64] {
             for (side, right) in [(1.0, DVec3::X), (-1.0, DVec3::NEG_X)] {
                 let (u, v, w) = look(DVec3::new(0.0, 5.0, 5.0 * side * sine), None).unwrap().basis();

@@ -1,4 +1,4 @@
-//! How a surface answers light.
+//! Materials: the response of a surface to light.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::invalid::{InvalidValue, Parameter, finite, positive};
 
-/// Coefficients of a surface, a channel each; any finite numbers.
+/// The coefficients of a surface per channel; any finite numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Coefficients {
     ambient: DVec3,
@@ -14,25 +14,25 @@ pub struct Coefficients {
     mirror: DVec3,
 }
 
-/// Coefficients of a surface, and what few surfaces have.
+/// The coefficients of a surface, and the optional finish.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Material {
     coefficients: Coefficients,
     finish: Option<Arc<Finish>>,
 }
 
-/// What a surface has beyond coefficients.
+/// The optional properties of a surface besides its coefficients.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Finish {
-    /// Highlights.
+    /// The specular highlights of the surface.
     pub shine: Option<Shine>,
-    /// Whether it is glass.
+    /// The transmission, if the surface is glass.
     pub glass: Option<Glass>,
-    /// Other coefficients here and there.
+    /// The pattern of other coefficients.
     pub pattern: Option<Pattern>,
 }
 
-/// Highlights: for each light that is not hidden, light·shine·max(0, N·h)ⁿ (Blinn and Phong).
+/// Highlights: for each visible light, light·shine·max(0, N·h)ⁿ (Blinn and Phong).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shine {
     color: DVec3,
@@ -40,8 +40,10 @@ pub struct Shine {
 }
 
 impl Shine {
+    /// Makes highlights.
+    ///
     /// # Errors
-    /// When the exponent is less than 1 or a number is not finite.
+    /// Fails if the exponent is less than 1 or a number is not finite.
     pub fn new(color: DVec3, exponent: f64) -> Result<Self, InvalidValue> {
         finite(Parameter::Shine, color)?;
         if !exponent.is_finite() {
@@ -53,18 +55,18 @@ impl Shine {
         Ok(Self { color, exponent })
     }
 
-    /// What share of a light, a channel each.
+    /// Returns the reflected share of a light, per channel.
     pub fn color(&self) -> DVec3 {
         self.color
     }
 
-    /// n, at least 1.
+    /// Returns the exponent n, at least 1.
     pub fn exponent(&self) -> f64 {
         self.exponent
     }
 }
 
-/// A surface that light goes through.
+/// A surface that transmits light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Glass {
     color: DVec3,
@@ -72,37 +74,37 @@ pub struct Glass {
 }
 
 impl Glass {
-    /// `ior` is the index of refraction of the inside over that of the outside.
+    /// Makes a transmitting surface. `ior` is the index of refraction of the inside relative to the outside.
     ///
     /// # Errors
-    /// When the index is not positive or a number is not finite.
+    /// Fails if the index is not positive or a number is not finite.
     pub fn new(color: DVec3, ior: f64) -> Result<Self, InvalidValue> {
         finite(Parameter::Glass, color)?;
         positive(Parameter::Ior, ior)?;
         Ok(Self { color, ior })
     }
 
-    /// What it lets through, a channel each.
+    /// Returns the transmitted share of light, per channel.
     pub fn color(&self) -> DVec3 {
         self.color
     }
 
-    /// Greater than zero.
+    /// Returns the index of refraction, greater than 0.
     pub fn ior(&self) -> f64 {
         self.ior
     }
 }
 
-/// Where a surface has other coefficients: (1 - w)·own + w·other.
+/// A blend of two sets of coefficients over the surface: (1 - w)·own + w·other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pattern {
-    /// How w comes from the place.
+    /// The weight w as a function of the position.
     pub weight: Weight,
-    /// The coefficients where w is 1.
+    /// The coefficients at w = 1.
     pub other: Coefficients,
 }
 
-/// How much of the other coefficients there is at a place, from 0 to 1; the place in the coordinates of the script.
+/// The weight of the other coefficients, from 0 to 1, as a function of the position in the coordinates of the script.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Weight {
     /// 1 in every other cell of that size, greater than 0, along the three axes.
@@ -116,8 +118,10 @@ pub enum Weight {
 }
 
 impl Weight {
+    /// Checks the numbers of the weight.
+    ///
     /// # Errors
-    /// When a size is not positive, the ends of a gradient are the same, or a number is not finite.
+    /// Fails if a size is not positive, the ends of a gradient are the same, or a number is not finite.
     pub fn checked(self) -> Result<Self, InvalidValue> {
         match self {
             Self::Checker(size) | Self::Stripes(size) | Self::Noise(size) => {
@@ -139,8 +143,10 @@ impl Weight {
 }
 
 impl Coefficients {
+    /// Makes coefficients.
+    ///
     /// # Errors
-    /// When a number is not finite.
+    /// Fails if a number is not finite.
     pub fn new(ambient: DVec3, diffuse: DVec3, mirror: DVec3) -> Result<Self, InvalidValue> {
         finite(Parameter::Ambient, ambient)?;
         finite(Parameter::Diffuse, diffuse)?;
@@ -148,25 +154,25 @@ impl Coefficients {
         Ok(Self { ambient, diffuse, mirror })
     }
 
-    /// The colour that needs no light.
+    /// Returns the colour without light.
     pub fn ambient(&self) -> DVec3 {
         self.ambient
     }
 
-    /// What is scattered of the light that arrives (Lambert).
+    /// Returns the diffuse reflectance (Lambert).
     pub fn diffuse(&self) -> DVec3 {
         self.diffuse
     }
 
-    /// What is mirrored of the colour along the reflected ray.
+    /// Returns the share of the colour along the reflected ray.
     pub fn mirror(&self) -> DVec3 {
         self.mirror
     }
 
-    /// (1 - w)·own + w·other for a weight from 0 to 1; its own for what is no such weight.
+    /// Returns (1 - w)·own + w·other for a weight from 0 to 1, else the own coefficients.
     #[must_use]
     pub fn mixed(&self, other: &Self, w: f64) -> Self {
-        // Where one of them is all, the other may be any number.
+        // If one of them has the whole weight, the other may be any number.
         if w == 1.0 {
             return *other;
         }
@@ -184,41 +190,41 @@ impl Coefficients {
 }
 
 impl Material {
-    /// Without a finish.
+    /// Makes a material without a finish.
     ///
     /// # Errors
-    /// When a number is not finite.
+    /// Fails if a number is not finite.
     pub fn new(ambient: DVec3, diffuse: DVec3, mirror: DVec3) -> Result<Self, InvalidValue> {
         Ok(Coefficients::new(ambient, diffuse, mirror)?.into())
     }
 
-    /// Coefficients and what there is beside them.
+    /// Makes a material with a finish.
     pub fn finished(coefficients: Coefficients, finish: Finish) -> Self {
         let finish = if finish == Finish::default() { None } else { Some(Arc::new(finish)) };
         Self { coefficients, finish }
     }
 
-    /// Its own, where a pattern says nothing else.
+    /// Returns the material's own coefficients, without its pattern.
     pub fn coefficients(&self) -> Coefficients {
         self.coefficients
     }
 
-    /// What few surfaces have; `None` for those of version 1.
+    /// Returns the finish, or `None` for materials of language version 1.
     pub fn finish(&self) -> Option<&Finish> {
         self.finish.as_deref()
     }
 
-    /// The colour that needs no light.
+    /// Returns the colour without light.
     pub fn ambient(&self) -> DVec3 {
         self.coefficients.ambient
     }
 
-    /// What is scattered of the light that arrives (Lambert).
+    /// Returns the diffuse reflectance (Lambert).
     pub fn diffuse(&self) -> DVec3 {
         self.coefficients.diffuse
     }
 
-    /// What is mirrored of the colour along the reflected ray.
+    /// Returns the share of the colour along the reflected ray.
     pub fn mirror(&self) -> DVec3 {
         self.coefficients.mirror
     }

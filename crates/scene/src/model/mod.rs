@@ -1,9 +1,9 @@
-//! The typed scene: what a `Trace` command renders.
+//! The typed scene that a `Trace` command renders.
 //!
-//! A bad value cannot be built: every type with a condition has private fields, a constructor that checks it and
-//! accessors. A thing that a line of a script holds says in its file also how it is written there
-//! (`form::Scripted`). Lengths are world units, colours are display values (0 black, 1 white, unclamped),
-//! positions and directions are right-handed with y up on the screen. All numbers are finite.
+//! An invalid value cannot be built: every type with a constraint has private fields, a checking constructor and
+//! accessors. The file of a type also defines its syntax in a script (`form::Scripted`). Lengths are world units.
+//! Colours are display values (0 black, 1 white, unclamped). Positions and directions are right-handed with y up on
+//! the screen. All numbers are finite.
 
 mod background;
 mod camera;
@@ -34,42 +34,42 @@ pub use vector::unit;
 
 pub(crate) use camera::{ORTHOCAMERA, unsquashed};
 pub(crate) use clause::{Clauses, MATERIAL};
-pub(crate) use invalid::{Doubt, Faults};
+pub(crate) use invalid::{Faults, Lint};
 pub(crate) use sampling::FrameNumbers;
 pub(crate) use shapes::USE;
 pub(crate) use vector::PARALLEL;
 
 use crate::shared_slice::SharedSlice;
 
-/// Everything that a frame is drawn from.
+/// The complete input of a frame's rendering.
 ///
 /// Objects and lights are shared, so that a script of many frames that adds to one scene does not copy it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// Size of the image.
+    /// The size of the image.
     pub screen: Screen,
-    /// Where the rays come from.
+    /// The camera that generates the rays.
     pub camera: Camera,
-    /// What a ray sees that hits nothing.
+    /// The colour of rays that hit nothing.
     pub background: Background,
-    /// In the order of the script: of hits at the same distance the first object wins.
+    /// The objects in the order of the script: of hits at the same distance, the first object wins.
     pub objects: SharedSlice<Object>,
-    /// In the order of the script, which is the order of summation.
+    /// The lights in the order of the script, which is the order of summation.
     pub lights: SharedSlice<Light>,
-    /// Rays a pixel.
+    /// The number of rays per pixel.
     pub samples: Samples,
-    /// How long a frame is exposed.
+    /// The exposure time of a frame.
     pub shutter: Shutter,
-    /// From colours to levels.
+    /// The conversion of colours to levels.
     pub tone: Tone,
-    /// Bounces that are followed.
+    /// The largest number of bounces.
     pub depth: Depth,
-    /// The camera's lens.
+    /// The lens of the camera.
     pub lens: Lens,
 }
 
 impl Scene {
-    /// An empty scene on a black background.
+    /// Makes an empty scene with a black background.
     pub fn new(screen: Screen, camera: Camera) -> Self {
         Self {
             screen,
@@ -88,7 +88,7 @@ impl Scene {
     /// Sets the background; each channel is clamped to 0..=1.
     ///
     /// # Errors
-    /// When a channel is not finite.
+    /// Fails if a channel is not finite.
     pub fn set_background(&mut self, color: DVec3) -> Result<(), InvalidValue> {
         self.background = Background::new(color)?;
         Ok(())

@@ -1,12 +1,12 @@
-//! What light in a pixel is: how it is sampled in the pixel, the lens and time, and how it is shown.
+//! Sampling and display: the samples over a pixel, the lens and the exposure time, and the conversion to levels.
 
 use std::fmt;
 
 use super::invalid::{Faults, InvalidValue, Parameter, not_negative};
 use super::screen::whole;
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Unit, Values};
+use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Unit, Values};
 
-/// How many rays a pixel gets at most, and to which error.
+/// The largest number of rays per pixel, and the error at which sampling stops earlier.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Samples {
     most: u32,
@@ -14,11 +14,12 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// `most` rays a pixel, fewer where the image's error is estimated to be below `error`, the root mean square in
-    /// levels (0..255); with an error of 0 always as many. One ray is version 1's: through the pixel's middle.
+    /// Makes a setting of at most `most` rays per pixel. Fewer are used where the image's error is estimated to be
+    /// below `error`, the root mean square in levels (0..255). With an error of 0, all rays are used. One ray is that
+    /// of language version 1, through the pixel's centre.
     ///
     /// # Errors
-    /// When there is no ray, or the error is negative or not finite.
+    /// Fails if there is no ray, or the error is negative or not finite.
     pub fn new(most: u32, error: f64) -> Result<Self, InvalidValue> {
         if most == 0 {
             return Err(InvalidValue::Zero(Parameter::Samples));
@@ -27,12 +28,12 @@ impl Samples {
         Ok(Self { most, error })
     }
 
-    /// Rays a pixel, at least 1.
+    /// Returns the largest number of rays per pixel, at least 1.
     pub fn most(self) -> u32 {
         self.most
     }
 
-    /// In levels.
+    /// Returns the error in levels.
     pub fn error(self) -> f64 {
         self.error
     }
@@ -63,20 +64,22 @@ impl Scripted for Samples {
     }
 }
 
-/// One ray a pixel.
+/// The default is one ray per pixel.
 impl Default for Samples {
     fn default() -> Self {
         Self { most: 1, error: 1.0 }
     }
 }
 
-/// What share of a frame's time the shutter is open, from 0 to 1.
+/// The share of a frame's time that the shutter is open, from 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Shutter(f64);
 
 impl Shutter {
+    /// Makes a shutter setting.
+    ///
     /// # Errors
-    /// When it is not from 0 to 1.
+    /// Fails if the share is not from 0 to 1.
     pub fn new(open: f64) -> Result<Self, InvalidValue> {
         if (0.0..=1.0).contains(&open) {
             Ok(Self(open))
@@ -85,7 +88,7 @@ impl Shutter {
         }
     }
 
-    /// From 0 to 1.
+    /// Returns the share, from 0 to 1.
     pub fn open(self) -> f64 {
         self.0
     }
@@ -104,7 +107,7 @@ impl Scripted for Shutter {
     }
 }
 
-/// From a colour to the levels of a pixel.
+/// The conversion of a colour to the levels of a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tone {
     /// Colours are display values.
@@ -115,7 +118,7 @@ pub enum Tone {
 }
 
 impl Tone {
-    /// Their words, in the order of the numbers that stand for them.
+    /// The words of the tones, in the order of the numbers that represent them.
     const WORDS: &[&str] = &["plain", "srgb"];
 }
 
@@ -136,16 +139,18 @@ impl Scripted for Tone {
     }
 }
 
-/// How many mirrorings and refractions are followed, from 0 to 64.
+/// The largest number of reflections and refractions of a ray, from 0 to 64.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Depth(u32);
 
 impl Depth {
-    /// The most that can be asked for.
+    /// The largest depth that is allowed.
     pub const MOST: u32 = 64;
 
+    /// Makes a depth.
+    ///
     /// # Errors
-    /// When it is more than [`Self::MOST`].
+    /// Fails if it is more than [`Self::MOST`].
     pub fn new(bounces: u32) -> Result<Self, InvalidValue> {
         if bounces <= Self::MOST {
             Ok(Self(bounces))
@@ -154,7 +159,7 @@ impl Depth {
         }
     }
 
-    /// How many.
+    /// Returns the number of bounces.
     pub fn bounces(self) -> u32 {
         self.0
     }
@@ -176,7 +181,7 @@ impl Scripted for Depth {
     }
 }
 
-/// As in version 1.
+/// The default is that of language version 1.
 impl Default for Depth {
     fn default() -> Self {
         Self(5)
@@ -191,11 +196,11 @@ pub struct Lens {
 }
 
 impl Lens {
-    /// A disc of that `radius` around the eye, square to the gaze, sharp at that `distance` along the gaze; if it is not
-    /// given, at the camera's own ([`super::Camera`]).
+    /// Makes a lens: a disc of this `radius` around the eye, perpendicular to the view direction. It is in focus at
+    /// this `distance` along the view direction. Default: the camera's own distance ([`super::Camera`]).
     ///
     /// # Errors
-    /// When the radius is negative, the distance is not positive, or a number is not finite.
+    /// Fails if the radius is negative, the distance is not positive, or a number is not finite.
     pub fn new(radius: f64, distance: Option<f64>) -> Result<Self, InvalidValue> {
         not_negative(Parameter::LensRadius, radius)?;
         if let Some(distance) = distance {
@@ -204,12 +209,12 @@ impl Lens {
         Ok(Self { radius, distance })
     }
 
-    /// 0 for a point.
+    /// Returns the radius, which is 0 for a pinhole.
     pub fn radius(self) -> f64 {
         self.radius
     }
 
-    /// Where it is sharp, along the gaze; `None` for the camera's own distance.
+    /// Returns the focus distance along the view direction, or `None` for the camera's own distance.
     pub fn distance(self) -> Option<f64> {
         self.distance
     }
@@ -241,7 +246,7 @@ impl Scripted for Lens {
     }
 }
 
-/// The frames that a `Trace` is, by their numbers.
+/// The frame numbers of a `Trace`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FrameNumbers {
     pub(crate) first: u32,
@@ -249,7 +254,7 @@ pub(crate) struct FrameNumbers {
 }
 
 impl FrameNumbers {
-    /// How many frames.
+    /// Returns the number of frames.
     pub(crate) fn count(self) -> u64 {
         u64::from(self.last - self.first) + 1
     }
@@ -264,7 +269,7 @@ impl Scripted for FrameNumbers {
                 .optional("1 to a"),
         ],
     )
-    .with(&[Together::InOrder(0, 1)])
+    .with(&[Constraint::InOrder(0, 1)])
     .fixed();
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {

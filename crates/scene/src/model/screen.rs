@@ -5,7 +5,7 @@ use std::fmt;
 use super::invalid::{Faults, InvalidValue, Parameter};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Unit, Values};
 
-/// Size of an image in pixels, at least 1 x 1.
+/// The size of an image in pixels, at least 1 x 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Screen {
     width: u32,
@@ -13,8 +13,10 @@ pub struct Screen {
 }
 
 impl Screen {
+    /// Makes a size.
+    ///
     /// # Errors
-    /// When a side is zero.
+    /// Fails if a side is zero.
     pub fn new(width: u32, height: u32) -> Result<Self, InvalidValue> {
         if width == 0 {
             return Err(InvalidValue::Zero(Parameter::ScreenWidth));
@@ -25,17 +27,17 @@ impl Screen {
         Ok(Self { width, height })
     }
 
-    /// Columns.
+    /// Returns the number of columns.
     pub fn width(self) -> u32 {
         self.width
     }
 
-    /// Rows.
+    /// Returns the number of rows.
     pub fn height(self) -> u32 {
         self.height
     }
 
-    /// Pixels in all.
+    /// Returns the number of pixels.
     pub fn pixels(self) -> u64 {
         u64::from(self.width) * u64::from(self.height)
     }
@@ -76,7 +78,7 @@ impl Scripted for Screen {
     }
 }
 
-/// A whole number of a range.
+/// Returns the whole number `x` if it is in a range.
 pub(super) fn whole(name: Parameter, least: u32, most: u32, x: f64) -> Result<u32, InvalidValue> {
     let fits = x.fract() == 0.0 && (f64::from(least)..=f64::from(most)).contains(&x);
     if fits { Ok(x as u32) } else { Err(InvalidValue::NotWhole(name, least, most)) }

@@ -1,11 +1,11 @@
-//! Directions and scales of vectors of any length, without overflow and without loss.
+//! Directions and scales of vectors of any length, without overflow and without loss of precision.
 
 use glam::DVec3;
 
-/// `v / |v|` for any finite non-zero vector, also where `|v|²` would overflow or vanish.
+/// Returns `v / |v|` for any finite non-zero vector, even if `|v|²` would overflow or underflow.
 pub fn unit(v: DVec3) -> DVec3 {
     let largest = v.abs().max_element();
-    // Powers of two, so that the direction of a scaled vector is the same bit for bit.
+    // Powers of two, so that a scaled vector has the same direction bit for bit.
     let scaled = if largest > 2f64.powi(500) {
         v * 2f64.powi(-600)
     } else if largest < 2f64.powi(-500) {
@@ -16,7 +16,7 @@ pub fn unit(v: DVec3) -> DVec3 {
     scaled / scaled.length()
 }
 
-/// The power of two that brings a positive `largest` to 1..2; 1 for zero.
+/// Returns the power of two that scales a positive `largest` to 1..2, or 1 for zero.
 pub(super) fn to_unit_scale(largest: f64) -> f64 {
     if largest == 0.0 {
         return 1.0;
@@ -25,8 +25,8 @@ pub(super) fn to_unit_scale(largest: f64) -> f64 {
     2f64.powi(-exponent)
 }
 
-/// Directions are parallel where the sine of their angle is at most this: what is parallel on paper is only nearly so
-/// once programs have worked it out in floats.
+/// The largest sine of the angle between directions that count as parallel. Directions that are parallel on paper are
+/// only nearly so after programs have computed them in floats.
 pub(crate) const PARALLEL: f64 = 1.0 / (1u64 << 40) as f64;
 
 pub(super) fn is_parallel(a: DVec3, b: DVec3) -> bool {
@@ -34,13 +34,13 @@ pub(super) fn is_parallel(a: DVec3, b: DVec3) -> bool {
     cross(a, b).length() <= PARALLEL * a.length() * b.length()
 }
 
-/// The vector times a power of two, about as long as 1.
+/// Scales the vector by a power of two to a length of about 1.
 pub(super) fn level(v: DVec3) -> DVec3 {
     v * to_unit_scale(v.abs().max_element())
 }
 
-/// The cross product to within 1.5 units in the last place of each component, also of nearly parallel vectors
-/// (Kahan's difference of products; Jeannerod, Louvet, Muller 2013, "Further analysis of Kahan's algorithm").
+/// Returns the cross product to within 1.5 units in the last place of each component, also for nearly parallel
+/// vectors (Kahan's difference of products; Jeannerod, Louvet, Muller 2013, "Further analysis of Kahan's algorithm").
 pub(super) fn cross(a: DVec3, b: DVec3) -> DVec3 {
     let difference = |a: f64, b: f64, c: f64, d: f64| {
         let cd = c * d;

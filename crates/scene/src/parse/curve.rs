@@ -1,4 +1,4 @@
-//! The text of a curve to a curve: `(smooth 1:0 25:3)`.
+//! Parses the text of a curve: `(smooth 1:0 25:3)`.
 
 use std::ops::Range;
 
@@ -7,46 +7,47 @@ use super::text::next_word;
 use crate::curve::{CYCLE, Curve, Key, Mode, Overflow};
 use crate::row::Number;
 
-/// What is wrong with a curve.
+/// The error in a curve.
 #[derive(Debug, PartialEq)]
 pub(super) enum CurveFault {
-    /// There is no closing bracket.
+    /// The closing bracket is missing.
     Unclosed,
     /// There is no key.
     NoKey,
-    /// A word that is neither a key nor a mode.
+    /// A word is neither a key nor a mode.
     NotAMode(String),
-    /// A mode where there is one, or behind a key.
+    /// A mode comes after another mode or after a key.
     MisplacedMode(String),
-    /// A mark that fits nowhere: a second `(`, or a `:` without a frame before it.
+    /// A mark is unexpected: a second `(`, or a `:` without a frame before it.
     Stray(String),
-    /// A frame without `:` and value.
+    /// A frame has no `:` and value.
     NoValue,
-    /// A frame or a value that is no number.
+    /// A frame or a value is no number.
     BadNumber(NumberFault, &'static str, String),
-    /// A frame that is not behind the one before it.
+    /// A frame is not greater than the one before it.
     OutOfOrder(f64, f64),
-    /// A cycle of one key.
+    /// A cycle has only one key.
     ShortCycle,
-    /// Between two keys the numbers become too large.
+    /// The numbers overflow between two keys.
     Overflow(f64, f64),
 }
 
-/// The curve that a word of a line is, from its opening bracket to the closing one; also one of a single key, which a scene
-/// takes as a number that is still. `None` for what is none.
+/// Parses a word of a line as a curve, from its opening bracket to the closing one. Accepts a single key, which a
+/// scene treats as a constant number. Returns `None` for any other word.
 pub fn parse_curve(word: &str) -> Option<Curve> {
     let is_one = word.starts_with('(') && word.find(')').is_some_and(|end| end + 1 == word.len());
     if is_one { read(word, 0..word.len()).ok() } else { None }
 }
 
-/// The curve that `text` holds at `span`, from its opening bracket on; a curve of one key is a number that is still.
+/// Parses the curve that `text` holds at `span`, from its opening bracket on. A curve of one key
+/// is a constant number.
 ///
 /// # Errors
-/// The first fault, and where.
+/// Returns the first fault and its place.
 pub(super) fn parse(text: &str, span: Range<usize>) -> Result<Number, (Range<usize>, CurveFault)> {
     read(text, span).map(|curve| match *curve.keys() {
-        [key] => Number::Still(key.value),
-        _ => Number::Moving(curve),
+        [key] => Number::Constant(key.value),
+        _ => Number::Animated(curve),
     })
 }
 
@@ -62,20 +63,20 @@ fn read(text: &str, span: Range<usize>) -> Result<Curve, (Range<usize>, CurveFau
     let mut places: Vec<Range<usize>> = Vec::new();
     loop {
         let Some(word) = next_word(bytes, &mut at) else { return Err((span, CurveFault::Unclosed)) };
-        let told = &text[word.clone()];
-        match told {
+        let word_text = &text[word.clone()];
+        match word_text {
             ")" => break,
-            "(" | ":" => return Err((word, CurveFault::Stray(told.to_owned()))),
+            "(" | ":" => return Err((word, CurveFault::Stray(word_text.to_owned()))),
             _ => {}
         }
-        if told.starts_with(|c: char| c.is_ascii_alphabetic()) {
-            let known = Mode::ALL.iter().copied().find(|mode| mode.name().eq_ignore_ascii_case(told));
-            let is_cycle = told.eq_ignore_ascii_case(CYCLE);
+        if word_text.starts_with(|c: char| c.is_ascii_alphabetic()) {
+            let known = Mode::ALL.iter().copied().find(|mode| mode.name().eq_ignore_ascii_case(word_text));
+            let is_cycle = word_text.eq_ignore_ascii_case(CYCLE);
             let is_again = if is_cycle { cycle } else { mode.is_some() };
             match known {
-                None if !is_cycle => return Err((word, CurveFault::NotAMode(told.to_owned()))),
+                None if !is_cycle => return Err((word, CurveFault::NotAMode(word_text.to_owned()))),
                 _ if is_again || !keys.is_empty() => {
-                    return Err((word, CurveFault::MisplacedMode(told.to_owned())));
+                    return Err((word, CurveFault::MisplacedMode(word_text.to_owned())));
                 }
                 None => cycle = true,
                 Some(known) => mode = Some(known),
@@ -83,8 +84,9 @@ fn read(text: &str, span: Range<usize>) -> Result<Curve, (Range<usize>, CurveFau
             continue;
         }
         let read = |word: Range<usize>, name| {
-            let told = &text[word.clone()];
-            number::parse(told).map_err(|fault| (word, CurveFault::BadNumber(fault, name, told.to_owned())))
+            let word_text = &text[word.clone()];
+            number::parse(word_text)
+                .map_err(|fault| (word, CurveFault::BadNumber(fault, name, word_text.to_owned())))
         };
         let frame = read(word.clone(), "frame")?;
         let colon = next_word(bytes, &mut at);
@@ -122,8 +124,8 @@ mod tests {
 
     fn parsed(text: &str) -> Result<String, (Range<usize>, CurveFault)> {
         parse(text, 0..text.len()).map(|number| match number {
-            Number::Still(value) => value.to_string(),
-            Number::Moving(curve) => curve.to_string(),
+            Number::Constant(value) => value.to_string(),
+            Number::Animated(curve) => curve.to_string(),
         })
     }
 

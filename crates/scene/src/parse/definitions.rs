@@ -1,50 +1,50 @@
-//! Materials and groups: their definitions, what refers to them, and when what is in them is seen.
+//! Materials and groups: their definitions, references to them, and the visibility of their contents.
 
 use std::ops::Range;
 
 use super::line::Statement;
-use super::seen::{Moving, Origin, Seen, Suffix, join};
 use super::text::{is_name, parameters};
+use super::visibility::{Animated, Origin, Suffix, VisibleSpan, join};
 use super::{Parser, curve, number, wording};
-use crate::command::{Act, Command};
+use crate::command::{Command, Effect};
 use crate::form::{Names as Kinds, Numbers};
 use crate::model::{Clause, Coefficients, Material};
 use crate::report::Line;
 use crate::row::{Number, Row};
 use crate::script::{ClauseLine, GroupRecorder, NamedMaterial};
 
-/// What the parser knows of a material.
+/// The parser's data about a material.
 pub(super) struct MaterialInfo {
-    /// Its value, if no curve is in it.
+    /// The material, if it has no curves.
     pub(super) still: Option<Material>,
-    /// Whether it is nothing but coefficients.
+    /// Whether it has only coefficients.
     is_plain: bool,
     /// The material of its pattern.
     other: Option<usize>,
-    /// Of its clauses with curves, among all lines with curves.
+    /// The lines of its clauses with curves, as indices of all lines with curves.
     moving: Vec<usize>,
-    seen: Option<Seen>,
+    visible_span: Option<VisibleSpan>,
 }
 
-/// What the parser knows of a group.
+/// The parser's data about a group.
 pub(super) struct GroupInfo {
-    /// How many objects drawing it draws, at most.
+    /// The largest number of objects that drawing it draws.
     pub(super) drawn: usize,
-    /// How many groups drawing it draws, at most.
+    /// The largest number of groups that drawing it draws.
     pub(super) uses: usize,
     pub(super) reach: Reach,
     contents: Contents,
-    seen: Option<Seen>,
+    visible_span: Option<VisibleSpan>,
 }
 
-/// Bounds on what the groups that a group uses are moved and scaled by.
+/// Bounds on the translation and the scale of the groups that a group uses.
 #[derive(Clone, Copy)]
 pub(super) struct Reach {
     distance: f64,
     scale: f64,
 }
 
-/// What is seen when a group is.
+/// The contents that are visible whenever the group is.
 #[derive(Default)]
 struct Contents {
     moving: Vec<usize>,
@@ -65,7 +65,7 @@ pub(super) struct OpenGroup<'a> {
     contents: Contents,
 }
 
-/// What was not looked at yet of the scene as it stands, each with the number of Traces before it.
+/// The parts of the current scene whose visibility is not recorded yet, each with the number of Traces before it.
 #[derive(Default)]
 pub(super) struct Pending {
     pub(super) camera: Option<(Option<usize>, usize)>,
@@ -79,7 +79,7 @@ pub(super) struct Pending {
 impl Reach {
     const NONE: Self = Self { distance: 0.0, scale: 1.0 };
 
-    /// How far, and how much larger, things come that `row` moves together with this.
+    /// Returns bounds on distance and scale after `row` moves a group with this reach.
     pub(super) fn placed(self, row: &Row) -> (f64, f64) {
         let [x, y, z] = [0, 1, 2].map(|i| row.largest(i).unwrap_or(0.0));
         let scale = row.largest(6).unwrap_or(1.0);
@@ -88,7 +88,7 @@ impl Reach {
 }
 
 impl<'a> Parser<'a> {
-    /// The number of a material or group; `None` where there is none, which is reported.
+    /// Returns the number of a material or group. If there is none, returns `None` and reports that.
     pub(super) fn refer(&mut self, kind: Kinds, line: Line<'a>, span: Range<usize>) -> Option<usize> {
         let name = std::str::from_utf8(&line.bytes[span.clone()]).unwrap_or_default();
         let number = match kind {
@@ -99,14 +99,14 @@ impl<'a> Parser<'a> {
             if kind == Kinds::Groups && self.group.as_ref().is_some_and(|group| group.name == name) {
                 self.report.error(line, span, || wording::uses_itself(name));
             } else {
-                // It may come later, which is then told.
+                // It may be defined later, which is reported at the end.
                 self.unresolved.push((kind, line, span));
             }
         }
         number
     }
 
-    /// Tells of the names that nothing before them had.
+    /// Reports the names that were not defined before they were used.
     pub(super) fn tell_unresolved(&mut self) {
         for (kind, line, span) in std::mem::take(&mut self.unresolved) {
             let name = std::str::from_utf8(&line.bytes[span.clone()]).unwrap_or_default();
@@ -139,7 +139,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Gives the name of a faulty line, so that what refers to it is not faulty too.
+    /// Defines the name of a faulty line, so that references to it are not reported as well.
     pub(super) fn define_faulty(
         &mut self,
         line: Line<'a>,
@@ -149,38 +149,38 @@ impl<'a> Parser<'a> {
     ) {
         let Some(subject) = subject else { return };
         let name = &text[subject.clone()];
-        // Nobody is told that it is not used, either.
-        match command.act() {
-            Act::Material => {
+        // It is also marked as used, so that it is not reported as unused.
+        match command.effect() {
+            Effect::Material => {
                 if self.materials.refer(name).is_none()
                     && self.materials.define(name, line, subject, None).is_ok()
                 {
                     self.materials.refer(name);
                 }
             }
-            Act::Group => {
+            Effect::Group => {
                 if self.groups.refer(name).is_none() && self.groups.define(name, line, subject, None).is_ok()
                 {
                     self.groups.refer(name);
                 }
             }
-            Act::Use => {
+            Effect::Use => {
                 self.groups.refer(name);
             }
-            Act::Screen
-            | Act::Camera(_)
-            | Act::Background
-            | Act::Lens
-            | Act::Samples
-            | Act::Shutter
-            | Act::Tone
-            | Act::Depth
-            | Act::Frames
-            | Act::End
-            | Act::Object(_)
-            | Act::Light(_)
-            | Act::Clear
-            | Act::Trace => {}
+            Effect::Screen
+            | Effect::Camera(_)
+            | Effect::Background
+            | Effect::Lens
+            | Effect::Samples
+            | Effect::Shutter
+            | Effect::Tone
+            | Effect::Depth
+            | Effect::Frames
+            | Effect::End
+            | Effect::Object(_)
+            | Effect::Light(_)
+            | Effect::Clear
+            | Effect::Trace => {}
         }
     }
 
@@ -192,14 +192,14 @@ impl<'a> Parser<'a> {
             |line: &ClauseLine| matches!(line.clause, Clause::Ambient | Clause::Diffuse | Clause::Mirror);
         let is_good = self.report.error_count() == errors_before;
         let other = clauses.iter().find_map(|line| line.other);
-        let is_still = clauses.iter().all(|line| line.row.is_still())
+        let is_constant = clauses.iter().all(|line| line.row.is_constant())
             && other.is_none_or(|other| {
-                self.materials.get(other).thing.as_ref().is_some_and(|info| info.still.is_some())
+                self.materials.get(other).value.as_ref().is_some_and(|info| info.still.is_some())
             });
         let mut named = NamedMaterial { name: name.into(), clauses, still: None };
-        if is_still && is_good {
+        if is_constant && is_good {
             let coefficients = |other: usize| {
-                let info = self.materials.get(other).thing.as_ref();
+                let info = self.materials.get(other).value.as_ref();
                 Ok(info.and_then(|info| info.still.clone()).unwrap_or_default())
             };
             named.still = named.at(0.0, coefficients).ok();
@@ -209,7 +209,7 @@ impl<'a> Parser<'a> {
             is_plain: named.clauses.iter().all(is_plain),
             other,
             moving,
-            seen: None,
+            visible_span: None,
         };
         match self.materials.define(name, s.line, subject.clone(), is_good.then_some(info)) {
             Ok(number) if is_good => {
@@ -225,7 +225,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// The clauses behind byte `at`, and those of them with curves among all lines with curves.
+    /// Parses the clauses after byte `at`. Returns them, and those with curves as indices of all lines with curves.
     fn clauses(&mut self, s: &Statement<'a, '_>, at: usize) -> (Vec<ClauseLine>, Vec<usize>) {
         let words = parameters(s.text.as_bytes(), at);
         let (mut lines, mut moving): (Vec<ClauseLine>, Vec<usize>) = (Vec::new(), Vec::new());
@@ -235,11 +235,11 @@ impl<'a> Parser<'a> {
         let mut next = 0;
         while next < words.len() {
             let place = words[next].clone();
-            let told = &s.text[place.clone()];
+            let word = &s.text[place.clone()];
             next += 1;
-            let Some(clause) = Clause::from_name(told) else {
-                self.report.error(s.line, place, || wording::unknown_clause(told));
-                // Numbers that belong to it say nothing new.
+            let Some(clause) = Clause::from_name(word) else {
+                self.report.error(s.line, place, || wording::unknown_clause(word));
+                // The numbers after an unknown clause are not reported.
                 next += words[next..]
                     .iter()
                     .take_while(|word| Clause::from_name(&s.text[(*word).clone()]).is_none())
@@ -259,7 +259,7 @@ impl<'a> Parser<'a> {
                 None => Some(None),
             };
             if let (Some(row), Some(other)) = (row, other) {
-                if row.is_still() {
+                if row.is_constant() {
                     self.check_clause(s, clause, &row, &spans);
                 } else {
                     moving.push(self.keep_moving(s.line, spans, Origin::Clause(clause), &row));
@@ -270,7 +270,7 @@ impl<'a> Parser<'a> {
         (lines, moving)
     }
 
-    /// The numbers of a clause; `None` if there is a fault in them, which is reported.
+    /// Parses the numbers of a clause. If there is a fault, returns `None` and reports it.
     fn clause_numbers(
         &mut self,
         s: &Statement<'a, '_>,
@@ -288,7 +288,7 @@ impl<'a> Parser<'a> {
                 Some((span, word)) if word.starts_with('(') => curve::parse(s.text, span.clone())
                     .map_err(|(span, fault)| (span, wording::curve(fault, name))),
                 Some((span, word)) => number::parse(word)
-                    .map(Number::Still)
+                    .map(Number::Constant)
                     .map_err(|fault| (span.clone(), wording::bad_number(fault, name, word, false))),
                 None => Err((0..0, wording::no_clause())),
             };
@@ -312,8 +312,8 @@ impl<'a> Parser<'a> {
         (good.then(|| Row::new(numbers)), spans)
     }
 
-    /// The material that a pattern names: `Some(None)` where it is unknown but a name, `None` where there is a fault
-    /// that the definition cannot go on with; both are reported.
+    /// Returns the material that a pattern names. Returns `Some(None)` for an unknown name, and `None` for a fault
+    /// after which the definition cannot continue. Both are reported.
     fn clause_material(
         &mut self,
         s: &Statement<'a, '_>,
@@ -329,14 +329,14 @@ impl<'a> Parser<'a> {
         };
         *next += 1;
         let number = self.refer(Kinds::Materials, s.line, span.clone())?;
-        if self.materials.get(number).thing.as_ref().is_some_and(|info| !info.is_plain) {
+        if self.materials.get(number).value.as_ref().is_some_and(|info| !info.is_plain) {
             let name = &s.text[span.clone()];
             self.report.error(s.line, span, || wording::unfit_material(name));
         }
         Some(Some(number))
     }
 
-    /// What is wrong with the numbers of a clause.
+    /// Reports the errors in the numbers of a clause.
     fn check_clause(&mut self, s: &Statement<'a, '_>, clause: Clause, row: &Row, spans: &[Range<usize>]) {
         let values = row.at(0.0);
         let mut clauses = crate::model::Clauses::default();
@@ -378,7 +378,7 @@ impl<'a> Parser<'a> {
         self.close_group();
     }
 
-    /// A command that may not stand in a group ends it, so that what follows is not faulty too.
+    /// Ends the group at a command that is not allowed in it, so that the following lines are not faulty as well.
     pub(super) fn leave_group_at(&mut self, s: &Statement<'a, '_>) {
         if let Some(group) = &self.group {
             let (name, number) = (group.name, group.line.number);
@@ -392,7 +392,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// At the end of the text.
+    /// Reports a group that is still open at the end of the text.
     pub(super) fn close_forgotten_group(&mut self) {
         if let Some(group) = &self.group
             && !self.line_lost
@@ -408,13 +408,13 @@ impl<'a> Parser<'a> {
     pub(super) fn close_group(&mut self) {
         let Some(group) = self.group.take() else { return };
         let OpenGroup { name, line, subject, recorder, drawn, uses, reach, contents, .. } = group;
-        let info = GroupInfo { drawn, uses, reach, contents, seen: None };
+        let info = GroupInfo { drawn, uses, reach, contents, visible_span: None };
         if self.groups.define(name, line, subject, Some(info)).is_ok() {
             self.record(|script| script.add_group(recorder.finish(name, drawn)));
         }
     }
 
-    /// Keeps a line with curves; its number among them.
+    /// Stores a line with curves. Returns its index among them.
     pub(super) fn keep_moving(
         &mut self,
         line: Line<'a>,
@@ -423,11 +423,11 @@ impl<'a> Parser<'a> {
         row: &Row,
     ) -> usize {
         self.is_fresh = true;
-        self.moving.push(Moving { line, spans, row: row.clone(), origin, seen: None });
+        self.moving.push(Animated { line, spans, row: row.clone(), origin, visible_span: None });
         self.moving.len() - 1
     }
 
-    /// A line with curves is drawn, in the group that is being defined or in the scene.
+    /// Records that a line with curves is drawn, in the open group or in the scene.
     pub(super) fn see_moving(&mut self, number: usize) {
         match &mut self.group {
             Some(group) => group.contents.moving.push(number),
@@ -435,7 +435,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// A material with curves is seen.
+    /// Records that a material with curves is visible.
     pub(super) fn see_material(&mut self, number: usize) {
         self.is_fresh = true;
         match &mut self.group {
@@ -448,7 +448,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// A group is drawn, as far away and as large as that.
+    /// Records that a group is drawn, at this distance and scale.
     pub(super) fn see_group(&mut self, number: usize, distance: f64, scale: f64) {
         self.is_fresh = true;
         match &mut self.group {
@@ -461,68 +461,70 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// A setting stands no more, since the Trace of which it stood.
+    /// A setting is replaced: records the Traces that rendered with it.
     pub(super) fn settle(&mut self, old: Option<(Option<usize>, usize)>) {
         if let Some((Some(number), since)) = old {
-            join(&mut self.moving[number].seen, Suffix::of(&self.exposures).from(since));
+            join(&mut self.moving[number].visible_span, Suffix::of(&self.exposures).from(since));
         }
     }
 
-    /// The scene stands no more: what of it which Traces saw.
+    /// The scene is cleared: records which Traces rendered each of its lines.
     pub(super) fn settle_scene(&mut self) {
         let background = self.pending.background.take();
         self.settle(background);
         let mut suffix = Suffix::of(&self.exposures);
         for (number, since) in self.pending.moving.drain(..).rev() {
-            join(&mut self.moving[number].seen, suffix.from(since));
+            join(&mut self.moving[number].visible_span, suffix.from(since));
         }
         let mut suffix = Suffix::of(&self.exposures);
         for (number, since) in self.pending.materials.drain(..).rev() {
-            if let Some(info) = self.materials.thing_mut(number) {
-                join(&mut info.seen, suffix.from(since));
+            if let Some(info) = self.materials.value_mut(number) {
+                join(&mut info.visible_span, suffix.from(since));
             }
         }
         let mut suffix = Suffix::of(&self.exposures);
         for (number, since) in self.pending.groups.drain(..).rev() {
-            if let Some(info) = self.groups.thing_mut(number) {
-                join(&mut info.seen, suffix.from(since));
+            if let Some(info) = self.groups.value_mut(number) {
+                join(&mut info.visible_span, suffix.from(since));
             }
         }
     }
 
-    /// At the end of the text: what was seen of everything.
+    /// Records at the end of the text which Traces rendered each line.
     pub(super) fn settle_all(&mut self) {
         self.settle_scene();
         for old in [self.pending.camera.take(), self.pending.lens.take()] {
             self.settle(old);
         }
-        // What a group or a material refers to stands before it.
+        // A group or a material refers only to earlier ones.
         for number in (0..self.groups.all().len()).rev() {
-            let Some(GroupInfo { seen, contents, .. }) = self.groups.thing_mut(number) else { continue };
-            let (seen, contents) = (seen.take(), std::mem::take(contents));
+            let Some(GroupInfo { visible_span, contents, .. }) = self.groups.value_mut(number) else {
+                continue;
+            };
+            let (visible_span, contents) = (visible_span.take(), std::mem::take(contents));
             for number in contents.moving {
-                join(&mut self.moving[number].seen, seen.as_ref());
+                join(&mut self.moving[number].visible_span, visible_span.as_ref());
             }
             for number in contents.materials {
-                if let Some(info) = self.materials.thing_mut(number) {
-                    join(&mut info.seen, seen.as_ref());
+                if let Some(info) = self.materials.value_mut(number) {
+                    join(&mut info.visible_span, visible_span.as_ref());
                 }
             }
             for number in contents.groups {
-                if let Some(info) = self.groups.thing_mut(number) {
-                    join(&mut info.seen, seen.as_ref());
+                if let Some(info) = self.groups.value_mut(number) {
+                    join(&mut info.visible_span, visible_span.as_ref());
                 }
             }
         }
         for number in (0..self.materials.all().len()).rev() {
-            let Some(info) = self.materials.thing_mut(number) else { continue };
-            let (seen, moving) = (info.seen.take(), std::mem::take(&mut info.moving));
+            let Some(info) = self.materials.value_mut(number) else { continue };
+            let (visible_span, moving) = (info.visible_span.take(), std::mem::take(&mut info.moving));
             let other = info.other;
             for number in moving {
-                join(&mut self.moving[number].seen, seen.as_ref());
+                join(&mut self.moving[number].visible_span, visible_span.as_ref());
             }
-            if let Some(info) = other.and_then(|other| self.materials.thing_mut(other)) {
-                join(&mut info.seen, seen.as_ref());
+            if let Some(info) = other.and_then(|other| self.materials.value_mut(other)) {
+                join(&mut info.visible_span, visible_span.as_ref());
             }
         }
     }

@@ -1,34 +1,34 @@
-//! A line of the text to a statement: its command, its numbers, and the names in it.
+//! Parses a line of the text to a statement: its command, its numbers, and its names.
 
 use std::ops::Range;
 use std::str::Utf8Error;
 
 use super::text::{Words, is_name};
 use super::{Parser, curve, number, wording};
-use crate::command::{Act, Command, MAX_NUMBERS};
+use crate::command::{Command, Effect, MAX_NUMBERS};
 use crate::form::{Subject, Values};
 use crate::report::{Fault, Line};
 use crate::row::{Number, Row};
 
-/// A command whose words are numbers and names, and as many as it takes.
+/// A command with valid numbers and names, as many as it takes.
 pub(super) struct Statement<'a, 'w> {
     pub(super) line: Line<'a>,
-    /// Of the line, without what is not UTF-8 in its comment.
+    /// The text of the line, without bytes in the comment that are not UTF-8.
     pub(super) text: &'a str,
     pub(super) command: Command,
-    /// Without the name that stands before the numbers.
+    /// The words without the name before the numbers.
     pub(super) words: &'w Words,
-    /// The name that stands before the numbers.
+    /// The name before the numbers.
     pub(super) subject: Option<Range<usize>>,
-    /// Of the parameters; 0 for optional ones that are missing, and for curves.
+    /// The values of the parameters; 0 for omitted ones and for curves.
     pub(super) values: &'w [f64; MAX_NUMBERS],
     /// The parameters, if one of them is a curve.
     pub(super) row: Option<Row>,
-    /// The name of a material that stands in the place of numbers.
+    /// The name of a material in place of numbers.
     pub(super) surface: Option<Range<usize>>,
 }
 
-/// What the parameters of a line are beside numbers.
+/// The parts of a line's parameters that are not plain numbers.
 #[derive(Default)]
 struct Parameters {
     row: Option<Row>,
@@ -36,27 +36,27 @@ struct Parameters {
 }
 
 impl<'a> Statement<'a, '_> {
-    /// Of its command.
+    /// Returns the place of the command.
     pub(super) fn place(&self) -> (Line<'a>, Range<usize>) {
         (self.line, self.words.command.clone())
     }
 
-    /// Its numbers, where none is a curve.
+    /// Returns the numbers, if none is a curve.
     pub(super) fn still_row(&self) -> Row {
         let count = self.words.count() - usize::from(self.surface.is_some());
-        Row::new(self.values[..count].iter().copied().map(Number::Still).collect())
+        Row::new(self.values[..count].iter().copied().map(Number::Constant).collect())
     }
 
-    /// The name that stands before the numbers.
+    /// Returns the name before the numbers.
     pub(super) fn name(&self) -> Option<&'a str> {
         self.subject.clone().map(|span| &self.text[span])
     }
 }
 
-/// The first parameter that was probably written with a comma for a point: `1,5`, in a line that would have as many
-/// numbers as its command takes if only blanks separated them.
+/// Returns the first parameter that was probably written with a decimal comma: `1,5`, in a line that would have the
+/// right number of numbers if only spaces separated them.
 fn decimal_comma(text: &str, command: Command, words: &Words) -> Option<Range<usize>> {
-    // Most lines have no comma, which is quickly seen.
+    // Most lines have no comma, which this test finds quickly.
     if !text.contains(',') {
         return None;
     }
@@ -77,7 +77,7 @@ fn decimal_comma(text: &str, command: Command, words: &Words) -> Option<Range<us
 }
 
 impl<'a> Parser<'a> {
-    /// Reads a line and does what it says, unless it has a fault, which is reported.
+    /// Parses a line and applies its effect, unless it has a fault, which is reported.
     pub(super) fn line(&mut self, line: Line<'a>, words: &mut Words) {
         let mut values = [0.0; MAX_NUMBERS];
         if let Some(statement) = self.statement(line, words, &mut values) {
@@ -85,7 +85,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// `None` for a line without a command and for one with a fault, which is reported.
+    /// Returns `None` for a line without a command, and for one with a fault, which is reported.
     fn statement<'w>(
         &mut self,
         line: Line<'a>,
@@ -124,7 +124,7 @@ impl<'a> Parser<'a> {
                 }
             },
         };
-        if matches!(command.act(), Act::Material) {
+        if matches!(command.effect(), Effect::Material) {
             return Some(Statement { line, text, command, words, subject, values, row: None, surface: None });
         }
         let Some(Parameters { row, surface }) = self.parameters(line, text, command, words, values) else {
@@ -140,7 +140,7 @@ impl<'a> Parser<'a> {
         Some(Statement { line, text, command, words, subject, values, row, surface })
     }
 
-    /// The name that stands before the numbers; `None` if it is missing or no name, which is reported.
+    /// Returns the name before the numbers. If it is missing or malformed, returns `None` and reports that.
     fn subject(
         &mut self,
         line: Line<'a>,
@@ -161,7 +161,7 @@ impl<'a> Parser<'a> {
         Some(name)
     }
 
-    /// A line of this command was there: what would follow from that it is not is not told.
+    /// Records that there was a faulty line with this command, so that its absence is not reported.
     fn faulty_line(
         &mut self,
         line: Line<'a>,
@@ -180,7 +180,7 @@ impl<'a> Parser<'a> {
         self.define_faulty(line, text, command, subject);
     }
 
-    /// The readable start of the line if only its comment is faulty.
+    /// Returns the readable start of the line if only its comment is faulty.
     fn not_utf8(&mut self, line: Line<'a>, error: Utf8Error) -> Option<&'a str> {
         let start = error.valid_up_to();
         let end = error.error_len().map_or(line.bytes.len(), |length| start + length);
@@ -194,7 +194,7 @@ impl<'a> Parser<'a> {
 
     fn unknown_command(&mut self, line: Line<'a>, text: &'a str, words: &mut Words) {
         let name = &text[words.command.clone()];
-        // Looking for it takes longer than parsing a line.
+        // This search takes longer than parsing a line.
         let nearest = if self.report.describes_next() { Command::nearest(name) } else { None };
         self.report.error(line, words.command.clone(), || wording::unknown_command(name, nearest));
         if let Some(command) = nearest {
@@ -203,8 +203,8 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// The parameters, their numbers into `values`, which are 0; `None` if there is a fault in them or in their number,
-    /// which is reported.
+    /// Parses the parameters, with their numbers into `values`, which are initially 0. If there is a fault in them or
+    /// in their number, returns `None` and reports it.
     fn parameters(
         &mut self,
         line: Line<'a>,
@@ -246,11 +246,11 @@ impl<'a> Parser<'a> {
                         good = false;
                         self.report.error(line, span.clone(), || wording::unwanted_curve(command, name));
                     }
-                    Ok(Number::Still(value)) => values[i] = value,
+                    Ok(Number::Constant(value)) => values[i] = value,
                     Ok(curve) => curves.push((i, curve)),
                     Err((place, fault)) => {
                         good = false;
-                        // Then numbers that are missing behind it may be in it.
+                        // Then the unclosed curve may contain the missing numbers.
                         is_countable &= fault != curve::CurveFault::Unclosed;
                         self.report.error(line, place, || wording::curve(fault, name));
                     }
@@ -288,7 +288,7 @@ impl<'a> Parser<'a> {
         }
         if !curves.is_empty() {
             let count = count.min(most) - usize::from(parameters.surface.is_some());
-            let mut numbers: Vec<_> = values[..count].iter().copied().map(Number::Still).collect();
+            let mut numbers: Vec<_> = values[..count].iter().copied().map(Number::Constant).collect();
             curves.into_iter().for_each(|(i, curve)| numbers[i] = curve);
             parameters.row = Some(Row::new(numbers));
         }

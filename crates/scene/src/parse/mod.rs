@@ -1,11 +1,12 @@
-//! Script text to frames and diagnostics.
+//! The parser: script text to frames and diagnostics.
 //!
-//! Parsing never stops at a fault: what can be said about a text is said in one go. A line is understood alone, but for
-//! the names that it refers to; `Trace` looks at what came before, and the end at when lines with curves are seen
-//! (`seen`). Nothing is allocated for a line that is in order and has neither curves nor names, and nothing is kept of a
-//! script that has an error. A fault is told once: what follows from one that was told is not.
+//! Parsing never stops at a fault, so all faults are reported at once. Each line is parsed on its own, except for
+//! the names that it refers to. `Trace` checks the lines before it, and the end of the text checks the lines with
+//! curves over the time in which they are visible (`visibility`). Nothing is allocated for a valid line without
+//! curves or names, and nothing is kept of a script with an error. A fault is reported once: consequences of a
+//! reported fault are not reported.
 //!
-//! Follows `docs/language.md`, where the forms of numbers, blanks and line ends are decided.
+//! Follows `docs/language.md`, which defines the forms of numbers, whitespace and line ends.
 
 mod curve;
 mod definitions;
@@ -13,13 +14,13 @@ mod line;
 mod names;
 mod number;
 mod picture;
-mod seen;
 mod text;
+mod visibility;
 mod wording;
 
 use std::ops::Range;
 
-use crate::command::{Act, Command, Reader};
+use crate::command::{Command, Effect, Reader};
 use crate::diagnostic::Diagnostic;
 use crate::form::{Names as Kinds, Numbers, Scripted};
 use crate::limits::Limits;
@@ -33,21 +34,21 @@ use definitions::{GroupInfo, MaterialInfo, OpenGroup, Pending};
 use line::Statement;
 use names::Names;
 use picture::Picture;
-use seen::{Exposure, Moving, Origin};
 use text::{Words, lines};
+use visibility::{Animated, Exposure, Origin};
 
-/// What a text turned out to be.
+/// The result of parsing a text.
 #[derive(Clone, Debug)]
 pub struct Parsed {
-    /// The script; `None` exactly when there is an error.
+    /// The script; `None` if and only if there is an error.
     pub script: Option<Script>,
     /// Errors and warnings in the order of the text.
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Parses the script `bytes`; `name` is what diagnostics call it.
+/// Parses the script `bytes`. `name` is its name in diagnostics.
 ///
-/// The `Trace` commands become the frames of the script; there is at least one.
+/// The `Trace` commands become the frames of the script. There is at least one frame.
 pub fn parse(name: &str, bytes: &[u8], limits: &Limits) -> Parsed {
     let mut report = Report::new(name, limits.max_described);
     if bytes.len() > limits.max_script_bytes {
@@ -68,42 +69,42 @@ struct Parser<'a> {
     recorder: Recorder,
     screen: ScreenState,
     picture: Picture<'a>,
-    /// Objects of the scene as it stands, as drawn.
+    /// The number of objects that the current scene draws.
     objects: usize,
-    /// Groups that are drawn in the scene as it stands, each as often as it is drawn.
+    /// The number of groups that the current scene draws, each as often as it is drawn.
     uses: usize,
-    /// Lights of the scene as it stands.
+    /// The number of lights of the current scene.
     lights: usize,
-    /// Frames so far.
+    /// The number of frames so far.
     frames: u64,
-    /// What the Traces so far are; those in a row that are alike, with nothing between that has curves, are one.
+    /// The Traces so far. Consecutive equal ones without curves between them are one.
     exposures: Vec<Exposure>,
-    /// Whether something that has curves came since the last `Trace`.
+    /// Whether a line with curves was added since the last `Trace`.
     is_fresh: bool,
     trace_misspelt: bool,
-    /// Whether a line could not be read: an `End` may have stood there, or a `Group`.
+    /// Whether a line could not be read, which may have been an `End` or a `Group`.
     line_lost: bool,
-    /// The text, unless something in it is not UTF-8.
+    /// The text, unless a part of it is not UTF-8.
     whole: Option<&'a str>,
-    /// Whether there is a carriage return in the text, wherever.
+    /// Whether the text contains a carriage return.
     has_returns: bool,
-    /// Where the first command since the last `Trace` stands that has no effect if no other `Trace` comes.
+    /// The first command since the last `Trace` that has no effect if no other `Trace` follows.
     unseen: Unseen<(Line<'a>, Range<usize>)>,
     materials: Names<'a, MaterialInfo>,
     groups: Names<'a, GroupInfo>,
     group: Option<OpenGroup<'a>>,
-    /// All lines with curves, and what was not seen yet of the scene as it stands.
-    moving: Vec<Moving<'a>>,
+    /// All lines with curves, and the visibility of the current scene that is not recorded yet.
+    moving: Vec<Animated<'a>>,
     pending: Pending,
-    /// Names that nothing before them had, of what, and where.
+    /// The names that were not defined before their use, with their kind and place.
     unresolved: Vec<(Kinds, Line<'a>, Range<usize>)>,
 }
 
-/// What no `Trace` has shown yet.
+/// The commands that no `Trace` has rendered yet.
 struct Unseen<T> {
-    /// Of what a `Clear` leaves: screen, camera and other settings.
+    /// The first command that a `Clear` keeps: screen, camera or another setting.
     lasting: Option<T>,
-    /// Of what a `Clear` removes.
+    /// The first command whose item a `Clear` removes.
     removable: Option<T>,
 }
 
@@ -114,7 +115,7 @@ impl<T> Unseen<T> {
 #[derive(Clone, Copy)]
 enum ScreenState {
     Unset,
-    /// Whatever is wrong with it has been told.
+    /// All errors about it have been reported.
     Faulty,
     Set(Screen),
 }
@@ -173,77 +174,77 @@ impl<'a> Parser<'a> {
         }
         self.tell_unused_names();
         self.settle_all();
-        seen::check(&self.moving, &self.exposures, &mut self.report);
+        visibility::check(&self.moving, &self.exposures, &mut self.report);
         let script = if self.report.has_errors() { None } else { self.recorder.finish() };
         Parsed { script, diagnostics: self.report.finish() }
     }
 
-    /// A line could not be read: what is missing may stand in it.
+    /// Records that a line could not be read, which may contain anything that is missing.
     fn expect_no_more(&mut self) {
         self.line_lost = true;
         self.expect_no_more_of(Command::Screen);
         self.expect_no_more_of(Command::Trace);
     }
 
-    /// A command was there, though faulty: that it is missing would be told in vain.
+    /// Records that there was a faulty line with a command, so that its absence is not reported.
     fn expect_no_more_of(&mut self, command: Command) {
-        match command.act() {
-            Act::Trace => {
+        match command.effect() {
+            Effect::Trace => {
                 self.trace_misspelt = true;
                 self.unseen = Unseen::NOTHING;
             }
-            Act::Screen => {
+            Effect::Screen => {
                 if matches!(self.screen, ScreenState::Unset) {
                     self.screen = ScreenState::Faulty;
                 }
             }
-            Act::Group => self.line_lost = true,
-            Act::End => self.close_group(),
-            Act::Camera(_)
-            | Act::Background
-            | Act::Lens
-            | Act::Samples
-            | Act::Shutter
-            | Act::Tone
-            | Act::Depth
-            | Act::Frames
-            | Act::Material
-            | Act::Use
-            | Act::Object(_)
-            | Act::Light(_)
-            | Act::Clear => {}
+            Effect::Group => self.line_lost = true,
+            Effect::End => self.close_group(),
+            Effect::Camera(_)
+            | Effect::Background
+            | Effect::Lens
+            | Effect::Samples
+            | Effect::Shutter
+            | Effect::Tone
+            | Effect::Depth
+            | Effect::Frames
+            | Effect::Material
+            | Effect::Use
+            | Effect::Object(_)
+            | Effect::Light(_)
+            | Effect::Clear => {}
         }
     }
 
     fn run(&mut self, s: &Statement<'a, '_>) {
-        let act = s.command.act();
-        if self.group.is_some() && !matches!(act, Act::Object(_) | Act::Use | Act::End) {
+        let effect = s.command.effect();
+        if self.group.is_some() && !matches!(effect, Effect::Object(_) | Effect::Use | Effect::End) {
             self.leave_group_at(s);
         }
-        match act {
-            Act::Screen => self.screen(s),
-            Act::Camera(read) => self.camera(s, read),
-            Act::Background => self.background(s),
-            Act::Lens => self.lens(s),
-            Act::Samples => {
+        match effect {
+            Effect::Screen => self.screen(s),
+            Effect::Camera(read) => self.camera(s, read),
+            Effect::Background => self.background(s),
+            Effect::Lens => self.lens(s),
+            Effect::Samples => {
                 self.set(s, |recorder, samples| recorder.samples = samples);
             }
-            Act::Shutter => self.set(s, |recorder, shutter| recorder.shutter = shutter),
-            Act::Tone => self.set(s, |recorder, tone| recorder.tone = tone),
-            Act::Depth => self.set(s, |recorder, depth| recorder.depth = depth),
-            Act::Frames => self.set(s, |recorder, numbers| recorder.numbers = numbers),
-            Act::Material => self.material(s),
-            Act::Group => self.open_group(s),
-            Act::End => self.end_group(s),
-            Act::Use => self.draw_group(s),
-            Act::Object(read) => self.object(s, read),
-            Act::Light(read) => self.light(s, read),
-            Act::Clear => self.clear(),
-            Act::Trace => self.trace(s),
+            Effect::Shutter => self.set(s, |recorder, shutter| recorder.shutter = shutter),
+            Effect::Tone => self.set(s, |recorder, tone| recorder.tone = tone),
+            Effect::Depth => self.set(s, |recorder, depth| recorder.depth = depth),
+            Effect::Frames => self.set(s, |recorder, numbers| recorder.numbers = numbers),
+            Effect::Material => self.material(s),
+            Effect::Group => self.open_group(s),
+            Effect::End => self.end_group(s),
+            Effect::Use => self.draw_group(s),
+            Effect::Object(read) => self.object(s, read),
+            Effect::Light(read) => self.light(s, read),
+            Effect::Clear => self.clear(),
+            Effect::Trace => self.trace(s),
         }
     }
 
-    /// What the line holds; `None` for what is no such thing, which is reported.
+    /// Makes the item of the line. If its numbers are invalid, returns `None` and reports that.
     fn read<T>(&mut self, s: &Statement<'a, '_>, surface: Option<&Material>, reader: Reader<T>) -> Option<T> {
         match reader(&mut Numbers::new(s.values, s.words.count(), surface)) {
             Ok(item) => Some(item),
@@ -254,20 +255,20 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// What the line holds, or the line itself if it has curves, whose conditions are looked at when it is known when it
-    /// is seen. With it the number of the line among those with curves.
+    /// Makes the item of the line, or keeps the line if it has curves, which is validated once its visibility is
+    /// known. Returns also the index of the line among those with curves.
     fn read_value<T>(
         &mut self,
         s: &Statement<'a, '_>,
         reader: Reader<T>,
     ) -> Option<(Value<T>, Option<usize>)> {
         match &s.row {
-            None => self.read(s, None, reader).map(|value| (Value::Still(value), None)),
+            None => self.read(s, None, reader).map(|value| (Value::Constant(value), None)),
             Some(row) => {
                 let template = Template { command: s.command, row: row.clone() };
                 let number =
                     self.keep_moving(s.line, s.words.parameters().to_vec(), Origin::Command(s.command), row);
-                Some((Value::Moving(template), Some(number)))
+                Some((Value::Animated(template), Some(number)))
             }
         }
     }
@@ -316,11 +317,11 @@ impl<'a> Parser<'a> {
         self.record(|recorder| recorder.set_background(background));
     }
 
-    /// A setting that a `Clear` leaves.
+    /// Applies a setting that a `Clear` keeps.
     fn set<T: Scripted>(&mut self, s: &Statement<'a, '_>, set: impl FnOnce(&mut Recorder, T)) {
         self.unseen.lasting.get_or_insert_with(|| s.place());
         if let Some(value) = self.read(s, None, T::read) {
-            // Also of a script with errors: what a `Trace` is, is asked later.
+            // Also in a script with errors, because the data of a `Trace` is used later.
             set(&mut self.recorder, value);
         }
     }
@@ -333,20 +334,20 @@ impl<'a> Parser<'a> {
         let (number, material) = match surface {
             None => (None, None),
             Some(Some(number)) => {
-                let info = self.materials.get(number).thing.as_ref();
-                // Of one with curves its line is kept; of a faulty one nothing.
+                let info = self.materials.get(number).value.as_ref();
+                // The line of a material with curves is kept, and nothing of a faulty one.
                 (Some(number), info.map(|info| info.still.clone()))
             }
             Some(None) => (None, Some(Some(Material::default()))),
         };
         let moves = matches!(material, Some(None));
-        let is_still = s.row.is_none() && !moves;
-        let drawn = if is_still {
+        let is_constant = s.row.is_none() && !moves;
+        let drawn = if is_constant {
             let material = material.flatten().or(number.map(|_| Material::default()));
             let Some(object) = self.read(s, material.as_ref(), read) else { return };
-            if let Some(doubt) = object.doubt() {
-                let place = s.command.form().place(|_, parameter| parameter == doubt.parameter());
-                self.report.warning(s.line, s.words.span(place), || wording::doubtful(doubt));
+            if let Some(lint) = object.lint() {
+                let place = s.command.form().place(|_, parameter| parameter == lint.parameter());
+                self.report.warning(s.line, s.words.span(place), || wording::lint_fault(lint));
             }
             Err(object)
         } else {
@@ -455,7 +456,7 @@ impl<'a> Parser<'a> {
         };
         let Some(number) = number else { return };
         let row = s.row.clone().unwrap_or_else(|| s.still_row());
-        let Some(info) = self.groups.get(number).thing.as_ref() else { return };
+        let Some(info) = self.groups.get(number).value.as_ref() else { return };
         let (reach, scale) = info.reach.placed(&row);
         let is_hidden = still == Some(None) || info.drawn == 0;
         let (drawn, uses) = if is_hidden { (0, 0) } else { (info.drawn, info.uses.saturating_add(1)) };
@@ -473,7 +474,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Counts what is drawn, in the group that is being defined or in the scene.
+    /// Counts drawn objects and groups, in the open group or in the scene.
     fn count_drawn(&mut self, s: &Statement<'a, '_>, drawn: usize, uses: usize) {
         if let Some(group) = &mut self.group {
             group.drawn = group.drawn.saturating_add(drawn);
@@ -503,7 +504,7 @@ impl<'a> Parser<'a> {
         });
     }
 
-    /// Reports the command that goes beyond a limit.
+    /// Reports the command that exceeds a limit.
     fn check_limit(&mut self, s: &Statement<'a, '_>, before: usize, count: usize, limit: usize, what: &str) {
         if before <= limit && count > limit {
             let span = s.words.command.clone();
@@ -511,12 +512,13 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Whether there is a fault, told or to be told.
+    /// Returns whether there is a fault, including those not reported yet.
     fn has_errors(&self) -> bool {
         self.report.has_errors() || !self.unresolved.is_empty()
     }
 
-    /// Records something, unless the script has an error: then it will not be used, and its memory is given back.
+    /// Records something, unless the script has an error. Then the recorded data is not needed, and
+    /// its memory is freed.
     fn record(&mut self, what: impl FnOnce(&mut Recorder)) {
         if self.has_errors() {
             self.recorder.forget();

@@ -1,30 +1,30 @@
-//! The names of materials and groups: which there are, which are referred to, and which was probably meant.
+//! The names of materials and groups: definitions, references, and corrections of misspelt names.
 
 use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::report::Line;
 
-/// How many names are compared with one that is unknown, in a whole script: far more than a person gives, few enough
-/// that a large script in which every name is unknown takes no longer than another.
-const MOST_COMPARED: usize = 1 << 20;
+/// The largest number of names that are compared with unknown ones in a whole script: far more than a person defines,
+/// and few enough that a large script with only unknown names takes no longer than another.
+const MAX_COMPARED: usize = 1 << 20;
 
-/// The things of one kind that have names.
+/// The named items of one kind.
 pub(super) struct Names<'a, T> {
     numbers: HashMap<&'a str, usize>,
     all: Vec<Named<'a, T>>,
     compared: usize,
 }
 
-/// A thing with a name.
+/// A named item and its definition.
 pub(super) struct Named<'a, T> {
     pub(super) name: &'a str,
     pub(super) line: Line<'a>,
-    /// Of the name in the line.
+    /// The range of the name in the line.
     pub(super) span: Range<usize>,
     pub(super) is_used: bool,
-    /// `None` where its definition is faulty.
-    pub(super) thing: Option<T>,
+    /// The item, or `None` if its definition is faulty.
+    pub(super) value: Option<T>,
 }
 
 impl<'a, T> Names<'a, T> {
@@ -32,32 +32,32 @@ impl<'a, T> Names<'a, T> {
         Self { numbers: HashMap::new(), all: Vec::new(), compared: 0 }
     }
 
-    /// Gives a name.
+    /// Defines a name.
     ///
     /// # Errors
-    /// The line in which it was given before.
+    /// Returns the line in which the name was defined before.
     pub(super) fn define(
         &mut self,
         name: &'a str,
         line: Line<'a>,
         span: Range<usize>,
-        thing: Option<T>,
+        value: Option<T>,
     ) -> Result<usize, usize> {
         if let Some(&first) = self.numbers.get(name) {
             return Err(self.all[first].line.number);
         }
         let number = self.all.len();
         self.numbers.insert(name, number);
-        self.all.push(Named { name, line, span, is_used: false, thing });
+        self.all.push(Named { name, line, span, is_used: false, value });
         Ok(number)
     }
 
-    /// The line in which a name was given.
+    /// Returns the line in which a name was defined.
     pub(super) fn line_of(&self, name: &str) -> Option<usize> {
         self.numbers.get(name).map(|&i| self.all[i].line.number)
     }
 
-    /// The number of what has this name, which from now on is used.
+    /// Returns the number of a named item, and marks it as used.
     pub(super) fn refer(&mut self, name: &str) -> Option<usize> {
         let number = *self.numbers.get(name)?;
         self.all[number].is_used = true;
@@ -68,22 +68,22 @@ impl<'a, T> Names<'a, T> {
         &self.all[number]
     }
 
-    pub(super) fn thing_mut(&mut self, number: usize) -> Option<&mut T> {
-        self.all[number].thing.as_mut()
+    pub(super) fn value_mut(&mut self, number: usize) -> Option<&mut T> {
+        self.all[number].value.as_mut()
     }
 
     pub(super) fn all(&self) -> &[Named<'a, T>] {
         &self.all
     }
 
-    /// The name that was probably meant: a slip or two away, also in letter case.
+    /// Returns the name that was probably meant: one with a similar spelling, in any letter case.
     pub(super) fn nearest(&mut self, name: &str) -> Option<&'a str> {
-        // Longer than that and it is no slip; the distance is quadratic in the length.
+        // A longer word is no typo, and the distance takes quadratic time.
         if name.len() > 40 {
             return None;
         }
         let lower = name.to_lowercase();
-        let left = MOST_COMPARED.saturating_sub(self.compared);
+        let left = MAX_COMPARED.saturating_sub(self.compared);
         self.compared += self.all.len();
         let candidates = self.all.iter().take(left).filter(|named| named.name.len() <= 80);
         let near = candidates

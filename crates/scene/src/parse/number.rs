@@ -1,10 +1,10 @@
 //! Numbers: decimal, finite, exact.
 //!
-//! Reading is exact: the nearest 64-bit float, ties to even, as `str::parse` guarantees. Of the forms that it takes
-//! the language leaves out the words (`inf`, `infinity`, `nan`); a point needs a digit on one side (`5.` and `.5` are
-//! numbers, `.` is not). What is too small for a float is 0.
+//! Parsing is exact: the result is the nearest 64-bit float, ties to even, as `str::parse` guarantees. The language
+//! does not accept the words that `str::parse` does (`inf`, `infinity`, `nan`). A point needs a digit on one side
+//! (`5.` and `.5` are numbers, `.` is not). A number too small for a float is 0.
 
-/// Why a word is not a number of the language.
+/// The reason why a word is not a number of the language.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NumberFault {
     Malformed,

@@ -1,4 +1,4 @@
-//! Doubts about a picture as a whole: what screen, camera and lens are together.
+//! Warnings about a picture as a whole, from the combination of screen, camera and lens.
 
 use std::ops::Range;
 
@@ -10,16 +10,16 @@ use crate::report::{Line, Report};
 use crate::row::Number;
 use crate::script::Value;
 
-/// Screen, camera and lens as they stand, as far as they can be odd together.
+/// The current screen, camera and lens, as far as warnings depend on their combination.
 #[derive(Default)]
 pub(super) struct Picture<'a> {
-    /// The corners of the window of a `Camera`, and where they stand.
+    /// The corners of the window of a `Camera`, with their place.
     window: Option<(Line<'a>, Range<usize>, [f64; 4])>,
     /// Whether the window was compared with the screen.
     is_compared: bool,
     is_orthographic: bool,
     has_camera: bool,
-    /// A lens with a radius that no picture was drawn with.
+    /// A lens with a radius with which no picture was rendered.
     lens: Option<(Line<'a>, Range<usize>)>,
 }
 
@@ -35,31 +35,31 @@ impl<'a> Picture<'a> {
     pub(super) fn camera_set(&mut self, s: &Statement<'a, '_>, camera: &Value<Camera>) {
         self.is_compared = false;
         self.has_camera = true;
-        self.is_orthographic = *camera == Value::Still(Camera::Orthographic);
+        self.is_orthographic = *camera == Value::Constant(Camera::Orthographic);
         let corners = match camera {
-            Value::Still(Camera::Pinhole(pinhole)) => {
+            Value::Constant(Camera::Pinhole(pinhole)) => {
                 let (a, b) = (pinhole.lower_left(), pinhole.upper_right());
                 Some([a.x, a.y, b.x, b.y])
             }
-            Value::Moving(template) if template.command == Command::Camera => {
+            Value::Animated(template) if template.command == Command::Camera => {
                 let still = |number: &Number| match number {
-                    Number::Still(value) => Some(*value),
-                    Number::Moving(_) => None,
+                    Number::Constant(value) => Some(*value),
+                    Number::Animated(_) => None,
                 };
                 let corners: Option<Vec<_>> = template.row.numbers()[10..].iter().map(still).collect();
                 corners.and_then(|corners| corners.try_into().ok())
             }
-            Value::Still(Camera::Orthographic | Camera::Look(_)) | Value::Moving(_) => None,
+            Value::Constant(Camera::Orthographic | Camera::Look(_)) | Value::Animated(_) => None,
         };
         self.window = corners.map(|corners| (s.line, s.words.span(10..14), corners));
     }
 
     pub(super) fn lens_set(&mut self, s: &Statement<'a, '_>, lens: &Value<Lens>) {
-        let is_point = matches!(lens, Value::Still(lens) if lens.radius() == 0.0);
+        let is_point = matches!(lens, Value::Constant(lens) if lens.radius() == 0.0);
         self.lens = (!is_point).then(|| s.place());
     }
 
-    /// What is odd about the picture that is drawn now, each thing once.
+    /// Reports warnings about the picture that is rendered now, each only once.
     pub(super) fn check(&mut self, screen: Screen, report: &mut Report<'a>) {
         if (self.is_orthographic || !self.has_camera)
             && let Some((line, span)) = self.lens.take()
@@ -71,7 +71,7 @@ impl<'a> Picture<'a> {
         }
         let Some((line, span, corners)) = &self.window else { return };
         if let Some(better) = unsquashed(*corners, screen) {
-            report.warning(*line, span.clone(), || wording::squashed(screen, better));
+            report.warning(*line, span.clone(), || wording::non_square_pixels(screen, better));
         }
     }
 }

@@ -1,12 +1,12 @@
-//! Text to lines and words.
+//! Splits text into lines and words.
 
 use std::ops::Range;
 
 use crate::command::MAX_NUMBERS;
 use crate::report::{BYTE_ORDER_MARK, Line};
 
-/// The lines of a text without their ends and without the byte-order mark. The last one is empty when the text ends
-/// with a line feed.
+/// Returns the lines of a text without their ends and without the byte-order mark. The last one is empty if the text
+/// ends with a line feed.
 pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
     let mut next = Some(if bytes.starts_with(BYTE_ORDER_MARK) { BYTE_ORDER_MARK.len() } else { 0 });
     (1..).map_while(move |number| {
@@ -25,17 +25,17 @@ pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
     })
 }
 
-/// What a byte is to the words of a line.
+/// The class of a byte within a line.
 #[derive(Clone, Copy, PartialEq)]
 enum Class {
     Word,
     Separator,
     Comment,
-    /// A word of its own.
+    /// A word on its own.
     Mark,
 }
 
-/// Of all bytes, so that a line is read with one look at each.
+/// The classes of all bytes, so that a line is split with one lookup per byte.
 const CLASSES: [Class; 256] = {
     let mut classes = [Class::Word; 256];
     classes[b' ' as usize] = Class::Separator;
@@ -48,7 +48,7 @@ const CLASSES: [Class; 256] = {
     classes
 };
 
-/// The next word of `line` from byte `at` on; `at` comes to stand behind it.
+/// Returns the next word of `line` from byte `at` on, and moves `at` to its end.
 #[inline]
 pub(super) fn next_word(line: &[u8], at: &mut usize) -> Option<Range<usize>> {
     let behind = |start: usize, class: Class| {
@@ -64,8 +64,8 @@ pub(super) fn next_word(line: &[u8], at: &mut usize) -> Option<Range<usize>> {
     (end > start).then_some(start..end)
 }
 
-/// The next parameter: a word, or a curve from its opening bracket to the closing one or, where that lacks, the end of
-/// the last word.
+/// Returns the next parameter: a word, or a curve from its opening bracket to the closing one. If that is missing,
+/// the curve ends with the last word.
 #[inline]
 fn next_parameter(line: &[u8], at: &mut usize) -> Option<Range<usize>> {
     let first = next_word(line, at)?;
@@ -82,33 +82,33 @@ fn next_parameter(line: &[u8], at: &mut usize) -> Option<Range<usize>> {
     Some(first.start..end)
 }
 
-/// All parameters of a line behind byte `at`.
+/// Returns all parameters of a line from byte `at` on.
 pub(super) fn parameters(line: &[u8], mut at: usize) -> Vec<Range<usize>> {
     std::iter::from_fn(|| next_parameter(line, &mut at)).collect()
 }
 
-/// The words of a line, as bytes of it: its command and the parameters, of which those beyond the most that any
-/// command takes are only counted. A curve is one parameter.
+/// The words of a line, as ranges of its bytes: its command and its parameters. Parameters beyond the largest number
+/// of any command are only counted. A curve is one parameter.
 ///
-/// One stands for all lines of a text, as it is too large to be handed on by value.
+/// One value is reused for all lines of a text, because it is too large to be passed by value.
 #[derive(Debug)]
 pub(super) struct Words {
     pub(super) command: Range<usize>,
     parameters: [Range<usize>; MAX_NUMBERS],
     count: usize,
-    /// End of the last word.
+    /// The end of the last word.
     end: usize,
 }
 
 impl Words {
     const NOWHERE: Range<usize> = 0..0;
 
-    /// Those of an empty line.
+    /// Makes the words of an empty line.
     pub(super) const fn new() -> Self {
         Self { command: Self::NOWHERE, parameters: [Self::NOWHERE; MAX_NUMBERS], count: 0, end: 0 }
     }
 
-    /// Takes the words of another line; whether it has a command.
+    /// Splits another line. Returns whether it has a command.
     pub(super) fn read(&mut self, line: &[u8]) -> bool {
         self.count = 0;
         let mut at = 0;
@@ -126,17 +126,17 @@ impl Words {
         is_there
     }
 
-    /// How many parameters there are.
+    /// Returns the number of parameters.
     pub(super) fn count(&self) -> usize {
         self.count
     }
 
-    /// The parameters, without those that no command has.
+    /// Returns the parameters, without those beyond the largest number of any command.
     pub(super) fn parameters(&self) -> &[Range<usize>] {
         &self.parameters[..self.count.min(MAX_NUMBERS)]
     }
 
-    /// The first parameter, which then is one no more.
+    /// Removes and returns the first parameter.
     pub(super) fn take_first(&mut self) -> Option<Range<usize>> {
         let first = self.parameters().first()?.clone();
         self.parameters.rotate_left(1);
@@ -144,7 +144,7 @@ impl Words {
         Some(first)
     }
 
-    /// From the first to the last of some parameters, of those that are there.
+    /// Returns the range from the first to the last of some parameters, as far as they exist.
     pub(super) fn span(&self, parameters: Range<usize>) -> Range<usize> {
         if parameters.start >= self.count {
             return Self::NOWHERE;
@@ -153,18 +153,18 @@ impl Words {
         self.parameters[parameters.start].start..self.parameters[last].end
     }
 
-    /// Behind the last word.
+    /// Returns the empty range after the last word.
     pub(super) fn end(&self) -> Range<usize> {
         self.end..self.end
     }
 
-    /// From parameter `first` to the last word.
+    /// Returns the range from parameter `first` to the last word.
     pub(super) fn rest(&self, first: usize) -> Range<usize> {
         self.parameters().get(first).map_or(self.end, |word| word.start)..self.end
     }
 }
 
-/// Whether it can be the name of a material or a group.
+/// Returns whether a word can be the name of a material or a group.
 pub(super) fn is_name(word: &str) -> bool {
     word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
         && word.bytes().all(|b| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'-'))

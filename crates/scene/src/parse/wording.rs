@@ -1,4 +1,4 @@
-//! What a person is told about a fault in a script: what is wrong, what was expected, what to do.
+//! The messages about faults in a script: the problem, the expected text, and advice.
 
 use super::curve::CurveFault;
 use super::number::{self, NumberFault};
@@ -7,11 +7,11 @@ use crate::command::Command;
 use crate::curve::{CYCLE, Mode, Moment};
 use crate::diagnostic::Code;
 use crate::form::{Field, Form, Kind, Names, Unit, Values};
-use crate::model::{Clause, Doubt, InvalidValue, Screen};
+use crate::model::{Clause, InvalidValue, Lint, Screen};
 use crate::report::Fault;
 use crate::shown::{grouped, nearest, quoted};
 
-/// What `Trace` is for.
+/// The help text about `Trace`.
 const TRACE_HELP: &str = "`Trace` renders a frame of everything that stands before it";
 
 pub(super) fn too_large(limit: usize) -> Fault {
@@ -37,7 +37,7 @@ pub(super) fn unknown_command(name: &str, nearest: Option<Command>) -> Fault {
     let help = if let Some(command) = nearest {
         format!("did you mean `{}`?", command.name())
     } else if number::parse(name).is_ok() {
-        "a command and all its parameters stand on one line".to_string()
+        "a command and all its parameters must be on one line".to_string()
     } else if ["//", "/*", ";", "%", "--"].iter().any(|mark| name.starts_with(mark)) {
         "a comment starts with `#`".to_string()
     } else {
@@ -49,7 +49,7 @@ pub(super) fn unknown_command(name: &str, nearest: Option<Command>) -> Fault {
         .help(help)
 }
 
-/// About `word`, which stands in the place of `parameter`; `is_surface` where a material's name could, alone.
+/// Describes `word` in place of `parameter`. `is_surface`: a material's name alone is allowed there.
 pub(super) fn bad_number(fault: NumberFault, parameter: &str, word: &str, is_surface: bool) -> Fault {
     match fault {
         NumberFault::TooLarge => Fault::new(Code::NumberTooLarge, format!("{} is too large", quoted(word)))
@@ -59,26 +59,24 @@ pub(super) fn bad_number(fault: NumberFault, parameter: &str, word: &str, is_sur
                 .expected(format!("expected `{parameter}`, a number such as 2, -.5 or 1e-3"));
             match hint(word) {
                 Some(hint) => fault.help(hint),
-                None if is_surface => {
-                    fault.help("the name of a material stands alone, in the place of all coefficients")
-                }
+                None if is_surface => fault.help("the name of a material replaces all coefficients"),
                 None => fault,
             }
         }
     }
 }
 
-/// What a slip of the keyboard or of another program would explain.
+/// Explains a typo or the number format of another program.
 fn hint(word: &str) -> Option<String> {
-    // Longer words are no slips.
+    // Longer words are no typos.
     if word.len() > 100 {
         return None;
     }
     if Command::from_name(word).is_some() {
-        return Some("every command stands on a line of its own".to_string());
+        return Some("each command needs a line of its own".to_string());
     }
     if matches!(word, ":" | ")") {
-        return Some(format!("{} stands in a curve only, as in `(1:0 25:3)`", quoted(word)));
+        return Some(format!("{} is allowed only in a curve, as in `(1:0 25:3)`", quoted(word)));
     }
     let odd = word.chars().find(|c| !c.is_ascii_graphic())?;
     let code = u32::from(odd);
@@ -92,18 +90,19 @@ fn hint(word: &str) -> Option<String> {
     None
 }
 
-/// `comma` is a parameter that was probably written with a comma for a point.
+/// Describes missing parameters. `comma` is a parameter that was probably written with a decimal comma.
 pub(super) fn too_few(command: Command, words: &Words, comma: Option<&str>) -> Fault {
     let (missing, _) = command.form().number(words.count());
     miscounted(Code::TooFewParameters, command, words, comma).expected(format!("expected `{missing}` here"))
 }
 
-/// `first` is the first word that is too much; `comma` a parameter that was probably written with a comma for a point.
+/// Describes extra parameters. `first` is the first of them, and `comma` a parameter that was probably written
+/// with a decimal comma.
 pub(super) fn too_many(command: Command, words: &Words, first: &str, comma: Option<&str>) -> Fault {
     let fault =
         miscounted(Code::TooManyParameters, command, words, comma).expected("expected the end of the line");
     if Command::from_name(first).is_some() {
-        fault.help("every command stands on a line of its own")
+        fault.help("each command needs a line of its own")
     } else {
         fault
     }
@@ -121,7 +120,7 @@ fn miscounted(code: Code, command: Command, words: &Words, comma: Option<&str>) 
     })
 }
 
-/// How many parameters a command takes.
+/// Describes the number of parameters of a command.
 fn counts_of(form: &Form) -> String {
     let counts: Vec<_> = form.counts().collect();
     let (first, last) = (counts[0], counts[counts.len() - 1]);
@@ -141,10 +140,10 @@ fn counts_of(form: &Form) -> String {
     }
 }
 
-/// About a number that was probably written with a comma for a point.
+/// Describes a number that was probably written with a decimal comma.
 pub(super) fn decimal_comma(comma: &str) -> Fault {
-    Fault::new(Code::DecimalComma, format!("{} is two numbers", quoted(comma)))
-        .expected(format!("expected {}, or a blank behind the comma", quoted(&comma.replace(',', "."))))
+    Fault::new(Code::DecimalComma, format!("{} is read as two numbers", quoted(comma)))
+        .expected(format!("expected {}, or a space after the comma", quoted(&comma.replace(',', "."))))
         .help("the decimal sign is a point, a comma separates numbers")
 }
 
@@ -153,7 +152,7 @@ fn two_numbers(comma: &str) -> String {
     format!("a comma separates numbers: if {} is to be one, it is {}", quoted(comma), quoted(&one))
 }
 
-/// `word` is the first of the numbers that it is about, in the place of `name` of `field`.
+/// Describes an invalid value. `word` is the first of its numbers, in place of `name` of `field`.
 pub(super) fn invalid(fault: InvalidValue, name: &str, field: &Field, word: &str) -> Fault {
     if let InvalidValue::NotWhole(_, least, most) = fault {
         return not_whole(least, most, name, field, word);
@@ -166,7 +165,7 @@ pub(super) fn invalid(fault: InvalidValue, name: &str, field: &Field, word: &str
     Fault::new(Code::InvalidValue, fault.to_string()).expected(expectation(fault))
 }
 
-/// At a time, in a line with curves.
+/// Describes a value of a line with curves that is invalid at a time.
 pub(super) fn invalid_at(fault: InvalidValue, frame: f64) -> Fault {
     Fault::new(Code::InvalidValue, format!("{fault}, which fails at frame {frame}"))
         .expected(format!("{} at frame {frame}", expectation(fault)))
@@ -207,13 +206,13 @@ fn not_whole(least: u32, most: u32, name: &str, field: &Field, word: &str) -> Fa
         .expected(format!("expected `{name}`, a whole number {range}"))
 }
 
-/// About a curve that stands where `parameter` does.
+/// Describes an error in the curve in place of `parameter`.
 pub(super) fn curve(fault: CurveFault, parameter: &str) -> Fault {
     let malformed = |message: String| Fault::new(Code::MalformedCurve, message);
     let modes = || Mode::ALL.iter().map(|mode| mode.name()).chain([CYCLE]);
     match fault {
         CurveFault::Unclosed => malformed("the curve is not closed".into())
-            .expected("expected a `)` behind this, on the same line"),
+            .expected("expected a `)` after this, on the same line"),
         CurveFault::NoKey => malformed("the curve has no key".into())
             .expected(format!("expected frames and values of `{parameter}`, such as `1:0 25:3`")),
         CurveFault::NotAMode(word) => {
@@ -221,24 +220,26 @@ pub(super) fn curve(fault: CurveFault, parameter: &str) -> Fault {
                 Some(near) => format!("did you mean `{near}`?"),
                 None => format!("the modes are {}", listed(modes())),
             };
-            malformed(format!("{} is no mode of a curve", quoted(&word)))
+            malformed(format!("unknown curve mode {}", quoted(&word)))
                 .expected("expected a mode, or a key such as `25:3`")
                 .help(help)
         }
-        CurveFault::MisplacedMode(word) => malformed(format!("{} stands too late, or twice", quoted(&word)))
-            .expected("expected a key such as `25:3`")
-            .help(format!(
-                "a curve starts with at most one of {}, and `{CYCLE}`",
-                listed(Mode::ALL.iter().map(|mode| mode.name()))
-            )),
-        CurveFault::Stray(mark) => malformed(format!("{} fits nowhere", quoted(&mark)))
+        CurveFault::MisplacedMode(word) => {
+            malformed(format!("{} must come before the keys, and only once", quoted(&word)))
+                .expected("expected a key such as `25:3`")
+                .help(format!(
+                    "a curve starts with at most one of {}, and `{CYCLE}`",
+                    listed(Mode::ALL.iter().map(|mode| mode.name()))
+                ))
+        }
+        CurveFault::Stray(mark) => malformed(format!("unexpected {} in a curve", quoted(&mark)))
             .expected("expected a key such as `25:3`, or `)`"),
         CurveFault::NoValue => malformed("a key lacks its value".into())
-            .expected(format!("expected `:` and `{parameter}` behind this frame")),
+            .expected(format!("expected `:` and `{parameter}` after this frame")),
         CurveFault::BadNumber(fault, "frame", word) => bad_number(fault, "frame", &word, false),
         CurveFault::BadNumber(fault, _, word) => bad_number(fault, parameter, &word, false),
         CurveFault::OutOfOrder(last, frame) => {
-            malformed(format!("frame {frame} does not come behind frame {last}"))
+            malformed(format!("frame {frame} must be greater than frame {last}"))
                 .expected(format!("expected a frame greater than {last}"))
         }
         CurveFault::ShortCycle => malformed("a cycle of one key has no length".into())
@@ -247,18 +248,17 @@ pub(super) fn curve(fault: CurveFault, parameter: &str) -> Fault {
             Code::CurveOverflow,
             format!("the curve becomes too large between frames {from} and {to}"),
         )
-        .expected("expected values that are nearer to each other, or frames that are not so near"),
+        .expected("expected values closer together, or keys further apart"),
     }
 }
 
-/// A curve where none may stand.
+/// Describes a curve where none is allowed.
 pub(super) fn unwanted_curve(command: Command, parameter: &str) -> Fault {
     Fault::new(Code::UnwantedCurve, format!("`{command}` takes no curves"))
         .expected(format!("expected `{parameter}`, a number"))
 }
 
-/// A curve has a value that `field` does not take.
-/// It is seen `from` one time `to` another.
+/// Describes a value of a curve that `field` does not allow. The curve is visible `from` one time `to` another.
 pub(super) fn wrong_at(field: &Field, moment: Moment, from: f64, to: f64) -> Fault {
     let Moment { frame, value } = moment;
     let takes = match field.values {
@@ -279,16 +279,16 @@ pub(super) fn wrong_at(field: &Field, moment: Moment, from: f64, to: f64) -> Fau
         .expected(format!("expected {takes} {when}"))
 }
 
-/// The conditions of a line with curves would take too long to look at.
+/// Reports that checking the constraints of a line with curves would take too long.
 pub(super) fn too_much_work() -> Fault {
-    Fault::new(Code::LimitExceeded, "too many frames to see whether this is in order in each of them")
-        .expected("expected fewer frames, or curves that stay away from what is not allowed")
+    Fault::new(Code::LimitExceeded, "too many frames to check this line in every frame")
+        .expected("expected fewer frames, or curves that stay well within the allowed range")
         .help("split the frames among several scripts")
 }
 
-/// `word` is none of the words that `field` takes.
+/// Describes a `word` that `field` does not allow.
 pub(super) fn no_such_word(word: &str, words: &[&str], field: &Field) -> Fault {
-    let fault = Fault::new(Code::InvalidValue, format!("{} is no {}", quoted(word), field.names[0]))
+    let fault = Fault::new(Code::InvalidValue, format!("unknown {} {}", field.names[0], quoted(word)))
         .expected(format!("expected {}", words.join(" or ")));
     match nearest(word, words.iter().copied()) {
         Some(near) => fault.help(format!("did you mean `{near}`?")),
@@ -296,16 +296,16 @@ pub(super) fn no_such_word(word: &str, words: &[&str], field: &Field) -> Fault {
     }
 }
 
-/// `a`, `b`, `c`.
+/// Joins words to a list: `a`, `b`, `c`.
 fn listed<'a>(words: impl Iterator<Item = &'a str>) -> String {
     words.map(|word| format!("`{word}`")).collect::<Vec<_>>().join(", ")
 }
 
-/// How a name looks.
+/// The help text about names.
 const NAME_HELP: &str = "a name is a letter or `_`, then letters, digits, `_` and `-`";
 
 pub(super) fn no_name(command: Command, names: Names) -> Fault {
-    Fault::new(Code::MalformedName, format!("`{command}` lacks the name of a {}", names.thing()))
+    Fault::new(Code::MalformedName, format!("`{command}` lacks the name of a {}", names.noun()))
         .expected("expected a name here")
         .help(format!("write `{}`", usage(command)))
 }
@@ -318,20 +318,21 @@ fn usage(command: Command) -> String {
 }
 
 pub(super) fn bad_name(word: &str, names: Names) -> Fault {
-    Fault::new(Code::MalformedName, format!("{} is no name", quoted(word)))
-        .expected(format!("expected the name of a {}", names.thing()))
+    Fault::new(Code::MalformedName, format!("invalid name {}", quoted(word)))
+        .expected(format!("expected the name of a {}", names.noun()))
         .help(NAME_HELP)
 }
 
-/// `later` is the line in which it is given; `nearest` was perhaps meant.
+/// Describes an unknown name. `later` is the line in which it is defined, and `nearest` a name that
+/// may have been meant.
 pub(super) fn unknown_name(names: Names, name: &str, later: Option<usize>, nearest: Option<&str>) -> Fault {
-    let thing = names.thing();
+    let noun = names.noun();
     let message = match later {
-        Some(line) => format!("the {thing} {} is not known before line {line}", quoted(name)),
-        None => format!("there is no {thing} {}", quoted(name)),
+        Some(line) => format!("the {noun} {} is not known before line {line}", quoted(name)),
+        None => format!("unknown {noun} {}", quoted(name)),
     };
     let fault = Fault::new(Code::UnknownName, message)
-        .expected(format!("expected a {thing} that is defined before this"));
+        .expected(format!("expected a {noun} that is defined before this"));
     match (later, nearest) {
         (Some(line), _) => fault.help(format!("move line {line} up, before this")),
         (None, Some(near)) => fault.help(format!("did you mean `{near}`?")),
@@ -344,21 +345,21 @@ pub(super) fn uses_itself(name: &str) -> Fault {
         .expected("expected a group that is defined before this")
 }
 
-/// `first` is the line in which it was given before.
+/// Describes a second definition. `first` is the line of the first one.
 pub(super) fn defined_twice(names: Names, name: &str, first: usize) -> Fault {
-    let thing = names.thing();
-    Fault::new(Code::DuplicateName, format!("there is a {thing} {} already, in line {first}", quoted(name)))
+    let noun = names.noun();
+    Fault::new(Code::DuplicateName, format!("there is a {noun} {} already, in line {first}", quoted(name)))
         .expected("expected another name")
 }
 
 pub(super) fn unused_name(names: Names) -> Fault {
-    let thing = names.thing();
-    Fault::new(Code::Unused, format!("this {thing} is not used"))
-        .expected(format!("expected something that uses this {thing}"))
+    let noun = names.noun();
+    Fault::new(Code::Unused, format!("this {noun} is not used"))
+        .expected(format!("expected something that uses this {noun}"))
 }
 
 pub(super) fn no_clause() -> Fault {
-    Fault::new(Code::TooFewParameters, "a material says something of its surface")
+    Fault::new(Code::TooFewParameters, "this material has no clauses")
         .expected("expected a clause, such as `diffuse .8 .2 .1`")
         .help(format!("the clauses are {}", listed(Clause::ALL.iter().map(|clause| clause.name()))))
 }
@@ -369,7 +370,7 @@ pub(super) fn unknown_clause(word: &str) -> Fault {
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("the clauses are {}", listed(names())),
     };
-    Fault::new(Code::UnknownClause, format!("{} is no clause of a material", quoted(word)))
+    Fault::new(Code::UnknownClause, format!("unknown material clause {}", quoted(word)))
         .expected("expected a clause")
         .help(help)
 }
@@ -383,7 +384,7 @@ pub(super) fn clause_twice(clause: Clause, first: Clause) -> Fault {
     Fault::new(Code::DuplicateClause, message).expected("expected another clause")
 }
 
-/// `found` numbers are there, the one called `name` is missing.
+/// Describes a clause with `found` numbers, of which the one called `name` is missing.
 pub(super) fn clause_too_short(clause: Clause, name: &str, found: usize) -> Fault {
     let found = if found == 0 { "none".to_string() } else { found.to_string() };
     let takes = counts_of(clause.form());
@@ -399,29 +400,31 @@ pub(super) fn no_pattern_material(clause: Clause) -> Fault {
 }
 
 pub(super) fn unfit_material(name: &str) -> Fault {
-    Fault::new(Code::UnfitMaterial, format!("the material {} has more than coefficients", quoted(name)))
+    Fault::new(Code::UnfitMaterial, format!(
+            "the material {} cannot be part of a pattern: it has clauses other than `ambient`, `diffuse` and `mirror`",
+            quoted(name)
+        ))
         .expected("expected a material of `ambient`, `diffuse` and `mirror` only")
 }
 
 pub(super) fn end_without_group() -> Fault {
-    Fault::new(Code::Misplaced, "there is no group that this could end")
-        .expected("expected a `Group` before this")
+    Fault::new(Code::Misplaced, "`End` without a `Group`").expected("expected a `Group` before this")
 }
 
-/// The group started in line `number`.
+/// Describes a command that is not allowed in the group that started in line `number`.
 pub(super) fn not_in_group(command: Command, name: &str, number: usize) -> Fault {
-    Fault::new(Code::Misplaced, format!("`{command}` cannot stand in a group"))
+    Fault::new(Code::Misplaced, format!("`{command}` is not allowed in a group"))
         .expected("expected an object, `Use` or `End`")
         .help(format!("the group {} starts in line {number}; is its `End` missing?", quoted(name)))
 }
 
 pub(super) fn group_not_ended() -> Fault {
-    Fault::new(Code::UnclosedGroup, "this group has no end").expected("expected an `End` behind its objects")
+    Fault::new(Code::UnclosedGroup, "this group has no end").expected("expected an `End` after its objects")
 }
 
 pub(super) fn too_far() -> Fault {
-    Fault::new(Code::NumberTooLarge, "this moves or scales the group further than numbers reach")
-        .expected("expected less; 1.79e308 is the largest number")
+    Fault::new(Code::NumberTooLarge, "the group's position or scale overflows")
+        .expected("expected values up to 1.79e308")
 }
 
 pub(super) fn lens_without_effect() -> Fault {
@@ -429,20 +432,20 @@ pub(super) fn lens_without_effect() -> Fault {
         .expected("expected a `Look` or `Camera` beside this")
 }
 
-/// `better` is a window that would not.
-pub(super) fn squashed(screen: Screen, better: [f64; 4]) -> Fault {
+/// Warns of pixels that are not square. `better` is a window with square pixels.
+pub(super) fn non_square_pixels(screen: Screen, better: [f64; 4]) -> Fault {
     let better: Vec<_> = better.iter().map(|x| short(*x)).collect();
-    Fault::new(Code::SquashedImage, "the picture is squashed: a ball is no circle in it")
+    Fault::new(Code::SquashedImage, "the pixels are not square: a sphere looks like an ellipse")
         .expected(format!("expected a window of the shape {} : {}", screen.width(), screen.height()))
         .help(format!("write for example `{}`", better.join(" ")))
 }
 
-/// A number to six digits.
+/// Formats a number with six digits.
 fn short(x: f64) -> String {
     format!("{x:.5e}").parse::<f64>().unwrap_or(x).to_string()
 }
 
-/// More frames than a script may be.
+/// Describes more frames than the limit of a script.
 pub(super) fn too_many_frames(frames: u64, limit: u64) -> Fault {
     let more = if frames == limit + 1 {
         "this is one more".to_string()
@@ -461,9 +464,9 @@ pub(super) fn too_many_pixels(pixels: u64, limit: u64) -> Fault {
         .help("make the image smaller or raise the limit")
 }
 
-/// With the last `added` there are `count`.
+/// Describes a limit that is exceeded. The last `added` items make the total `count`.
 pub(super) fn beyond_limit(added: usize, count: usize, limit: usize, what: &str) -> Fault {
-    let told = grouped(limit as u64);
+    let limit_text = grouped(limit as u64);
     let more = if added == 1 && count == limit + 1 {
         "this is one more".to_string()
     } else if count == usize::MAX {
@@ -471,8 +474,8 @@ pub(super) fn beyond_limit(added: usize, count: usize, limit: usize, what: &str)
     } else {
         format!("with this there are {}", grouped(count as u64))
     };
-    Fault::new(Code::LimitExceeded, format!("more than {told} {what}"))
-        .expected(format!("expected at most {told}, {more}"))
+    Fault::new(Code::LimitExceeded, format!("more than {limit_text} {what}"))
+        .expected(format!("expected at most {limit_text}, {more}"))
 }
 
 pub(super) fn no_screen() -> Fault {
@@ -487,9 +490,9 @@ pub(super) fn no_trace() -> Fault {
         .help(TRACE_HELP)
 }
 
-pub(super) fn doubtful(doubt: Doubt) -> Fault {
-    match doubt {
-        Doubt::DegenerateTriangle => {
+pub(super) fn lint_fault(lint: Lint) -> Fault {
+    match lint {
+        Lint::DegenerateTriangle => {
             Fault::new(Code::DegenerateTriangle, "a triangle of no area is never hit")
                 .expected("expected three points that are not on a line")
         }

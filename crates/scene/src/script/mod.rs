@@ -1,13 +1,13 @@
-//! A script that was understood: a sequence of frames, each made when it is asked for.
+//! A parsed script: a sequence of frames, each built on request.
 //!
-//! Frames share what they have in common. All objects of the script lie in one list, in the order of the text; a
-//! `Clear` starts a new range of it, each command adds to the range, and a `Trace` notes how far it reaches: a [`Shot`],
-//! which is one frame or many. So a frame is a handful of numbers, and any frame can be had without replaying those
-//! before it. What has no curves is kept as it is drawn; what has is kept as its line, and read at each moment that is
-//! asked for (`moment`).
+//! Frames share their common data. All objects of the script are in one list, in the order of the text. A `Clear`
+//! starts a new range of it, each command adds to the range, and a `Trace` records its end in a [`Shot`], which is
+//! one frame or many. So a frame is a few numbers, and any frame can be built without replaying the frames before
+//! it. Items without curves are stored as they are drawn. Items with curves are stored as lines, and evaluated at
+//! each requested moment (`moment`).
 //!
-//! Invariants: every range lies within its list; what no frame sees is not kept; no two neighbours in `views` are equal, nor in `shots`;
-//! materials and groups refer only to earlier ones.
+//! Invariants: every range is within its list. Items that no frame sees are not stored. No two neighbours in `views`
+//! or in `shots` are equal. Materials and groups refer only to earlier ones.
 
 mod moment;
 mod of_scene;
@@ -26,7 +26,7 @@ use crate::shared_slice::SharedSlice;
 
 pub(crate) use recorder::{GroupRecorder, Recorder};
 
-/// The frames of a script, at least one.
+/// A parsed script, with at least one frame.
 ///
 /// ```
 /// let text = b"Screen 4 3\nSphere (1:1 25:3) 0 0 -5 1 0 0 0 0 0\nFrames 50\nTrace\nClear\nFrames 1\nTrace";
@@ -46,20 +46,20 @@ pub struct Script {
     shots: Vec<Shot>,
 }
 
-/// What one `Trace`, or several in a row that see the same, renders, without its scenes.
+/// A summary of one `Trace`, or of several consecutive ones that see the same, without their scenes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShotSummary {
-    /// How many frames it is.
+    /// The number of frames.
     pub frame_count: usize,
-    /// Size of their images.
+    /// The size of the images.
     pub screen: Screen,
-    /// Whether they are drawn by `Orthocamera`.
+    /// Whether the camera is `Orthocamera`.
     pub is_orthographic: bool,
-    /// The most objects that one of them has, as drawn.
+    /// The largest number of objects that a frame draws.
     pub objects: usize,
 }
 
-/// What a frame has beside its objects and lights.
+/// The settings of a frame, without its objects and lights.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct View {
     pub(crate) screen: Screen,
@@ -72,44 +72,44 @@ pub(crate) struct View {
     pub(crate) depth: Depth,
 }
 
-/// What is the same in all frames, or read anew for each.
+/// A value that is the same in all frames, or evaluated for each.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value<T> {
-    Still(T),
-    Moving(Template),
+    Constant(T),
+    Animated(Template),
 }
 
-/// A line that is read at each moment that is asked for.
+/// A line that is evaluated at each requested moment.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Template {
     pub(crate) command: Command,
     pub(crate) row: Row,
 }
 
-/// What a `Trace` sees, or several in a row that see the same.
+/// The data of one `Trace`, or of several consecutive ones that see the same.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Shot {
     view: usize,
     objects: Extent,
     lights: Extent,
     numbers: FrameNumbers,
-    /// How many Traces.
+    /// The number of Traces.
     times: usize,
-    /// How many frames come before.
+    /// The number of frames before it.
     before: usize,
-    /// The most objects that a frame has, as drawn.
+    /// The largest number of objects that a frame draws.
     drawn: usize,
 }
 
-/// Things in the order of the text: those that are the same in all frames, and others between them.
+/// Items in the order of the text: those that are the same in all frames, and the others between them.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Sequence<T, M> {
     still: SharedSlice<T>,
-    /// Each with the number of still ones that stand before it.
+    /// The other items, each with the number of constant items before it.
     others: Vec<(usize, M)>,
 }
 
-/// A part of a sequence.
+/// A range of a sequence.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Extent {
     still: Range<usize>,
@@ -120,29 +120,29 @@ pub(crate) struct Extent {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Objects {
     list: Sequence<Object, Drawn>,
-    /// Which material the still objects from a place on are named to have.
+    /// The named material of the constant objects from an index on.
     surfaces: Vec<(usize, Option<usize>)>,
 }
 
-/// What is drawn beside still objects.
+/// A drawn item that is no constant object.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Drawn {
-    /// An object that is read at each moment, with its numbers or a named material.
+    /// An object that is evaluated at each moment, with its numbers or a named material.
     Object { template: Template, surface: Option<usize> },
-    /// A group.
+    /// A group that is drawn.
     Use { group: usize, row: Row },
 }
 
-/// A material with its name.
+/// A named material with its clauses.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct NamedMaterial {
     pub(crate) name: Box<str>,
     pub(crate) clauses: Vec<ClauseLine>,
-    /// Its value, if no curve is in it.
+    /// The material, if it has no curves.
     pub(crate) still: Option<Material>,
 }
 
-/// A clause as it stands in a script.
+/// A clause as in the script.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ClauseLine {
     pub(crate) clause: Clause,
@@ -151,58 +151,58 @@ pub(crate) struct ClauseLine {
     pub(crate) other: Option<usize>,
 }
 
-/// A group with its name.
+/// A named group with its objects.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Group {
     name: Box<str>,
     objects: Objects,
-    /// The most objects that drawing it draws.
+    /// The largest number of objects that drawing it draws.
     drawn: usize,
 }
 
 impl Script {
-    /// How many frames there are.
+    /// Returns the number of frames.
     pub fn frame_count(&self) -> usize {
         self.shots.last().map_or(0, |shot| shot.before.saturating_add(shot.frame_count()))
     }
 
-    /// The scene of frame `k`, counted from 0, at the middle of its exposure; `None` beyond the last. Copies no object
-    /// of a frame in which nothing moves.
+    /// Returns the scene of frame `k`, counted from 0, in the middle of its exposure, or `None` after the last frame.
+    /// Copies no object of a frame without motion.
     pub fn frame(&self, k: usize) -> Option<Scene> {
         let (shot, number) = self.shot_of(k)?;
         self.scene(shot, number).ok()
     }
 
-    /// The number of frame `k`, counted from 0, which is the time at which its curves are read.
+    /// Returns the number of frame `k`, counted from 0, which is the time at which its curves are evaluated.
     pub fn frame_number(&self, k: usize) -> Option<f64> {
         self.shot_of(k).map(|(_, number)| number)
     }
 
-    /// The numbers of the frames that frame `k`, counted from 0, has its `Trace` in common with: the first and the last.
+    /// Returns the first and the last number of the frames that share the `Trace` of frame `k`, counted from 0.
     pub fn frame_numbers(&self, k: usize) -> Option<(u32, u32)> {
         self.shot_of(k).map(|(shot, _)| (shot.numbers.first, shot.numbers.last))
     }
 
-    /// The scene of frame `k`, counted from 0, as it is at another moment of its exposure: `time` lies within half of the
-    /// shutter's share around [`Self::frame_number`]. `None` beyond the last frame.
+    /// Returns the scene of frame `k`, counted from 0, at another moment of its exposure. `time` is within half of
+    /// the shutter's share around [`Self::frame_number`]. Returns `None` after the last frame.
     ///
     /// # Errors
-    /// What is wrong at that moment: what several numbers must keep together is known to hold only at the opening, the
-    /// middle and the closing of the shutter. Nothing at these three.
+    /// Returns the error at that moment. Constraints on several numbers are only known to hold when the shutter opens
+    /// and closes and in the middle, so there is no error at these three times.
     pub fn frame_at(&self, k: usize, time: f64) -> Option<Result<Scene, InvalidValue>> {
         let (shot, _) = self.shot_of(k)?;
         Some(self.scene(shot, time).map_err(|faults| faults.0[0]))
     }
 
-    /// Frame `k`, counted from 0, so many frames after the middle of its exposure (before it, if negative): within half of
-    /// the shutter's share. Where several numbers do not keep together what they must at that very moment, the frame as it is
-    /// in the middle. `None` beyond the last frame.
+    /// Returns frame `k`, counted from 0, at a time in frames after the middle of its exposure (before it, if
+    /// negative), within half of the shutter's share. If a constraint on several numbers fails at that moment,
+    /// returns the frame in the middle of its exposure. Returns `None` after the last frame.
     pub fn frame_after(&self, k: usize, frames: f64) -> Option<Scene> {
         let (shot, number) = self.shot_of(k)?;
         self.scene(shot, number + frames).or_else(|_| self.scene(shot, number)).ok()
     }
 
-    /// The scenes of all frames in order, each made when the iterator comes to it.
+    /// Returns the scenes of all frames in order. The iterator builds each on request.
     pub fn frames(&self) -> impl DoubleEndedIterator<Item = Scene> + ExactSizeIterator + '_ {
         (0..self.frame_count()).map(|k| {
             let scene = self.frame(k);
@@ -210,21 +210,21 @@ impl Script {
         })
     }
 
-    /// What the `Trace` commands render, in order; costs nothing for the frames that they are.
+    /// Returns the summaries of the `Trace` commands in order. Their cost does not depend on the number of frames.
     pub fn shots(&self) -> impl Iterator<Item = ShotSummary> + '_ {
         self.shots.iter().map(|shot| {
             let view = &self.views[shot.view];
             ShotSummary {
                 frame_count: shot.frame_count(),
                 screen: view.screen,
-                is_orthographic: view.camera == Value::Still(Camera::Orthographic),
+                is_orthographic: view.camera == Value::Constant(Camera::Orthographic),
                 objects: shot.drawn,
             }
         })
     }
 
-    /// The script of frame `k`, counted from 0, alone; `None` beyond the last. It has the pixels of that frame, and is
-    /// written with its curves and its number.
+    /// Returns the script of frame `k` alone, counted from 0, or `None` after the last frame. It has the pixels of
+    /// that frame, and is written with its curves and its number.
     pub fn only(&self, k: usize) -> Option<Self> {
         let (shot, number) = self.shot_of(k)?;
         let number = number as u32;
@@ -250,7 +250,7 @@ impl Script {
         Some(script)
     }
 
-    /// What frame `k` is a part of, and its number.
+    /// Returns the shot of frame `k`, and its frame number.
     fn shot_of(&self, k: usize) -> Option<(&Shot, f64)> {
         let shot = &self.shots[self.shots.partition_point(|shot| shot.before <= k).checked_sub(1)?];
         let place = k - shot.before;
@@ -258,7 +258,7 @@ impl Script {
         (place < shot.frame_count()).then_some((shot, number))
     }
 
-    /// Forgets materials and groups that nothing refers to, and numbers the others anew.
+    /// Removes materials and groups without references, and renumbers the others.
     fn forget_unused(&mut self) {
         if self.materials.is_empty() && self.groups.is_empty() {
             return;
@@ -299,7 +299,7 @@ impl Script {
     }
 }
 
-/// The new number of each that is kept.
+/// Returns the new number of each item that is kept.
 fn renumbered(kept: &[bool]) -> Vec<Option<usize>> {
     let mut next = 0..;
     kept.iter().map(|kept| if *kept { next.next() } else { None }).collect()
@@ -348,13 +348,13 @@ impl Objects {
         Self { list: self.list.part(extent), surfaces }
     }
 
-    /// The named material of still object `i`.
+    /// Returns the named material of constant object `i`.
     fn surface_of(&self, i: usize) -> Option<usize> {
         let run = self.surfaces.partition_point(|(from, _)| *from <= i).checked_sub(1)?;
         self.surfaces[run].1
     }
 
-    /// Marks the materials and groups that they refer to.
+    /// Marks the materials and groups that the objects refer to.
     fn refer(&self, materials: &mut [bool], groups: &mut [bool]) {
         self.surfaces.iter().filter_map(|(_, surface)| *surface).for_each(|k| materials[k] = true);
         for (_, drawn) in &self.list.others {
@@ -368,6 +368,6 @@ impl Objects {
 
 impl<T: Default> Default for Value<T> {
     fn default() -> Self {
-        Self::Still(T::default())
+        Self::Constant(T::default())
     }
 }

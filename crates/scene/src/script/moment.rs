@@ -1,32 +1,32 @@
-//! The scene of a script at a moment: lines with curves are read, groups are drawn.
+//! The scene of a script at a moment: evaluates lines with curves and draws groups.
 //!
-//! Each material and group is evaluated once a moment, however often it is used. Groups are drawn without recursion, so
-//! that no depth of groups in groups exhausts the stack.
+//! Each material and group is evaluated once per moment, however often it is used. Groups are drawn without
+//! recursion, so that deeply nested groups do not exhaust the stack.
 
 use std::sync::Arc;
 
 use super::{Drawn, Extent, Group, NamedMaterial, Script, Shot, Template, Value};
-use crate::command::{Act, Reader};
+use crate::command::{Effect, Reader};
 use crate::form::{Numbers, Scripted};
 use crate::model::{Clauses, Coefficients, Faults, Instance, Light, Material, Object, Placement, Scene};
 use crate::row::Row;
 use crate::shared_slice::SharedSlice;
 
-/// A script at a time, and what of it was evaluated so far.
+/// A script at a time, with the results evaluated so far.
 struct Moment<'a> {
     script: &'a Script,
     frame: f64,
-    /// Those that move.
+    /// The evaluated materials that have curves.
     materials: Vec<Option<Material>>,
-    /// The objects that stand in a group, without those of groups that it uses.
+    /// The objects of each group, without those of the groups that it uses.
     groups: Vec<Option<SharedSlice<Object>>>,
 }
 
-/// How far the drawing of a group has come.
+/// The state of drawing a group.
 struct Level {
     group: usize,
     placement: Arc<Placement>,
-    /// The next of its still objects, of its other lines, and of all its objects.
+    /// The next constant object, the next other line, and the next of all objects.
     still: usize,
     other: usize,
     object: usize,
@@ -35,8 +35,8 @@ struct Level {
 impl Script {
     pub(super) fn scene(&self, shot: &Shot, frame: f64) -> Result<Scene, Faults> {
         let view = &self.views[shot.view];
-        let camera = view.camera.at(frame, |act| match act {
-            Act::Camera(read) => Some(read),
+        let camera = view.camera.at(frame, |effect| match effect {
+            Effect::Camera(read) => Some(read),
             _ => None,
         })?;
         let mut scene = Scene::new(view.screen, camera);
@@ -103,13 +103,13 @@ impl Moment<'_> {
             return Ok(material.clone());
         }
         let named = &self.script.materials[i];
-        // Those that a pattern names have no pattern, so that this goes no deeper.
+        // The material that a pattern names has no pattern, so the recursion ends here.
         let material = named.at(self.frame, |other| self.material(other))?;
         self.materials[i] = Some(material.clone());
         Ok(material)
     }
 
-    /// The objects that stand in a group, without those of groups that it uses.
+    /// Returns the objects of a group, without those of the groups that it uses.
     fn objects_of(&mut self, i: usize) -> Result<SharedSlice<Object>, Faults> {
         if let Some(objects) = &self.groups[i] {
             return Ok(objects.clone());
@@ -137,7 +137,7 @@ impl Moment<'_> {
         Ok(self.groups[i].clone().unwrap_or_default())
     }
 
-    /// Adds the objects of a group where `row` draws it, in the order of the text.
+    /// Adds the objects of a group as placed by `row`, in the order of the text.
     fn draw(&mut self, group: usize, row: &Row, into: &mut Vec<Object>) -> Result<(), Faults> {
         let Some(placement) = self.placement(group, row, None)? else { return Ok(()) };
         let mut stack = vec![Level { group, placement, still: 0, other: 0, object: 0 }];
@@ -172,7 +172,7 @@ impl Moment<'_> {
         Ok(())
     }
 
-    /// Where a group is drawn within another, if at all.
+    /// Returns the placement of a group within another, or `None` if it is hidden.
     fn placement(
         &self,
         group: usize,
@@ -187,7 +187,7 @@ impl Moment<'_> {
             return Ok(None);
         };
         Ok(match outer {
-            // What is scaled to less than the least of numbers is hidden.
+            // A group whose scale underflows is hidden.
             Some(outer) if own.scale() * outer.scale() == 0.0 => None,
             Some(outer) => Some(Arc::new(own.within(outer)?)),
             None => Some(Arc::new(own)),
@@ -196,7 +196,7 @@ impl Moment<'_> {
 }
 
 impl NamedMaterial {
-    /// Its value at a time; `other` gives that of another material.
+    /// Returns the material at a time. `other` returns another material.
     pub(crate) fn at(
         &self,
         frame: f64,
@@ -216,7 +216,7 @@ impl NamedMaterial {
 }
 
 impl Template {
-    /// What is read from its numbers at a time.
+    /// Makes the item from the numbers at a time.
     pub(crate) fn at<T>(
         &self,
         frame: f64,
@@ -228,22 +228,26 @@ impl Template {
     }
 
     pub(crate) fn object(&self, frame: f64, surface: Option<&Material>) -> Result<Object, Faults> {
-        let Act::Object(read) = self.command.act() else { unreachable!("`{}` is no object", self.command) };
+        let Effect::Object(read) = self.command.effect() else {
+            unreachable!("`{}` is no object", self.command)
+        };
         self.at(frame, surface, read)
     }
 
     pub(crate) fn light(&self, frame: f64) -> Result<Light, Faults> {
-        let Act::Light(read) = self.command.act() else { unreachable!("`{}` is no light", self.command) };
+        let Effect::Light(read) = self.command.effect() else {
+            unreachable!("`{}` is no light", self.command)
+        };
         self.at(frame, None, read)
     }
 }
 
 impl<T: Clone> Value<T> {
-    /// `reader` finds in what the line's command does how it is read.
-    fn at(&self, frame: f64, reader: impl Fn(Act) -> Option<Reader<T>>) -> Result<T, Faults> {
+    /// Evaluates the value. `reader` selects the function that reads it from the effect of its command.
+    fn at(&self, frame: f64, reader: impl Fn(Effect) -> Option<Reader<T>>) -> Result<T, Faults> {
         match self {
-            Self::Still(value) => Ok(value.clone()),
-            Self::Moving(template) => match reader(template.command.act()) {
+            Self::Constant(value) => Ok(value.clone()),
+            Self::Animated(template) => match reader(template.command.effect()) {
                 Some(read) => template.at(frame, None, read),
                 None => unreachable!("`{}` is no such thing", template.command),
             },

@@ -1,4 +1,4 @@
-//! A scene as a script of one frame, with names for what needs one.
+//! Converts a scene to a script of one frame, with names for its materials and groups.
 
 use glam::{DMat3, DVec3};
 
@@ -8,13 +8,13 @@ use crate::model::{
 };
 use crate::row::{Number, Row};
 
-/// What has been given a name so far.
+/// The names given so far.
 #[derive(Default)]
 struct Namer {
     recorder: Recorder,
     materials: usize,
     groups: usize,
-    /// The last material that got a name, and its number: neighbours are often alike.
+    /// The last material that got a name, and its number, because neighbours often have the same one.
     last_material: Option<(Material, usize)>,
     /// The last object of a group, and the number of the group that was made for it.
     last_group: Option<(Object, usize)>,
@@ -27,13 +27,13 @@ impl From<&Scene> for Script {
             namer.add(object);
         }
         let mut recorder = namer.recorder;
-        recorder.set_camera(Value::Still(scene.camera));
-        recorder.set_background(Value::Still(scene.background));
-        recorder.set_lens(Value::Still(scene.lens));
+        recorder.set_camera(Value::Constant(scene.camera));
+        recorder.set_background(Value::Constant(scene.background));
+        recorder.set_lens(Value::Constant(scene.lens));
         (recorder.samples, recorder.shutter) = (scene.samples, scene.shutter);
         (recorder.tone, recorder.depth) = (scene.tone, scene.depth);
         recorder.numbers = FrameNumbers::default();
-        scene.lights.iter().for_each(|light| recorder.add_light(Value::Still(*light)));
+        scene.lights.iter().for_each(|light| recorder.add_light(Value::Constant(*light)));
         recorder.trace(scene.screen, scene.objects.len());
         recorder.finish().unwrap_or_else(|| unreachable!("a frame was recorded"))
     }
@@ -74,7 +74,7 @@ impl Namer {
         self.recorder.add_drawn(Drawn::Use { group, row: row_of(instance.placement()) });
     }
 
-    /// The number of the name of a material; `None` for one that needs none.
+    /// Returns the number of a material's name, or `None` if it needs none.
     fn surface(&mut self, material: &Material) -> Option<usize> {
         material.finish()?;
         if let Some((last, number)) = &self.last_material
@@ -124,7 +124,7 @@ fn line(clause: Clause, numbers: &[&[f64]], other: Option<usize>) -> ClauseLine 
 }
 
 fn row(numbers: &[&[f64]]) -> Row {
-    Row::new(numbers.concat().into_iter().map(Number::Still).collect())
+    Row::new(numbers.concat().into_iter().map(Number::Constant).collect())
 }
 
 fn row_of(placement: &Placement) -> Row {
@@ -132,11 +132,11 @@ fn row_of(placement: &Placement) -> Row {
     row(&[&placement.translation().to_array(), &degrees.to_array(), &[placement.scale()]])
 }
 
-/// The angles of Rz·Ry·Rx, in degrees.
+/// Returns the angles of Rz·Ry·Rx in degrees.
 fn angles(rotation: DMat3) -> DVec3 {
     let [x, y, z] = [rotation.x_axis, rotation.y_axis, rotation.z_axis];
     let about_y = libm::atan2(-x.z, libm::hypot(x.x, x.y));
-    // Seen from above or below, turns about x and z are the same: all is given to x.
+    // Seen from above or below, rotations about x and z are the same: x gets the whole angle.
     let (about_x, about_z) = if libm::hypot(x.x, x.y) > 1e-12 {
         (libm::atan2(y.z, z.z), libm::atan2(x.y, x.x))
     } else {

@@ -1,11 +1,11 @@
-//! What commands change, and the shots noted so far.
+//! The recorder: applies commands to the state, and stores the shots.
 
 use super::{Drawn, Extent, Group, NamedMaterial, Objects, Script, Sequence, Shot, Template, Value, View};
 use crate::model::{
     Background, Camera, Depth, FrameNumbers, Lens, Light, Object, Samples, Screen, Shutter, Tone,
 };
 
-/// The state that commands change, and the shots noted so far.
+/// The state that commands change, and the shots so far.
 #[derive(Debug, Default)]
 pub(crate) struct Recorder {
     materials: Vec<NamedMaterial>,
@@ -16,7 +16,7 @@ pub(crate) struct Recorder {
     camera: Value<Camera>,
     background: Value<Background>,
     lens: Value<Lens>,
-    /// As they stand; screens are given with each `Trace`.
+    /// The current settings. The screen is passed to each `Trace`.
     pub(crate) samples: Samples,
     pub(crate) shutter: Shutter,
     pub(crate) tone: Tone,
@@ -34,19 +34,19 @@ pub(crate) struct GroupRecorder {
     surfaces: Surfaces,
 }
 
-/// Runs of still objects of one named material.
+/// Runs of constant objects with the same named material.
 #[derive(Debug, Default)]
 struct Surfaces(Vec<(usize, Option<usize>)>);
 
 impl Surfaces {
-    /// Object `i`, the last so far, has this material.
+    /// Records the material of object `i`, which is the last so far.
     fn add(&mut self, i: usize, surface: Option<usize>) {
         if self.0.last().and_then(|(_, last)| *last) != surface {
             self.0.push((i, surface));
         }
     }
 
-    /// Forgets those from object `count` on.
+    /// Removes the entries from object `count` on.
     fn truncate(&mut self, count: usize) {
         self.0.truncate(self.0.partition_point(|(from, _)| *from < count));
     }
@@ -62,7 +62,7 @@ impl GroupRecorder {
         self.others.push((self.still.len(), drawn));
     }
 
-    /// `drawn` is how many objects drawing it draws at most.
+    /// Finishes the group. `drawn` is the largest number of objects that drawing it draws.
     pub(crate) fn finish(self, name: &str, drawn: usize) -> Group {
         let list = Sequence { still: self.still.into(), others: self.others };
         Group { name: name.into(), objects: Objects { list, surfaces: self.surfaces.0 }, drawn }
@@ -70,17 +70,17 @@ impl GroupRecorder {
 }
 
 impl Recorder {
-    /// The next one; they are numbered from 0.
+    /// Adds the next material. They are numbered from 0.
     pub(crate) fn add_material(&mut self, material: NamedMaterial) {
         self.materials.push(material);
     }
 
-    /// The next one; they are numbered from 0.
+    /// Adds the next group. They are numbered from 0.
     pub(crate) fn add_group(&mut self, group: Group) {
         self.groups.push(group);
     }
 
-    /// `surface` is the number of its material, if that was named.
+    /// Adds an object. `surface` is the number of its material if that is named.
     pub(crate) fn add_object(&mut self, object: Object, surface: Option<usize>) {
         self.surfaces.add(self.objects.still.len(), surface);
         self.objects.still.push(object);
@@ -92,8 +92,8 @@ impl Recorder {
 
     pub(crate) fn add_light(&mut self, light: Value<Light>) {
         match light {
-            Value::Still(light) => self.lights.still.push(light),
-            Value::Moving(template) => self.lights.others.push((self.lights.still.len(), template)),
+            Value::Constant(light) => self.lights.still.push(light),
+            Value::Animated(template) => self.lights.others.push((self.lights.still.len(), template)),
         }
     }
 
@@ -109,7 +109,7 @@ impl Recorder {
         set(&mut self.lens, lens);
     }
 
-    /// Everything but what a `Trace` is.
+    /// Forgets everything except the settings of a `Trace`.
     pub(crate) fn forget(&mut self) {
         *self = Self { shutter: self.shutter, numbers: self.numbers, ..Self::default() };
     }
@@ -121,7 +121,7 @@ impl Recorder {
         self.background = Value::default();
     }
 
-    /// `drawn` is how many objects a frame has at most.
+    /// Records a `Trace`. `drawn` is the largest number of objects that a frame draws.
     pub(crate) fn trace(&mut self, screen: Screen, drawn: usize) {
         if !self.views.last().is_some_and(|view| self.is_seen_by(view, screen)) {
             self.views.push(View {
@@ -155,7 +155,7 @@ impl Recorder {
         });
     }
 
-    /// Whether `view` is how things stand, which mostly they do.
+    /// Returns whether `view` equals the current state, which is the common case.
     fn is_seen_by(&self, view: &View, screen: Screen) -> bool {
         let View { screen: size, camera, background, lens, samples, shutter, tone, depth } = view;
         *size == screen
@@ -165,7 +165,7 @@ impl Recorder {
             && (*samples, *shutter, *tone, *depth) == (self.samples, self.shutter, self.tone, self.depth)
     }
 
-    /// The script; `None` when there are no frames.
+    /// Returns the script, or `None` if there are no frames.
     pub(crate) fn finish(mut self) -> Option<Script> {
         self.clear();
         let Self { materials, groups, objects, surfaces, lights, views, shots, .. } = self;
@@ -176,21 +176,21 @@ impl Recorder {
     }
 }
 
-/// Equal ones stay shared, so that views are quickly compared.
+/// Replaces the value unless it is equal. Equal values stay shared, so that views are compared quickly.
 fn set<T: PartialEq>(old: &mut T, new: T) {
     if *old != new {
         *old = new;
     }
 }
 
-/// The items of all frames in the order of the script; those since the last `Clear` are the current ones.
+/// The items of all frames in the order of the script. Those since the last `Clear` are the current ones.
 #[derive(Debug)]
 struct List<T, M> {
     still: Vec<T>,
     others: Vec<(usize, M)>,
-    /// Where the current ones start.
+    /// The start of the current items.
     start: (usize, usize),
-    /// How far the frames noted so far see.
+    /// The end of the items that the shots so far see.
     seen: (usize, usize),
 }
 

@@ -1,7 +1,7 @@
-//! Scenes and scripts back to text.
+//! Writes scenes and scripts as text.
 //!
-//! What is written reads back as the same script, every number bit for bit. It is not the text that was read:
-//! comments, spelling, and what no frame sees are gone.
+//! The text reads back as the same script, every number bit for bit. It is not the original text: comments, spelling,
+//! and items that no frame sees are lost.
 //!
 //! ```
 //! let text = "Screen 4 3\nSphere 1 0 0 -5 .1 .1 .1 1 1 1\nTrace\nTrace";
@@ -17,7 +17,7 @@ use crate::command::Command;
 use crate::form::write_line;
 use crate::model::{Background, Camera, FrameNumbers, Lens, Scene, Screen};
 
-/// As a script: materials and groups, then each shot as what changed since the one before, and a `Trace`.
+/// Writes a script: materials and groups, then for each shot the changes since the previous one, and a `Trace`.
 impl Display for Script {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         self.materials.iter().try_for_each(|material| self.write_material(f, material))?;
@@ -31,7 +31,7 @@ impl Display for Script {
         for shot in &self.shots {
             let view = &self.views[shot.view];
             let (mut objects, mut lights) = (shot.objects.clone(), shot.lights.clone());
-            let mut background = &Value::Still(Background::default());
+            let mut background = &Value::Constant(Background::default());
             if let Some(seen) = seen {
                 if seen.objects.starts_with(&objects) && seen.lights.starts_with(&lights) {
                     background = &last.background;
@@ -50,8 +50,8 @@ impl Display for Script {
             }
             if *background != view.background {
                 match &view.background {
-                    Value::Still(background) => write_line(f, background, None)?,
-                    Value::Moving(template) => template.write(f, None)?,
+                    Value::Constant(background) => write_line(f, background, None)?,
+                    Value::Animated(template) => template.write(f, None)?,
                 }
             }
             self.write_lights(f, &lights)?;
@@ -63,8 +63,8 @@ impl Display for Script {
     }
 }
 
-/// As a script of one frame. Materials and groups get names; what a group is turned by is written as angles, which
-/// read back as the same turn but for rounding.
+/// Writes a script of one frame. Materials and groups get names. The rotation of a group is written as angles, which
+/// read back as the same rotation except for rounding.
 impl Display for Scene {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         Script::from(self).fmt(f)
@@ -126,7 +126,7 @@ impl Script {
 }
 
 impl View {
-    /// As it is before any command.
+    /// Makes the view before any command.
     fn new(screen: Screen) -> Self {
         Self {
             screen,
@@ -140,18 +140,18 @@ impl View {
         }
     }
 
-    /// What a `Clear` leaves, but for the screen.
+    /// Writes the changes of settings that a `Clear` keeps, except the screen.
     fn write_changes(&self, f: &mut Formatter<'_>, last: &Self) -> fmt::Result {
         if self.camera != last.camera {
             match &self.camera {
-                Value::Still(camera) => Camera::write(camera, f)?,
-                Value::Moving(template) => template.write(f, None)?,
+                Value::Constant(camera) => Camera::write(camera, f)?,
+                Value::Animated(template) => template.write(f, None)?,
             }
         }
         if self.lens != last.lens {
             match &self.lens {
-                Value::Still(lens) => write_line::<Lens>(f, lens, None)?,
-                Value::Moving(template) => template.write(f, None)?,
+                Value::Constant(lens) => write_line::<Lens>(f, lens, None)?,
+                Value::Animated(template) => template.write(f, None)?,
             }
         }
         if self.samples != last.samples {
@@ -171,12 +171,12 @@ impl View {
 }
 
 impl Extent {
-    /// Whether `other` starts where this one does.
+    /// Returns whether `other` starts at the same position.
     fn starts_with(&self, other: &Self) -> bool {
         (self.still.start, self.others.start) == (other.still.start, other.others.start)
     }
 
-    /// What lies behind `seen`, which starts where this does.
+    /// Returns the part after `seen`, which starts at the same position.
     fn behind(&self, seen: &Self) -> Self {
         Self { still: seen.still.end..self.still.end, others: seen.others.end..self.others.end }
     }
@@ -193,7 +193,7 @@ impl Template {
     }
 }
 
-/// A line of a command without parameters.
+/// Writes a line of a command without parameters.
 fn write_name(f: &mut Formatter<'_>, command: Command) -> fmt::Result {
     writeln!(f, "{command}")
 }

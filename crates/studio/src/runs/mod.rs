@@ -1,16 +1,16 @@
-//! Animations in a bucket, for the page: what would be sent and what that costs, sending it, and how each run stands until
-//! it is a GIF.
+//! Animations in a bucket, for the page: what would be uploaded and what it costs, the upload, and the progress of
+//! each run until its GIF.
 //!
-//! Works over any [`Store`], so it knows no AWS, and the page hears names, states and faults, never who asks the store or
-//! with which credentials. What stands in the bucket is the truth: only an upload that goes on is remembered here, so
-//! that a page can be closed, opened again, and finds its run by its name.
+//! Works over any [`Store`], so it knows no AWS. The page gets names, states and errors, but never the caller of the
+//! store or its credentials. The bucket is the source of truth. Only running uploads are kept in memory, so a page
+//! can be closed and reopened, and finds its run by its name.
 
 mod offer;
 mod routes;
 mod sending;
 #[cfg(test)]
 mod tests;
-mod told;
+mod updates;
 
 use std::fmt;
 use std::sync::{Arc, Mutex};
@@ -24,18 +24,18 @@ use crate::project::Project;
 pub struct Cloud(Box<dyn FnOnce(Arc<Mutex<Project>>) -> Router + Send>);
 
 impl Cloud {
-    /// The page says how to name one.
+    /// Makes a page without bucket, which explains how to name one.
     pub fn none() -> Self {
         Self(Box::new(|_| routes::without_bucket()))
     }
 
-    /// The bucket of this name, which is this store.
+    /// Makes a page with the bucket of this name in this store.
     pub fn new(name: impl Into<String>, store: impl Store + 'static) -> Self {
         let name = name.into();
         Self(Box::new(move |project| routes::with_bucket(name, store, project)))
     }
 
-    /// What answers the page.
+    /// Returns the routes that answer the page.
     pub(crate) fn router(self, project: Arc<Mutex<Project>>) -> Router {
         (self.0)(project)
     }

@@ -1,4 +1,5 @@
-//! What would be sent of a project: checked, counted, and drawn in part to see what it takes.
+//! The offer of a submission: the project is checked and counted, and sample frames are rendered
+//! to estimate the cost.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -15,13 +16,13 @@ use crate::error::words;
 use crate::output::png;
 use crate::project::Project;
 
-/// Frames that are drawn to see what one takes, spread evenly over the animation, each twice.
+/// The number of sample frames, spread evenly over the animation. Each is rendered twice.
 const SAMPLES: usize = 8;
 
-/// How long these may take; the first is drawn in any case.
+/// The time limit for the samples. The first is rendered in any case.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// Scripts of a project that are in order, as they stand on the page.
+/// The valid scripts of a project, as they are on the page.
 #[derive(Debug)]
 pub(super) struct Ready {
     scripts: Vec<(ScriptName, Bytes, Arc<Script>)>,
@@ -30,13 +31,13 @@ pub(super) struct Ready {
     size: Screen,
 }
 
-/// Why nothing is sent.
+/// The reason why nothing is uploaded.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Refusal {
-    /// Why.
+    /// The reason as text.
     pub(super) why: String,
-    /// The script that is at fault.
+    /// The script with the error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) script: Option<String>,
     /// Line and column, from 1.
@@ -47,19 +48,19 @@ pub(super) struct Refusal {
     pub(super) delete: Vec<String>,
 }
 
-/// What an animation takes, and costs on AWS.
+/// The time and the cost of an animation on AWS.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Estimate {
-    /// How many frames.
+    /// The number of frames.
     pub(super) frames: u64,
-    /// Their width and height.
+    /// The width and height of the frames.
     pub(super) size: (u32, u32),
-    /// Milliseconds that one takes to be drawn, on one thread of this machine.
+    /// The time to render a frame on one thread of this machine, in milliseconds.
     pub(super) drawing_ms: f64,
-    /// Where and when the prices held.
+    /// The region and the date of the prices.
     pub(super) prices: String,
-    /// Line by line.
+    /// The lines of the bill, by section.
     pub(super) sections: Vec<Section>,
 }
 
@@ -73,14 +74,16 @@ impl Refusal {
     }
 }
 
-/// What a file of the project is called as a script.
+/// Returns the script name for a file of the project.
 fn script_name(file: &str) -> &str {
     file.strip_suffix(".txt").unwrap_or(file)
 }
 
 impl Ready {
+    /// Collects the scripts of a project.
+    ///
     /// # Errors
-    /// What is wrong with the scripts.
+    /// Returns the first error of the scripts.
     pub(super) fn of(project: &Project) -> Result<Self, Refusal> {
         let mut scripts = Vec::new();
         let mut size: Option<(Screen, &str)> = None;
@@ -93,7 +96,7 @@ impl Ready {
                 return Err(Refusal { place: Some((fault.line, fault.column)), ..refused(why) });
             }
             let Some(script) = &file.script else {
-                return Err(refused(format!("{} is no script", file.name)));
+                return Err(refused(format!("{} is not a script", file.name)));
             };
             for shot in script.shots() {
                 match size {
@@ -125,10 +128,10 @@ impl Ready {
         }
     }
 
-    /// What the bucket's folder should hold.
+    /// Returns the wanted content of the bucket's folder.
     ///
     /// # Errors
-    /// For names that the bucket cannot take.
+    /// Fails if the bucket does not allow a name.
     pub(super) fn submission(&self, animation: Animation) -> Result<Submission, Refusal> {
         let refused = |error: rayfold_client::Error| Refusal::of(&error);
         let frames = self.settings.frames().unwrap_or(self.frames);
@@ -141,10 +144,10 @@ impl Ready {
         Submission::new(animation, scripts, settings).map_err(refused)
     }
 
-    /// Draws some frames on one thread, for a few seconds at most.
+    /// Renders sample frames on one thread, for a few seconds at most.
     ///
     /// # Errors
-    /// When a frame cannot be drawn.
+    /// Fails if a frame cannot be rendered.
     pub(super) fn estimate(&self) -> Result<Estimate, Refusal> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
         let pool = pool.map_err(|error| Refusal::of(&error))?;
@@ -174,13 +177,13 @@ impl Ready {
         })
     }
 
-    /// Places from 0 of the frames that are drawn.
+    /// Returns the indices of the sample frames, from 0.
     fn sampled(&self) -> impl Iterator<Item = usize> {
         let frames = usize::try_from(self.frames).unwrap_or(usize::MAX);
         (0..frames).step_by(frames.div_ceil(SAMPLES).max(1))
     }
 
-    /// Draws a frame, twice if there is time; the shorter time in seconds, and its file's size.
+    /// Renders a frame, twice if there is time. Returns the shorter time in seconds, and the size of its file.
     fn draw(&self, at: usize, begun: Instant) -> Result<(f64, usize), Refusal> {
         let mut left = at;
         let place = self.scripts.iter().find_map(|(_, _, script)| {

@@ -1,7 +1,7 @@
-//! What the page asks over HTTP about a bucket, and what it is answered. The guard of the server stands in front of it.
+//! The HTTP requests of the page about a bucket. The server's guard checks each request first.
 //!
-//! Names come as queries and are read as the pipeline reads them, so that a request can only mean an animation, a frame, a
-//! GIF, never any other object.
+//! Names in queries are parsed like those of the pipeline, so a request can only mean an animation, a frame or a GIF,
+//! never any other object.
 
 use std::convert::Infallible;
 use std::io;
@@ -26,28 +26,28 @@ use serde_json::json;
 use tokio::sync::{Semaphore, mpsc};
 
 use super::offer::{Ready, Refusal};
-use super::sending::{SendingTell, Uploads};
-use super::told::{FrameTell, RunState, RunTell, Summary, faults, summary};
+use super::sending::{UploadProgress, Uploads};
+use super::updates::{FrameUpdate, RunState, RunUpdate, Summary, faults, summary};
 use crate::error::words;
 use crate::pipe::{Zip, frame_file, pipe};
 use crate::project::Project;
 
-/// Bytes of what the page sends at once: names of scripts that may be deleted.
+/// The largest body of a request in bytes: names of scripts that may be deleted.
 const BODY: usize = 1 << 20;
 
-/// Runs in a list.
+/// The largest number of runs in a list.
 const LISTED: usize = 500;
 
-/// Runs that are watched at once.
+/// The largest number of runs that are watched at the same time.
 pub(super) const WATCHED: usize = 8;
 
-/// Pictures and GIFs that are fetched at once.
+/// The largest number of pictures and GIFs that are downloaded at the same time.
 const FETCHED: usize = 12;
 
-/// Bytes of a GIF that are kept in memory, at most.
+/// The largest GIF in bytes that is kept in memory.
 const GIF: u64 = 512 << 20;
 
-/// A bucket and what is done with it.
+/// A bucket and its clients.
 struct Runs<S> {
     bucket: String,
     store: S,
@@ -55,7 +55,7 @@ struct Runs<S> {
     uploads: Uploads,
     watched: Arc<Semaphore>,
     fetched: Semaphore,
-    /// Frames are drawn for an estimate.
+    /// A permit to render frames for an estimate.
     estimating: Semaphore,
 }
 
@@ -63,7 +63,7 @@ type Shared<S> = State<Arc<Runs<S>>>;
 
 type Answer<T> = Result<T, Refused>;
 
-/// Why a wish is not fulfilled.
+/// The reason why a request is refused.
 struct Refused(StatusCode, Refusal);
 
 #[derive(Deserialize)]
@@ -90,7 +90,7 @@ struct Submit {
 #[derive(Deserialize)]
 struct Retry {
     run: String,
-    /// One frame's; all that failed, without.
+    /// The script of one frame; without it, all failed frames are retried.
     script: Option<String>,
     part: Option<NonZeroU64>,
 }
@@ -100,7 +100,7 @@ struct Retry {
 struct List {
     bucket: String,
     runs: Vec<Summary>,
-    /// Runs that are not listed.
+    /// The number of runs that are not listed.
     more: usize,
 }
 
@@ -145,12 +145,12 @@ impl<S: Store> Runs<S> {
         ready.map_err(|refusal| Refused(StatusCode::CONFLICT, refusal))
     }
 
-    /// How a run stands.
+    /// Returns the state of a run.
     fn state<C: Clock>(&self, watch: &Watch<'_, S, C>, problem: Option<String>) -> RunState {
         let (faults, more_faults) = watch.manifest().map_or_else(Default::default, faults);
         let sending = self.uploads.of(watch.animation());
         let mut summary = summary(watch);
-        summary.settled &= !matches!(sending, Some(SendingTell::Uploading { .. }));
+        summary.settled &= !matches!(sending, Some(UploadProgress::Uploading { .. }));
         RunState { summary, faults, more_faults, sending, problem }
     }
 }
@@ -188,7 +188,7 @@ fn busy(what: &str) -> Refused {
     Refused(StatusCode::SERVICE_UNAVAILABLE, Refusal::new(what))
 }
 
-/// All runs of the bucket, those that are being sent among them.
+/// Lists all runs of the bucket, including those that are being uploaded.
 async fn list<S: Store + 'static>(State(runs): Shared<S>) -> Answer<Json<List>> {
     let client = runs.client();
     let mut names = client.animations().await?;
@@ -198,11 +198,11 @@ async fn list<S: Store + 'static>(State(runs): Shared<S>) -> Answer<Json<List>> 
     let more = names.len().saturating_sub(LISTED);
     names.truncate(LISTED);
     let watches = client.look(&names).await?;
-    let told = watches.iter().map(|watch| runs.state(watch, None).summary).collect();
-    Ok(Json(List { bucket: runs.bucket.clone(), runs: told, more }))
+    let summaries = watches.iter().map(|watch| runs.state(watch, None).summary).collect();
+    Ok(Json(List { bucket: runs.bucket.clone(), runs: summaries, more }))
 }
 
-/// What would be sent under a name, and what it would cost.
+/// Returns what would be uploaded under a name, and the cost.
 async fn offer<S: Store + 'static>(
     State(runs): Shared<S>,
     Query(named): Query<Named>,
@@ -229,14 +229,14 @@ async fn offer<S: Store + 'static>(
     })))
 }
 
-/// Begins to send what stands on the page; goes on without the page.
+/// Starts uploading the scripts of the page. Continues if the page is closed.
 async fn submit<S: Store + 'static>(State(runs): Shared<S>, Json(wish): Json<Submit>) -> Answer<StatusCode> {
     let animation = Animation::new(&wish.run)?;
     let submission = tokio::task::block_in_place(|| {
         let submission = runs.ready()?.submission(animation.clone());
         submission.map_err(|refusal| Refused(StatusCode::BAD_REQUEST, refusal))
     })?;
-    // Whoever has agreed to some has not agreed to others.
+    // Permission to delete one script is no permission to delete another.
     let preview = runs.client().preview(&submission).await?;
     if preview.delete.iter().any(|key| !wish.delete.contains(key)) {
         let refusal = Refusal {
@@ -250,8 +250,8 @@ async fn submit<S: Store + 'static>(State(runs): Shared<S>, Json(wish): Json<Sub
     }
     let submission = submission.deleting(wish.delete);
     tokio::spawn(async move {
-        let told = |sending| runs.uploads.note(&animation, &sending);
-        let ended = runs.client().submit(&submission, told).await;
+        let report = |sending| runs.uploads.note(&animation, &sending);
+        let ended = runs.client().submit(&submission, report).await;
         runs.uploads.end(&animation, ended);
     });
     Ok(StatusCode::ACCEPTED)
@@ -273,7 +273,7 @@ async fn retry<S: Store + 'static>(
     Ok(Json(json!({"woken": retried.woken, "reassembled": retried.reassembled})))
 }
 
-/// How a run stands, and each change of that, as server-sent events.
+/// Sends the state of a run, and each change of it, as server-sent events.
 async fn events<S: Store + 'static>(
     State(runs): Shared<S>,
     Query(named): Query<Named>,
@@ -302,7 +302,7 @@ async fn watch<S: Store>(runs: &Runs<S>, animation: Animation, sender: &mpsc::Se
     loop {
         let ended_before = std::mem::replace(&mut ended, runs.uploads.ended());
         let looked = async {
-            let changed = watch.look().await?;
+            let changed = watch.poll().await?;
             if changed || watch.is_behind() || last.is_none() || ended != ended_before {
                 watch.compare().await?;
             }
@@ -310,9 +310,9 @@ async fn watch<S: Store>(runs: &Runs<S>, animation: Animation, sender: &mpsc::Se
         };
         let problem = looked.await.err().map(|error| words(&error));
         let frames = watch.manifest().map_or(&[][..], |manifest| &manifest.frames);
-        let frames = frames.iter().map(FrameTell::of).collect();
-        if let Some(tell) = RunTell::since(&mut last, runs.state(&watch, problem), frames) {
-            // Numbers, texts and lists of them always have a form in JSON.
+        let frames = frames.iter().map(FrameUpdate::of).collect();
+        if let Some(tell) = RunUpdate::since(&mut last, runs.state(&watch, problem), frames) {
+            // Numbers, texts and lists of them can always be written as JSON.
             let event = Event::default().data(serde_json::to_string(&tell).unwrap_or_default());
             if sender.send(event).await.is_err() {
                 return;
@@ -322,7 +322,7 @@ async fn watch<S: Store>(runs: &Runs<S>, animation: Animation, sender: &mpsc::Se
     }
 }
 
-/// A frame that is drawn.
+/// Returns the PNG of a rendered frame.
 async fn frame<S: Store + 'static>(
     State(runs): Shared<S>,
     Query(named): Query<FrameNamed>,
@@ -335,7 +335,7 @@ async fn frame<S: Store + 'static>(
     Ok(([(header::CONTENT_TYPE, "image/png")], png))
 }
 
-/// The GIF as it is now.
+/// Returns the current GIF.
 async fn gif<S: Store + 'static>(
     State(runs): Shared<S>,
     Query(named): Query<Named>,
@@ -350,7 +350,7 @@ async fn gif<S: Store + 'static>(
     Ok(([(header::CONTENT_TYPE, "image/gif")], Bytes::from(gif.0)))
 }
 
-/// The frames that are drawn, as a zip file.
+/// Returns the rendered frames as a zip file.
 async fn frames_zip<S: Store + 'static>(
     State(runs): Shared<S>,
     Query(named): Query<Named>,
@@ -377,7 +377,7 @@ async fn frames_zip<S: Store + 'static>(
     Ok(([(header::CONTENT_TYPE, "application/zip")], body))
 }
 
-/// Bytes up to a limit.
+/// A buffer with a size limit.
 struct Bounded(Vec<u8>);
 
 impl Output for Bounded {

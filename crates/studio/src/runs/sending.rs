@@ -1,4 +1,4 @@
-//! Uploads that go on: they outlive the page that began them, and end with the program.
+//! Running uploads: they outlive the page that started them, and end with the program.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -10,23 +10,23 @@ use serde::Serialize;
 
 use crate::error::words;
 
-/// Uploads that are known, at most; the ended ones are forgotten first.
+/// The largest number of uploads in memory. Ended ones are forgotten first.
 const KNOWN: usize = 64;
 
-/// How far an upload is.
+/// The progress of an upload.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "is")]
-pub(super) enum SendingTell {
-    /// It goes on.
+pub(super) enum UploadProgress {
+    /// The upload is running.
     Uploading {
-        /// So many scripts are there.
+        /// The number of uploaded scripts.
         done: u64,
-        /// Of so many.
+        /// The number of scripts to upload.
         total: u64,
     },
-    /// It has ended before all was there.
+    /// The upload ended before everything was uploaded.
     Failed {
-        /// Why.
+        /// The reason of the failure.
         why: String,
     },
 }
@@ -34,62 +34,62 @@ pub(super) enum SendingTell {
 /// The uploads of this program by animation.
 #[derive(Debug, Default)]
 pub(super) struct Uploads {
-    known: Mutex<BTreeMap<Animation, SendingTell>>,
+    known: Mutex<BTreeMap<Animation, UploadProgress>>,
     ended: AtomicU64,
 }
 
 impl Uploads {
-    /// Takes note of a new one; not if one of this animation goes on, or too many do.
+    /// Records a new upload. Returns `false` if one of this animation or too many others are running.
     pub(super) fn begin(&self, animation: &Animation) -> bool {
         let mut known = self.known();
-        if matches!(known.get(animation), Some(SendingTell::Uploading { .. })) {
+        if matches!(known.get(animation), Some(UploadProgress::Uploading { .. })) {
             return false;
         }
         if known.len() >= KNOWN {
-            known.retain(|_, sending| matches!(sending, SendingTell::Uploading { .. }));
+            known.retain(|_, sending| matches!(sending, UploadProgress::Uploading { .. }));
         }
         if known.len() >= KNOWN {
             return false;
         }
-        known.insert(animation.clone(), SendingTell::Uploading { done: 0, total: 0 });
+        known.insert(animation.clone(), UploadProgress::Uploading { done: 0, total: 0 });
         true
     }
 
-    /// Takes note of how far it is.
+    /// Records the progress of an upload.
     pub(super) fn note(&self, animation: &Animation, sending: &Sending) {
         if let Sending::Uploading { done, total } = *sending {
-            self.known().insert(animation.clone(), SendingTell::Uploading { done, total });
+            self.known().insert(animation.clone(), UploadProgress::Uploading { done, total });
         }
     }
 
-    /// Takes note of its end.
+    /// Records the end of an upload.
     pub(super) fn end<T>(&self, animation: &Animation, ended: Result<T, Error>) {
         let mut known = self.known();
         self.ended.fetch_add(1, Ordering::Relaxed);
         match ended {
             Ok(_) => drop(known.remove(animation)),
             Err(error) => {
-                drop(known.insert(animation.clone(), SendingTell::Failed { why: words(&error) }));
+                drop(known.insert(animation.clone(), UploadProgress::Failed { why: words(&error) }));
             }
         }
     }
 
-    /// How many have ended: when that grows the bucket may hold other scripts than were seen last.
+    /// Returns the number of ended uploads. When it grows, the bucket may hold other scripts than those seen last.
     pub(super) fn ended(&self) -> u64 {
         self.ended.load(Ordering::Relaxed)
     }
 
-    /// How far it is, if it goes on or failed.
-    pub(super) fn of(&self, animation: &Animation) -> Option<SendingTell> {
+    /// Returns the progress of an upload that is running or failed.
+    pub(super) fn of(&self, animation: &Animation) -> Option<UploadProgress> {
         self.known().get(animation).cloned()
     }
 
-    /// All that go on or failed.
+    /// Returns the animations whose upload is running or failed.
     pub(super) fn all(&self) -> Vec<Animation> {
         self.known().keys().cloned().collect()
     }
 
-    fn known(&self) -> MutexGuard<'_, BTreeMap<Animation, SendingTell>> {
+    fn known(&self) -> MutexGuard<'_, BTreeMap<Animation, UploadProgress>> {
         self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -104,9 +104,12 @@ mod tests {
         let film = Animation::new("film").unwrap();
         assert!(uploads.begin(&film) && !uploads.begin(&film));
         uploads.note(&film, &Sending::Uploading { done: 1, total: 3 });
-        assert_eq!(uploads.of(&film), Some(SendingTell::Uploading { done: 1, total: 3 }));
+        assert_eq!(uploads.of(&film), Some(UploadProgress::Uploading { done: 1, total: 3 }));
         uploads.end::<()>(&film, Err(Error::NoAnimation(film.clone())));
-        assert_eq!(uploads.of(&film), Some(SendingTell::Failed { why: "there is no animation film".into() }));
+        assert_eq!(
+            uploads.of(&film),
+            Some(UploadProgress::Failed { why: "there is no animation film".into() })
+        );
         assert!(uploads.begin(&film));
         uploads.end(&film, Ok(()));
         assert_eq!((uploads.of(&film), uploads.ended()), (None, 2));

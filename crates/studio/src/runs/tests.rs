@@ -1,4 +1,4 @@
-//! The bucket's routes over real sockets: what they answer, and what they refuse.
+//! Tests of the bucket's routes over real sockets: responses and refusals.
 
 use std::time::Duration;
 
@@ -43,12 +43,12 @@ impl Desk {
         let mut stream = TcpStream::connect(&self.host).await.unwrap();
         let head = format!("{head}Host: {}\r\nContent-Length: {}\r\n\r\n", self.host, body.len());
         stream.write_all(head.as_bytes()).await.unwrap();
-        // Of a body that is too large the rest is not read.
+        // The server does not read the rest of a body that is too large.
         let _ = stream.write_all(body).await;
         stream
     }
 
-    /// The status and the body of an answer.
+    /// Returns the status and the body of a response.
     async fn answer(&self, head: &str, body: &[u8]) -> (u16, String) {
         let mut stream = self.send(&format!("{head}Connection: close\r\n"), body).await;
         let mut answer = Vec::new();
@@ -145,7 +145,7 @@ async fn scripts_with_errors_are_not_sent_and_the_place_is_told() {
     }
 }
 
-/// A request can name animations, scripts and frames; whatever else it says, no other object is read.
+/// A request can name animations, scripts and frames. Whatever else it contains, no other object is read.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn no_request_reaches_an_object_that_is_none_of_an_animation() {
     let store = memory();
@@ -199,7 +199,7 @@ async fn what_is_sent_must_come_from_the_page_and_be_small() {
     ] {
         assert_eq!(desk.answer(&head, body.as_bytes()).await.0, 403, "{head}");
     }
-    // What a form of another page could send without being asked whether it may.
+    // A form of another page could send this without a preflight.
     let form = format!("POST {}runs/submit HTTP/1.1\r\n{own}Content-Type: text/plain\r\n", desk.path);
     assert_eq!(desk.answer(&form, body.as_bytes()).await.0, 415);
     let large = json!({"run": "film", "delete": ["x".repeat(2 << 20)]});

@@ -8,18 +8,18 @@ use crate::document::Splice;
 use crate::edits;
 use crate::groups;
 use crate::project::Project;
-use crate::protocol::Tell;
+use crate::protocol::ServerMessage;
 use crate::tables::{Role, role};
 use crate::view::Projection;
 
 impl Session {
-    /// Makes changes of the file that is shown, as one step.
+    /// Changes the shown file, as one step.
     pub(super) fn edit(
         &mut self,
         project: &mut Project,
         splices: Vec<Splice>,
         gesture: Option<u64>,
-        tell: &mut Tell,
+        tell: &mut ServerMessage,
     ) {
         let file = self.place(project).file;
         let lines = project.files[file].document.lines();
@@ -29,19 +29,25 @@ impl Session {
         if splices.is_empty() {
             return;
         }
-        // Several splices are one step also where there is no gesture.
+        // Several splices are one step even without a gesture.
         let gesture = gesture.unwrap_or_else(|| self.next_gesture());
         let done = project.files[file].apply(splices, Some(gesture));
-        self.told(done, tell);
+        self.send_splices(done, tell);
     }
 
-    /// The pointer's gestures are even.
+    /// Returns a new gesture. Those of the pointer are even.
     pub(super) fn next_gesture(&mut self) -> u64 {
         self.gestures += 1;
         self.gestures << 1
     }
 
-    pub(super) fn add(&mut self, project: &mut Project, name: &str, at: Option<DVec2>, tell: &mut Tell) {
+    pub(super) fn add(
+        &mut self,
+        project: &mut Project,
+        name: &str,
+        at: Option<DVec2>,
+        tell: &mut ServerMessage,
+    ) {
         let Some(command) = Command::from_name(name) else { return };
         match role(command) {
             Role::Object | Role::Light => {}
@@ -53,7 +59,7 @@ impl Session {
             Role::Use | Role::Group | Role::Material | Role::Setting => return,
         }
         let shown = self.shown(project);
-        let stage = &shown.stage;
+        let source_map = &shown.source_map;
         let (mut ground, mut size) = (DVec3::ZERO, 1.0);
         if let Some(scene) = self.scene(project) {
             let projection = Projection::new(&scene);
@@ -77,46 +83,46 @@ impl Session {
         if !(size.is_normal() && ground.is_finite()) {
             (ground, size) = (DVec3::ZERO, 1.0);
         }
-        let count = stage.objects.len() + stage.lights.len();
+        let count = source_map.objects.len() + source_map.lights.len();
         let line = edits::new_line(command, ground, size, count);
-        let (splices, place) = edits::add(self.file_lines(project), stage, line);
+        let (splices, place) = edits::add(self.file_lines(project), source_map, line);
         self.edit(project, splices, None, tell);
         self.select(project, vec![place]);
         self.outline(project, tell);
     }
 
-    /// Lines become a group, which is selected then.
-    pub(super) fn group(&mut self, project: &mut Project, lines: &[usize], tell: &mut Tell) {
+    /// Makes a group of lines and selects it.
+    pub(super) fn group(&mut self, project: &mut Project, lines: &[usize], tell: &mut ServerMessage) {
         let shown = self.shown(project);
         let Some(scene) = self.sound_scene(project) else { return };
-        match groups::group(self.file_lines(project), &shown.stage, &scene, lines) {
+        match groups::group(self.file_lines(project), &shown.source_map, &scene, lines) {
             Ok((splices, place)) => {
                 self.edit(project, splices, None, tell);
                 self.select(project, vec![place]);
                 self.outline(project, tell);
             }
-            Err(refusal) => tell.notice = Some(refusal.told().into()),
+            Err(refusal) => tell.notice = Some(refusal.message().into()),
         }
     }
 
-    /// A group is taken apart; its lines are selected then.
-    pub(super) fn ungroup(&mut self, project: &mut Project, line: usize, tell: &mut Tell) {
+    /// Takes a group apart and selects its lines.
+    pub(super) fn ungroup(&mut self, project: &mut Project, line: usize, tell: &mut ServerMessage) {
         match groups::ungroup(self.file_lines(project), line) {
             Ok((splices, place)) => {
                 self.edit(project, splices, None, tell);
                 self.select(project, place.collect());
                 self.outline(project, tell);
             }
-            Err(refusal) => tell.notice = Some(refusal.told().into()),
+            Err(refusal) => tell.notice = Some(refusal.message().into()),
         }
     }
 
-    /// Whether a line cannot be taken hold of in the picture.
+    /// Returns whether a line cannot be dragged in the picture.
     pub(super) fn is_locked(&self, project: &Project, line: usize) -> bool {
         self.locked.contains(&(self.place(project).file, line))
     }
 
-    /// The lines of the file that is shown which cannot be taken hold of.
+    /// Returns the lines of the shown file that cannot be dragged.
     pub(super) fn locked_lines(&self, project: &Project) -> Vec<usize> {
         let file = self.place(project).file;
         self.locked.iter().filter(|(of, _)| *of == file).map(|(_, line)| *line).collect()

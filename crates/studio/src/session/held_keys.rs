@@ -5,12 +5,12 @@ use crate::edits;
 use crate::line::Line;
 use crate::tracks::{self, KeyPlace};
 
-/// Keys that are being dragged: their lines as they were.
+/// The keys that are being dragged, with the original lines.
 #[derive(Debug)]
 pub(super) struct HeldKeys {
     numbers: Vec<usize>,
     lines: Vec<Line>,
-    /// Their lines are places in `lines`.
+    /// The keys. Their lines are indices of `lines`.
     keys: Vec<KeyPlace>,
     pub(super) gesture: u64,
 }
@@ -26,7 +26,7 @@ impl HeldKeys {
         Self { numbers, lines, keys, gesture }
     }
 
-    /// The lines, where the keys are so many frames later.
+    /// Returns the changes of the lines if the keys are moved by this many frames.
     pub(super) fn moved(&self, by: f64) -> Vec<Splice> {
         let mut lines = self.lines.clone();
         for (at, line) in tracks::moved(&self.lines, &self.keys, by) {

@@ -1,21 +1,21 @@
-//! What the pointer holds, from its press to its release.
+//! The object that the pointer holds, from its press to its release.
 
 use glam::DVec2;
 
 use super::held_keys::HeldKeys;
 use super::{Change, Session};
 use crate::edits;
-use crate::handles::{Drag, Grip, Manner};
+use crate::handles::{Drag, DragOptions, HandleKind};
 use crate::project::Project;
-use crate::protocol::{Navigation, Tell};
+use crate::protocol::{Navigation, ServerMessage};
 use crate::view::Projection;
 
-/// What the pointer holds.
+/// The object that the pointer holds.
 #[derive(Debug)]
 pub(super) enum Held {
-    /// Lines.
+    /// Lines, with the point where the drag started.
     Drag(Drag, DVec2),
-    /// The free camera; where the pointer was last.
+    /// The free camera, with the last position of the pointer.
     Turn(DVec2),
     /// Keys of the timeline.
     Keys(HeldKeys),
@@ -27,7 +27,7 @@ impl Session {
         project: &Project,
         at: DVec2,
         extend: bool,
-        handle: Option<(Grip, usize)>,
+        handle: Option<(HandleKind, usize)>,
     ) {
         self.gestures += 1;
         let around = self.around(project);
@@ -53,14 +53,15 @@ impl Session {
                 };
                 selection.push(line);
                 self.select(project, selection);
-                (Grip::Body, Some(point))
+                (HandleKind::Body, Some(point))
             }
         };
-        let all = matches!(grip, Grip::Body | Grip::Axis { .. } | Grip::Plane { .. });
+        let all = matches!(grip, HandleKind::Body | HandleKind::Axis { .. } | HandleKind::Plane { .. });
         let main = self.selection.last().copied();
         let lines = self.selection.iter().rev().copied().filter(|&line| all || Some(line) == main);
         let shown = self.shown(project);
-        let lines = lines.filter(|&line| !shown.stage.is_in_group(line) && !self.is_locked(project, line));
+        let lines =
+            lines.filter(|&line| !shown.source_map.is_in_group(line) && !self.is_locked(project, line));
         let lines = lines.filter_map(|line| Some((line, self.line(project, line)?.clone()))).collect();
         let keying = self.keying(project);
         self.held = Drag::new(grip, lines, grabbed, around, keying).map(|drag| Held::Drag(drag, at));
@@ -70,8 +71,8 @@ impl Session {
         &mut self,
         project: &mut Project,
         at: DVec2,
-        manner: Manner,
-        tell: &mut Tell,
+        options: DragOptions,
+        tell: &mut ServerMessage,
     ) -> Change {
         let Some(scene) = self.scene(project) else { return Change::Nothing };
         match &mut self.held {
@@ -84,7 +85,7 @@ impl Session {
                 Change::Moving
             }
             Some(Held::Drag(drag, start)) => {
-                let changed = drag.to(&Projection::new(&scene), *start, at, manner);
+                let changed = drag.to(&Projection::new(&scene), *start, at, options);
                 let gesture = self.gestures << 1;
                 let splices = changed
                     .into_iter()

@@ -1,19 +1,19 @@
-//! Whole texts: an example, an empty scene, a file that somebody has chosen in the browser, a copy of what is shown. Each
-//! comes in place of the text that is shown, as one step that undo takes back, or as a new script of the folder.
+//! Loading of whole texts: an example, an empty scene, a file chosen in the browser, a copy of the shown script. A
+//! text replaces the shown one, as one step that can be undone, or becomes a new script of the folder.
 
 use super::{Change, Session};
 use crate::examples;
 use crate::project::Project;
-use crate::protocol::{Source, Tell};
+use crate::protocol::{ServerMessage, Source};
 
 impl Session {
-    /// Puts a text in place of the one that is shown, or into a new file of this name.
+    /// Loads a text in place of the shown one, or into a new file of this name.
     pub(super) fn load(
         &mut self,
         project: &mut Project,
         from: Source,
         new: Option<&str>,
-        tell: &mut Tell,
+        tell: &mut ServerMessage,
     ) -> Change {
         let file = self.place(project).file;
         let text = match from {
@@ -29,13 +29,13 @@ impl Session {
         match new {
             None => {
                 let splices = project.files[file].replace(&text);
-                self.told(splices, tell);
+                self.send_splices(splices, tell);
                 self.select(project, Vec::new());
             }
             Some(name) => match project.create(name, &text) {
                 Ok(file) => {
                     self.selection.clear();
-                    // Other files have other numbers now: what is shown is told anew in any case.
+                    // Other files have other indices now, so the whole state is sent again.
                     self.shown_file = usize::MAX;
                     let first = project.first_frame(file);
                     self.show(project, first, tell);

@@ -1,21 +1,21 @@
-//! Whatever a page wishes, in whatever order: undoing all of it gives the bytes that were there.
+//! Random messages of a page: undoing all of them restores the original bytes.
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
 use super::tests::Desk;
 use super::*;
-use crate::handles::Manner;
-use crate::protocol::{LineState, Navigation, Source, Standpoint, Switch, TimeWish};
+use crate::handles::DragOptions;
+use crate::protocol::{LineState, Navigation, Source, Switch, TimelineEdit, ViewPreset};
 use crate::tracks::KeyPlace;
 
-/// Lines of all kinds, with both ends of lines, a byte-order mark, and no end of the last.
+/// Lines of all kinds, with both line ends, a byte-order mark, and no end of the last line.
 const TEXT: &str = "\u{feff}# a scene\r\nScreen 48 27\nLook 0 2 8  0 0 0  40\r\nIlight 1 1 1 .5 -1 -.3 # sun\n\n\
                     Material grey diffuse .5 .5 (1:.5 50:.2)\n\tSphere 1.0 , 0 (smooth 1:1 9:2) 0  .1 .1 .1 .9 .2 .2   # ball\n\
                     Box -3 -1 -3 3 0 3 grey\nGroup table\nCylinder .5  0 0 0  0 1 0  grey\nEnd\nUse table  2.5 0 0 # one\n\
                     Frames 9\nTrace\n# \u{20ac} no command\nClear\nTrace";
 
-/// How many wishes in all.
+/// The total number of messages.
 const WISHES: usize = 10_000;
 
 fn number() -> impl Strategy<Value = f64> {
@@ -47,7 +47,7 @@ fn line() -> impl Strategy<Value = String> {
     ]
 }
 
-fn wish() -> impl Strategy<Value = Ask> {
+fn wish() -> impl Strategy<Value = ClientMessage> {
     let at = || 0..18usize;
     let lines = || prop::collection::vec(0..18usize, 0..4);
     let keys = || {
@@ -57,68 +57,66 @@ fn wish() -> impl Strategy<Value = Ask> {
     let name = || prop::sample::select(vec!["grey", "table", "group1", "", "x y"]).prop_map(str::to_owned);
     let time = prop_oneof![
         (prop::sample::select(vec![Switch::AutoKey, Switch::Path, Switch::Onion]), any::<bool>())
-            .prop_map(|(what, on)| TimeWish::Switch { what, on }),
-        lines().prop_map(|lines| TimeWish::Key { lines }),
+            .prop_map(|(what, on)| TimelineEdit::Switch { what, on }),
+        lines().prop_map(|lines| TimelineEdit::Key { lines }),
         (at(), prop::collection::vec(0..8usize, 0..3))
-            .prop_map(|(line, numbers)| TimeWish::Toggle { line, numbers }),
-        keys().prop_map(|keys| TimeWish::Grab { keys }),
-        number().prop_map(|by| TimeWish::Move { by }),
-        keys().prop_map(|keys| TimeWish::Remove { keys }),
-        keys().prop_map(|keys| TimeWish::Copy { keys }),
-        Just(TimeWish::Paste),
+            .prop_map(|(line, numbers)| TimelineEdit::Toggle { line, numbers }),
+        keys().prop_map(|keys| TimelineEdit::Grab { keys }),
+        number().prop_map(|by| TimelineEdit::Move { by }),
+        keys().prop_map(|keys| TimelineEdit::Remove { keys }),
+        keys().prop_map(|keys| TimelineEdit::Copy { keys }),
+        Just(TimelineEdit::Paste),
         (keys(), prop::sample::select(vec!["linear", "smooth", "step", "no"]), any::<bool>())
-            .prop_map(|(keys, mode, cycle)| TimeWish::Ease { keys, mode: mode.into(), cycle }),
-        (0..12u32).prop_map(|count| TimeWish::Frames { count }),
-        prop::sample::select(vec![0.0, 5.0, 24.0, 1e9]).prop_map(|fps| TimeWish::Pace { fps }),
+            .prop_map(|(keys, mode, cycle)| TimelineEdit::Ease { keys, mode: mode.into(), cycle }),
+        (0..12u32).prop_map(|count| TimelineEdit::Frames { count }),
+        prop::sample::select(vec![0.0, 5.0, 24.0, 1e9]).prop_map(|fps| TimelineEdit::Pace { fps }),
     ];
     let changes = prop_oneof![
         (at(), 0..12usize, prop::collection::vec(number(), 0..4), prop::option::of(0..3u64))
-            .prop_map(|(line, first, values, gesture)| Ask::Set { line, first, values, gesture }),
+            .prop_map(|(line, first, values, gesture)| ClientMessage::Set { line, first, values, gesture }),
         (at(), prop::collection::vec(line(), 1..3))
-            .prop_map(|(line, text)| Ask::Text { line, text: text.join("\n") }),
-        (at(), line()).prop_map(|(at, text)| Ask::Insert { at, text }),
-        lines().prop_map(|lines| Ask::Remove { lines }),
-        lines().prop_map(|lines| Ask::Duplicate { lines }),
-        (at(), any::<bool>()).prop_map(|(line, down)| Ask::Reorder { line, down }),
-        (at(), name()).prop_map(|(line, name)| Ask::Rename { line, name }),
-        lines().prop_map(|lines| Ask::Hide { lines }),
-        lines().prop_map(|lines| Ask::Ground { lines }),
-        lines().prop_map(|lines| Ask::Drop { lines }),
-        lines().prop_map(|lines| Ask::Lock { lines }),
-        lines().prop_map(|lines| Ask::Group { lines }),
-        at().prop_map(|line| Ask::Ungroup { line }),
-        (lines(), name()).prop_map(|(lines, material)| Ask::Surface { lines, material }),
+            .prop_map(|(line, text)| ClientMessage::Text { line, text: text.join("\n") }),
+        (at(), line()).prop_map(|(at, text)| ClientMessage::Insert { at, text }),
+        lines().prop_map(|lines| ClientMessage::Remove { lines }),
+        lines().prop_map(|lines| ClientMessage::Duplicate { lines }),
+        (at(), any::<bool>()).prop_map(|(line, down)| ClientMessage::Reorder { line, down }),
+        (at(), name()).prop_map(|(line, name)| ClientMessage::Rename { line, name }),
+        lines().prop_map(|lines| ClientMessage::Hide { lines }),
+        lines().prop_map(|lines| ClientMessage::Ground { lines }),
+        lines().prop_map(|lines| ClientMessage::Drop { lines }),
+        lines().prop_map(|lines| ClientMessage::Lock { lines }),
+        lines().prop_map(|lines| ClientMessage::Group { lines }),
+        at().prop_map(|line| ClientMessage::Ungroup { line }),
+        (lines(), name()).prop_map(|(lines, material)| ClientMessage::Surface { lines, material }),
         (lines(), prop::sample::select(materials::presets()))
-            .prop_map(|(lines, preset)| Ask::Preset { lines, preset: preset.into() }),
-        (lines(), [number(), number(), number()]).prop_map(|(lines, by)| Ask::Nudge { lines, by }),
+            .prop_map(|(lines, preset)| ClientMessage::Preset { lines, preset: preset.into() }),
+        (lines(), [number(), number(), number()]).prop_map(|(lines, by)| ClientMessage::Nudge { lines, by }),
         (
             prop::sample::select(vec!["Sphere", "Ilight", "Plane", "Trace", "?"]),
             prop::option::of([0.0..48.0, 0.0..27.0])
         )
-            .prop_map(|(command, at)| Ask::Add { command: command.into(), at }),
-        Just(Ask::KeepCamera),
+            .prop_map(|(command, at)| ClientMessage::Add { command: command.into(), at }),
+        Just(ClientMessage::KeepCamera),
     ];
     let looks = prop_oneof![
-        (0..12usize, any::<bool>()).prop_map(|(frame, moving)| Ask::Frame { frame, moving }),
-        lines().prop_map(|lines| Ask::Select { lines }),
-        ([number(), number()]).prop_map(|[x, y]| Ask::Navigate { how: Navigation::Turn, x, y }),
-        prop::sample::select(vec![Standpoint::Script, Standpoint::Top, Standpoint::Selection])
-            .prop_map(|at| Ask::Look { at }),
+        (0..12usize, any::<bool>()).prop_map(|(frame, moving)| ClientMessage::Frame { frame, moving }),
+        lines().prop_map(|lines| ClientMessage::Select { lines }),
+        ([number(), number()]).prop_map(|[x, y]| ClientMessage::Navigate { how: Navigation::Turn, x, y }),
+        prop::sample::select(vec![ViewPreset::Script, ViewPreset::Top, ViewPreset::Selection])
+            .prop_map(|at| ClientMessage::Look { at }),
     ];
     let pointer = prop_oneof![
-        (0.0..48.0, 0.0..27.0, any::<bool>()).prop_map(|(x, y, extend)| Ask::Press {
+        (0.0..48.0, 0.0..27.0, any::<bool>()).prop_map(|(x, y, extend)| ClientMessage::Press {
             x,
             y,
             extend,
             grip: None,
             line: None
         }),
-        (number(), 0.0..27.0, any::<[bool; 3]>()).prop_map(|(x, y, [upright, snap, whole])| Ask::Drag {
-            x: 20.0 + 5.0 * x,
-            y,
-            manner: Manner { upright, snap, whole },
+        (number(), 0.0..27.0, any::<[bool; 3]>()).prop_map(|(x, y, [upright, snap, whole])| {
+            ClientMessage::Drag { x: 20.0 + 5.0 * x, y, options: DragOptions { upright, snap, whole } }
         }),
-        Just(Ask::Release),
+        Just(ClientMessage::Release),
     ];
     let load = prop_oneof![
         Just(Source::Empty),
@@ -127,11 +125,11 @@ fn wish() -> impl Strategy<Value = Ask> {
     prop_oneof![
         12 => changes,
         4 => pointer,
-        3 => time.prop_map(|wish| Ask::Time { wish }),
+        3 => time.prop_map(|wish| ClientMessage::Time { wish }),
         2 => looks,
-        4 => Just(Ask::Undo),
-        2 => Just(Ask::Redo),
-        1 => load.prop_map(|from| Ask::Load { from, new: None }),
+        4 => Just(ClientMessage::Undo),
+        2 => Just(ClientMessage::Redo),
+        1 => load.prop_map(|from| ClientMessage::Load { from, new: None }),
     ]
 }
 
@@ -144,11 +142,11 @@ fn ten_thousand_wishes_and_undos_end_in_the_same_bytes() {
         .run(&wishes, |wishes| {
             let mut desk = Desk::new(TEXT);
             let mut page: Vec<LineState> = desk.session.lines(&desk.project);
-            desk.ask(Ask::Size { width: 48, height: 27 });
+            desk.ask(ClientMessage::Size { width: 48, height: 27 });
             let mut changes = 0;
             for wish in wishes {
                 let before = desk.text();
-                let told = format!("{wish:?}");
+                let shown = format!("{wish:?}");
                 let tell = desk.ask(wish).tell;
                 changes += usize::from(desk.text() != before);
                 if let Some(lines) = tell.lines {
@@ -157,12 +155,12 @@ fn ten_thousand_wishes_and_undos_end_in_the_same_bytes() {
                 for splice in tell.splices {
                     page.splice(splice.at..splice.at + splice.removed, splice.lines);
                 }
-                prop_assert_eq!(&page, &desk.session.lines(&desk.project), "the page knows all of {}", told);
+                prop_assert_eq!(&page, &desk.session.lines(&desk.project), "the page knows all of {}", shown);
             }
             prop_assert!(changes > 50, "{} changes", changes);
             let (edited, mut steps) = (desk.text(), 0);
             while desk.state().can_undo {
-                desk.ask(Ask::Undo);
+                desk.ask(ClientMessage::Undo);
                 steps += 1;
             }
             prop_assert_eq!(desk.text(), TEXT);
@@ -170,7 +168,7 @@ fn ten_thousand_wishes_and_undos_end_in_the_same_bytes() {
             desk.project.save(true);
             prop_assert_eq!(&desk.on_disk(), TEXT);
             for _ in 0..steps {
-                desk.ask(Ask::Redo);
+                desk.ask(ClientMessage::Redo);
             }
             prop_assert_eq!(desk.text(), edited);
             Ok(())

@@ -1,15 +1,15 @@
-//! A page's wishes, without a browser.
+//! Messages of a page, without a browser.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::sight::PIXELS;
+use super::viewport::PIXELS;
 use super::*;
-use crate::handles::{Grip, Handle, Manner};
+use crate::handles::{DragOptions, Handle, HandleKind};
 use crate::protocol::{Source, State};
 use crate::view::Projection;
 
-/// A page and the script that it has open.
+/// A page and its open script.
 pub(super) struct Desk {
     _folder: tempfile::TempDir,
     path: PathBuf,
@@ -28,7 +28,7 @@ impl Desk {
         Self { _folder: folder, path, project, session }
     }
 
-    pub(super) fn ask(&mut self, ask: Ask) -> Answer {
+    pub(super) fn ask(&mut self, ask: ClientMessage) -> Answer {
         self.session.ask(&mut self.project, ask)
     }
 
@@ -36,16 +36,16 @@ impl Desk {
         String::from_utf8(self.project.files[0].document.bytes()).unwrap()
     }
 
-    /// What the file holds.
+    /// Returns the content of the file.
     pub(super) fn on_disk(&self) -> String {
         fs::read_to_string(&self.path).unwrap()
     }
 
     pub(super) fn state(&mut self) -> State {
-        self.ask(Ask::Hover { x: -1.0, y: -1.0 }).tell.state.unwrap()
+        self.ask(ClientMessage::Hover { x: -1.0, y: -1.0 }).tell.state.unwrap()
     }
 
-    /// Where the object of a line is seen.
+    /// Returns a point of the picture that shows the object of a line.
     pub(super) fn seen(&mut self, line: usize) -> DVec2 {
         let scene = self.session.scene(&self.project).unwrap();
         for y in (0..scene.screen.height()).step_by(4) {
@@ -60,12 +60,12 @@ impl Desk {
     }
 
     pub(super) fn drag(&mut self, from: DVec2, to: DVec2) {
-        self.ask(Ask::Press { x: from.x, y: from.y, extend: false, grip: None, line: None });
+        self.ask(ClientMessage::Press { x: from.x, y: from.y, extend: false, grip: None, line: None });
         for share in [0.25, 0.5, 0.75, 1.0] {
             let at = from.lerp(to, share);
-            self.ask(Ask::Drag { x: at.x, y: at.y, manner: Manner::default() });
+            self.ask(ClientMessage::Drag { x: at.x, y: at.y, options: DragOptions::default() });
         }
-        self.ask(Ask::Release);
+        self.ask(ClientMessage::Release);
     }
 }
 
@@ -85,27 +85,27 @@ fn a_drag_changes_one_line_and_one_undo_takes_it_back() {
         "{text}"
     );
     assert_eq!(desk.state().selection, [4]);
-    desk.ask(Ask::Undo);
+    desk.ask(ClientMessage::Undo);
     assert_eq!(desk.text(), TEXT);
     assert!(!desk.state().can_undo);
-    desk.ask(Ask::Redo);
+    desk.ask(ClientMessage::Redo);
     assert_eq!(desk.text(), text);
 }
 
 #[test]
 fn an_outline_is_that_of_the_picture_also_in_another_size_and_with_other_numbers() {
     let mut desk = Desk::new(TEXT);
-    desk.ask(Ask::Size { width: 160, height: 90 });
-    let small = desk.ask(Ask::Select { lines: vec![4] }).tell.outline.unwrap();
-    let large = desk.ask(Ask::Size { width: 320, height: 180 }).tell.outline.unwrap();
+    desk.ask(ClientMessage::Size { width: 160, height: 90 });
+    let small = desk.ask(ClientMessage::Select { lines: vec![4] }).tell.outline.unwrap();
+    let large = desk.ask(ClientMessage::Size { width: 320, height: 180 }).tell.outline.unwrap();
     assert!(small.starts_with('M') && large.starts_with('M') && small != large);
-    let set = |gesture| Ask::Set { line: 4, first: 0, values: vec![0.5], gesture };
+    let set = |gesture| ClientMessage::Set { line: 4, first: 0, values: vec![0.5], gesture };
     assert_eq!(desk.ask(set(Some(1))).tell.outline.as_deref(), Some(""), "while a slider moves");
-    let done = Ask::Set { line: 4, first: 0, values: vec![], gesture: None };
+    let done = ClientMessage::Set { line: 4, first: 0, values: vec![], gesture: None };
     let thinner = desk.ask(done).tell.outline.unwrap();
     assert!(thinner.starts_with('M') && thinner != large);
     assert_ne!(
-        desk.ask(Ask::Text { line: 4, text: "Sphere 2 0 1 0 0 0 0 1 1 1".into() }).tell.outline,
+        desk.ask(ClientMessage::Text { line: 4, text: "Sphere 2 0 1 0 0 0 0 1 1 1".into() }).tell.outline,
         Some(thinner)
     );
 }
@@ -125,7 +125,7 @@ fn a_drag_beside_all_objects_turns_a_free_camera_and_leaves_the_script() {
     desk.drag(DVec2::new(2.0, 2.0), DVec2::new(60.0, 20.0));
     assert!(desk.state().free);
     assert_eq!(desk.text(), TEXT);
-    desk.ask(Ask::KeepCamera);
+    desk.ask(ClientMessage::KeepCamera);
     let text = desk.text();
     assert!(!desk.state().free && text.lines().nth(2) != TEXT.lines().nth(2));
     assert_eq!(text.lines().count(), TEXT.lines().count());
@@ -137,25 +137,25 @@ fn a_camera_of_the_palette_looks_from_here_at_what_it_falls_on() {
     let mut desk = Desk::new(TEXT);
     let before = desk.seen(4);
     let (_, point) = desk.session.pick(&desk.project, before.x, before.y).unwrap();
-    desk.ask(Ask::Add { command: "Camera".into(), at: Some(before.into()) });
+    desk.ask(ClientMessage::Add { command: "Camera".into(), at: Some(before.into()) });
     let text = desk.text();
     assert_eq!(text.lines().count(), TEXT.lines().count(), "{text}");
     let scene = desk.session.scene(&desk.project).unwrap();
     let after = Projection::new(&scene).point(point).unwrap();
     let middle = 0.5 * DVec2::new(f64::from(scene.screen.width()), f64::from(scene.screen.height()));
     assert!(after.distance(middle) < 1.5 && before.distance(middle) > 5.0, "{before} to {after}");
-    desk.ask(Ask::Undo);
+    desk.ask(ClientMessage::Undo);
     assert_eq!(desk.text(), TEXT);
 }
 
 #[test]
 fn the_picture_through_the_scripts_camera_is_the_scene_of_the_script() {
     let mut desk = Desk::new(TEXT);
-    let picture = desk.ask(Ask::Size { width: 160, height: 200 }).picture.unwrap();
+    let picture = desk.ask(ClientMessage::Size { width: 160, height: 200 }).picture.unwrap();
     let scene =
         rayfold_scene::parse("a", TEXT.as_bytes(), &Default::default()).script.unwrap().frame(0).unwrap();
     assert_eq!(picture.scene, scene, "as large as fits, in the script's proportions");
-    let picture = desk.ask(Ask::Size { width: 100_000, height: 100_000 }).picture.unwrap();
+    let picture = desk.ask(ClientMessage::Size { width: 100_000, height: 100_000 }).picture.unwrap();
     assert!(picture.scene.screen.pixels() <= PIXELS + 10_000);
 }
 
@@ -164,13 +164,13 @@ fn five_objects_from_an_empty_page() {
     let mut desk = Desk::new("");
     assert!(desk.state().picture.is_none());
     for command in ["Box", "Sphere", "Sphere", "Triangle", "Ilight"] {
-        desk.ask(Ask::Add { command: command.into(), at: None });
+        desk.ask(ClientMessage::Add { command: command.into(), at: None });
         assert!(desk.project.files[0].is_sound(), "{}", desk.text());
     }
     let scene = desk.project.files[0].script.as_ref().unwrap().frame(0).unwrap();
     assert_eq!((scene.objects.len(), scene.lights.len()), (4, 2));
     while desk.state().can_undo {
-        desk.ask(Ask::Undo);
+        desk.ask(ClientMessage::Undo);
     }
     assert_eq!(desk.text(), "");
 }
@@ -178,12 +178,12 @@ fn five_objects_from_an_empty_page() {
 #[test]
 fn a_script_with_an_error_keeps_its_last_picture_and_tells_the_place() {
     let mut desk = Desk::new(TEXT);
-    let answer = desk.ask(Ask::Text { line: 4, text: "Spere 1".into() });
+    let answer = desk.ask(ClientMessage::Text { line: 4, text: "Spere 1".into() });
     assert!(answer.picture.is_some());
     let state = answer.tell.state.unwrap();
     assert_eq!((state.faults[0].line, state.faults[0].column, state.faults[0].length), (4, 0, 5));
     assert_eq!(desk.session.pick(&desk.project, 80.0, 45.0), None, "lines and picture differ");
-    desk.ask(Ask::Undo);
+    desk.ask(ClientMessage::Undo);
     assert!(desk.state().faults.is_empty());
 }
 
@@ -191,32 +191,32 @@ fn a_script_with_an_error_keeps_its_last_picture_and_tells_the_place() {
 fn what_is_typed_in_a_line_is_one_step() {
     let mut desk = Desk::new(TEXT);
     for text in ["T", "Tr", "# Trace"] {
-        desk.ask(Ask::Text { line: 6, text: text.into() });
-        desk.ask(Ask::Hover { x: 1.0, y: 1.0 });
+        desk.ask(ClientMessage::Text { line: 6, text: text.into() });
+        desk.ask(ClientMessage::Hover { x: 1.0, y: 1.0 });
     }
-    desk.ask(Ask::Undo);
+    desk.ask(ClientMessage::Undo);
     assert_eq!(desk.text(), TEXT);
 }
 
 #[test]
 fn a_parameter_that_was_left_out_comes_whole() {
     let mut desk = Desk::new(TEXT);
-    desk.ask(Ask::Set { line: 4, first: 11, values: vec![0.5], gesture: None });
+    desk.ask(ClientMessage::Set { line: 4, first: 11, values: vec![0.5], gesture: None });
     assert_eq!(desk.text(), TEXT.replace(".9 .2 .2   #", ".9 .2 .2 0 0.5 0   #"));
-    desk.ask(Ask::Set { line: 4, first: 12, values: vec![], gesture: None });
+    desk.ask(ClientMessage::Set { line: 4, first: 12, values: vec![], gesture: None });
     assert_eq!(desk.text(), TEXT.replace(".9 .2 .2   #", ".9 .2 .2 0 0.5 0   #"));
 }
 
 #[test]
 fn the_selection_stays_with_its_lines() {
     let mut desk = Desk::new(TEXT);
-    desk.ask(Ask::Select { lines: vec![4, 5] });
-    desk.ask(Ask::Insert { at: 0, text: "# one\n# two".into() });
+    desk.ask(ClientMessage::Select { lines: vec![4, 5] });
+    desk.ask(ClientMessage::Insert { at: 0, text: "# one\n# two".into() });
     assert_eq!(desk.state().selection, [6, 7]);
-    desk.ask(Ask::Remove { lines: vec![6] });
-    desk.ask(Ask::Undo);
-    desk.ask(Ask::Select { lines: vec![7] });
-    desk.ask(Ask::Undo);
+    desk.ask(ClientMessage::Remove { lines: vec![6] });
+    desk.ask(ClientMessage::Undo);
+    desk.ask(ClientMessage::Select { lines: vec![7] });
+    desk.ask(ClientMessage::Undo);
     assert_eq!(desk.state().selection, [5]);
     assert_eq!(desk.text(), TEXT);
 }
@@ -224,21 +224,25 @@ fn the_selection_stays_with_its_lines() {
 #[test]
 fn handles_lead_to_the_numbers_of_the_line() {
     let mut desk = Desk::new(TEXT);
-    let handles = desk.ask(Ask::Select { lines: vec![5] }).tell.state.unwrap().handles;
+    let handles = desk.ask(ClientMessage::Select { lines: vec![5] }).tell.state.unwrap().handles;
     let grips: Vec<_> = handles.iter().map(|handle| handle.grip).collect();
-    let axes = [0, 1, 2].map(|axis| Grip::Axis { axis });
-    let planes = [1, 2].map(|axis| Grip::Plane { axis });
-    let points = [0, 3].map(|first| Grip::Point { first });
+    let axes = [0, 1, 2].map(|axis| HandleKind::Axis { axis });
+    let planes = [1, 2].map(|axis| HandleKind::Plane { axis });
+    let points = [0, 3].map(|first| HandleKind::Point { first });
     assert_eq!(grips, [axes.as_slice(), &planes, &points].concat(), "that of y and z is seen edge on");
     let Handle { at, .. } = *handles.last().unwrap();
-    let (grip, line) = (Some(Grip::Point { first: 3 }), Some(5));
-    desk.ask(Ask::Press { x: at[0], y: at[1], extend: false, grip, line });
-    desk.ask(Ask::Drag { x: at[0], y: at[1] - 12.0, manner: Manner { upright: true, ..Manner::default() } });
+    let (grip, line) = (Some(HandleKind::Point { first: 3 }), Some(5));
+    desk.ask(ClientMessage::Press { x: at[0], y: at[1], extend: false, grip, line });
+    desk.ask(ClientMessage::Drag {
+        x: at[0],
+        y: at[1] - 12.0,
+        options: DragOptions { upright: true, ..DragOptions::default() },
+    });
     let text = desk.text();
     assert!(text.contains("\nBox -3 -1 -3 3 0.") && text.contains(" 3 0 0 0 .5 .5 .5\n"), "{text}");
 }
 
-/// All example scenes: whichever object of the first script is moved, the difference is its line.
+/// In all example scenes: if any object of the first script is moved, only its line differs.
 #[test]
 fn touching_one_object_of_each_example_changes_its_line_alone() {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
@@ -248,16 +252,16 @@ fn touching_one_object_of_each_example_changes_its_line_alone() {
         let project = Project::open(&entry).unwrap();
         let text = String::from_utf8(project.files[0].document.bytes()).unwrap();
         let mut desk = Desk::new(&text);
-        let objects = desk.session.shown(&desk.project).stage.objects.clone();
+        let objects = desk.session.shown(&desk.project).source_map.objects.clone();
         for line in objects.into_iter().take(12) {
-            desk.ask(Ask::Nudge { lines: vec![line], by: [1.0, 0.0, 0.0] });
+            desk.ask(ClientMessage::Nudge { lines: vec![line], by: [1.0, 0.0, 0.0] });
             desk.project.save(true);
             let saved = fs::read_to_string(&desk.path).unwrap();
             let (new, old): (Vec<_>, Vec<_>) = (saved.split('\n').collect(), text.split('\n').collect());
             assert_eq!(new.len(), old.len());
             let differ: Vec<_> = (0..new.len()).filter(|&at| new[at] != old[at]).collect();
             assert_eq!(differ, [line], "{}", entry.display());
-            desk.ask(Ask::Undo);
+            desk.ask(ClientMessage::Undo);
             assert_eq!(desk.text(), text);
             seen += 1;
         }
@@ -277,11 +281,11 @@ fn a_huge_script_is_edited_line_by_line() {
     }
     text.push_str("Trace\n");
     let mut desk = Desk::new(&text);
-    let answer = desk.ask(Ask::Set { line: 50_000, first: 1, values: vec![7.5], gesture: Some(1) });
+    let answer = desk.ask(ClientMessage::Set { line: 50_000, first: 1, values: vec![7.5], gesture: Some(1) });
     assert!(answer.picture.is_some() && answer.tell.lines.is_none());
-    assert_eq!(answer.tell.splices.len(), 1, "what is told is small");
+    assert_eq!(answer.tell.splices.len(), 1, "the reply is small");
     assert_eq!(answer.tell.splices[0].lines.len(), 1);
-    desk.ask(Ask::Undo);
+    desk.ask(ClientMessage::Undo);
     assert_eq!(desk.text(), text);
 }
 
@@ -289,15 +293,15 @@ fn a_huge_script_is_edited_line_by_line() {
 fn another_text_is_one_step_and_an_example_is_drawn() {
     let mut desk = Desk::new(TEXT);
     let from = Source::Example { name: "marbles".into() };
-    let answer = desk.ask(Ask::Load { from, new: None });
+    let answer = desk.ask(ClientMessage::Load { from, new: None });
     assert!(answer.picture.is_some() && desk.project.files[0].is_sound());
     assert!(desk.text().lines().count() > 10 && desk.text() != TEXT);
-    desk.ask(Ask::Undo);
+    desk.ask(ClientMessage::Undo);
     assert_eq!(desk.text(), TEXT);
-    desk.ask(Ask::Load { from: Source::Empty, new: None });
+    desk.ask(ClientMessage::Load { from: Source::Empty, new: None });
     assert_eq!(desk.text(), "");
-    desk.ask(Ask::Undo);
-    let refused = desk.ask(Ask::Load { from: Source::Shown, new: Some("b.txt".into()) });
+    desk.ask(ClientMessage::Undo);
+    let refused = desk.ask(ClientMessage::Load { from: Source::Shown, new: Some("b.txt".into()) });
     assert!(refused.tell.notice.unwrap().contains("one script was opened"));
     assert_eq!(fs::read_dir(desk.path.parent().unwrap()).unwrap().count(), 1);
 }
@@ -311,14 +315,15 @@ fn a_copy_under_a_new_name_is_shown_and_the_old_one_stays() {
     let mut project = Project::open(folder.path()).unwrap();
     let (mut session, first) = Session::open(&project);
     assert_eq!(first.tell.can_create, Some(true));
-    session.ask(&mut project, Ask::Frame { frame: 1, moving: false });
-    let answer = session.ask(&mut project, Ask::Load { from: Source::Shown, new: Some("b.txt".into()) });
+    session.ask(&mut project, ClientMessage::Frame { frame: 1, moving: false });
+    let answer =
+        session.ask(&mut project, ClientMessage::Load { from: Source::Shown, new: Some("b.txt".into()) });
     let state = answer.tell.state.unwrap();
     assert_eq!((state.file, state.frame, state.frames), (1, 1, 3));
-    assert_eq!(answer.tell.lines.unwrap().len(), TEXT.split('\n').count(), "its lines are told");
+    assert_eq!(answer.tell.lines.unwrap().len(), TEXT.split('\n').count(), "the reply has its lines");
     assert_eq!(answer.tell.files.unwrap().len(), 3);
     assert_eq!(fs::read_to_string(folder.path().join("b.txt")).unwrap(), TEXT);
-    session.ask(&mut project, Ask::Text { line: 0, text: "# b".into() });
+    session.ask(&mut project, ClientMessage::Text { line: 0, text: "# b".into() });
     project.save(true);
     assert_eq!(fs::read_to_string(folder.path().join("c.txt")).unwrap(), TEXT);
     assert!(fs::read_to_string(folder.path().join("b.txt")).unwrap().starts_with("# b\r\n"));

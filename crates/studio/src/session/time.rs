@@ -1,4 +1,4 @@
-//! Time: keys and what is done with them, the frame that is shown, and where things are at others.
+//! The timeline: edits of keys, the shown frame, and the selection at other frames.
 
 use std::fmt::Write;
 
@@ -6,60 +6,65 @@ use rayfold_scene::{Command, Mode};
 
 use super::held_keys::HeldKeys;
 use super::hold::Held;
-use super::sight::picture_of;
+use super::viewport::picture_of;
 use super::{Change, Session};
 use crate::edits;
 use crate::error::words;
 use crate::frame::Frame;
 use crate::line::Line;
 use crate::project::Project;
-use crate::protocol::{Ghost, Inspected, Switch, Tell, TimeState, TimeWish};
+use crate::protocol::{Ghost, Inspected, ServerMessage, Switch, TimeState, TimelineEdit};
 use crate::silhouette::View;
-use crate::stage::Stage;
+use crate::source_map::SourceMap;
 use crate::tables::FieldTable;
 use crate::tracks::{self, Tracks};
 use crate::values::{Keying, Values, curve};
 use crate::view::Projection;
 
-/// Frames of a script, at most, that the page asks for.
+/// The largest number of frames that the page may set.
 const FRAMES: u32 = 1_000_000;
 
-/// Places of a motion path, at most.
+/// The largest number of points of a motion path.
 const PLACES: usize = 400;
 
-/// How many ghosts before the frame that is shown, and behind it.
+/// The number of ghosts before the shown frame, and after it.
 const GHOSTS: i64 = 2;
 
-/// Parts that the frames are divided into by ghosts.
+/// The number of parts into which ghosts divide the frames.
 const PARTS: i64 = 12;
 
 impl Session {
-    /// The time of the frame that is shown.
+    /// Returns the time of the shown frame.
     pub(super) fn time(&self, project: &Project) -> f64 {
         self.shown(project).time
     }
 
-    /// How a change is written that is made now.
+    /// Returns the way in which a change at the shown frame is written.
     pub(super) fn keying(&self, project: &Project) -> Keying {
         let (first, _) = self.range(project);
         Keying { time: self.time(project), first: first.into(), auto: self.auto_key, whole: false }
     }
 
-    /// The frames of the `Trace` that is shown.
+    /// Returns the frames of the shown `Trace`.
     fn range(&self, project: &Project) -> (u32, u32) {
         let place = self.place(project);
         let script = project.files[place.file].script.as_ref();
         script.and_then(|script| script.frame_numbers(place.frame)).unwrap_or((1, 1))
     }
 
-    pub(super) fn time_wish(&mut self, project: &mut Project, wish: TimeWish, tell: &mut Tell) -> Change {
+    pub(super) fn edit_timeline(
+        &mut self,
+        project: &mut Project,
+        wish: TimelineEdit,
+        tell: &mut ServerMessage,
+    ) -> Change {
         let time = self.time(project);
         let lines = self.file_lines(project);
         let set = |changed: Vec<(usize, Line)>| {
             changed.into_iter().map(|(at, line)| edits::set(at, line)).collect::<Vec<_>>()
         };
         let splices = match wish {
-            TimeWish::Switch { what, on } => {
+            TimelineEdit::Switch { what, on } => {
                 match what {
                     Switch::AutoKey => self.auto_key = on,
                     Switch::Path => self.path = on,
@@ -68,23 +73,23 @@ impl Session {
                 self.outline(project, tell);
                 return Change::Nothing;
             }
-            TimeWish::Key { lines: which } => set(which
+            TimelineEdit::Key { lines: which } => set(which
                 .iter()
                 .filter_map(|&at| {
                     let line = lines.get(at)?;
                     Some((at, tracks::toggled(line, &tracks::main_numbers(line), time)?))
                 })
                 .collect()),
-            TimeWish::Toggle { line, numbers } => {
+            TimelineEdit::Toggle { line, numbers } => {
                 let changed = lines.get(line).and_then(|text| tracks::toggled(text, &numbers, time));
                 set(changed.map(|text| (line, text)).into_iter().collect())
             }
-            TimeWish::Grab { keys } => {
+            TimelineEdit::Grab { keys } => {
                 let gesture = self.next_gesture();
                 self.held = Some(Held::Keys(HeldKeys::new(self.file_lines(project), &keys, gesture)));
                 return Change::Nothing;
             }
-            TimeWish::Move { by } => {
+            TimelineEdit::Move { by } => {
                 let Some(Held::Keys(held)) = &self.held else { return Change::Nothing };
                 if !by.is_finite() {
                     return Change::Nothing;
@@ -94,29 +99,31 @@ impl Session {
                 tell.outline = Some(String::new());
                 return Change::Moving;
             }
-            TimeWish::Remove { keys } => set(tracks::removed(lines, &keys)),
-            TimeWish::Copy { keys } => {
+            TimelineEdit::Remove { keys } => set(tracks::removed(lines, &keys)),
+            TimelineEdit::Copy { keys } => {
                 self.copied = tracks::copied(lines, &keys);
                 return Change::Nothing;
             }
-            TimeWish::Paste => set(tracks::pasted(lines, &self.copied, time, self.selection.last().copied())),
-            TimeWish::Ease { keys, mode, cycle } => {
+            TimelineEdit::Paste => {
+                set(tracks::pasted(lines, &self.copied, time, self.selection.last().copied()))
+            }
+            TimelineEdit::Ease { keys, mode, cycle } => {
                 let mode = Mode::ALL.iter().copied().find(|known| known.name() == mode);
                 set(mode.map(|mode| tracks::eased(lines, &keys, mode, cycle)).unwrap_or_default())
             }
-            TimeWish::Pace { fps } => {
+            TimelineEdit::Pace { fps } => {
                 let file = self.place(project).file;
                 if let Err(error) = project.set_fps(file, fps) {
                     tell.notice = Some(words(&error));
                 }
                 return Change::Nothing;
             }
-            TimeWish::Frames { count } => {
-                edits::set_frames(lines, &self.shown(project).stage, count.clamp(1, FRAMES))
+            TimelineEdit::Frames { count } => {
+                edits::set_frames(lines, &self.shown(project).source_map, count.clamp(1, FRAMES))
             }
         };
         self.edit(project, splices, None, tell);
-        // There may be fewer now.
+        // There may be fewer frames now.
         self.show(project, self.frame, tell);
         self.outline(project, tell);
         Change::Still
@@ -138,7 +145,7 @@ impl Session {
         }
     }
 
-    /// The tracks, if the page knows others.
+    /// Returns the tracks if they have changed since they were sent.
     pub(super) fn new_tracks(&mut self, project: &Project) -> Option<Tracks> {
         let tracks = project.files[self.place(project).file].tracks();
         if self.tracks.as_ref() == Some(tracks) {
@@ -148,7 +155,7 @@ impl Session {
         self.tracks.clone()
     }
 
-    /// The parameters of a line, as they are now.
+    /// Returns the current parameters of a line.
     pub(super) fn inspected(&self, project: &Project, at: usize) -> Option<Inspected> {
         let line = self.line(project, at)?;
         let time = self.time(project);
@@ -177,15 +184,16 @@ impl Session {
         })
     }
 
-    /// The way of what is selected, and where its keys are, as paths of an SVG.
+    /// Returns the motion path of the selection and its keys, as SVG paths.
     pub(super) fn motion_path(
         &self,
         project: &Project,
         projection: &Projection,
-        stage: &Stage,
+        source_map: &SourceMap,
     ) -> (String, String) {
         let nothing = (String::new(), String::new());
-        let Some(&at) = self.selection.last().filter(|line| self.path && !stage.is_in_group(**line)) else {
+        let Some(&at) = self.selection.last().filter(|line| self.path && !source_map.is_in_group(**line))
+        else {
             return nothing;
         };
         let Some(line) = self.line(project, at).filter(|line| line.bytes().contains(&b'(')) else {
@@ -208,7 +216,7 @@ impl Session {
         for place in places {
             let seen = place.and_then(|place| projection.point(place));
             if let Some(at) = seen {
-                // Writing to a text cannot fail.
+                // Writing to a string cannot fail.
                 let _ = write!(way, "{}{:.1} {:.1}", if is_open { 'L' } else { 'M' }, at.x, at.y);
             }
             is_open = seen.is_some();
@@ -224,7 +232,7 @@ impl Session {
         (way, marks)
     }
 
-    /// Outlines of what is selected at other frames, seen from where one looks now.
+    /// Returns outlines of the selection at other frames, in the current view.
     pub(super) fn ghosts(&self, project: &Project) -> Vec<Ghost> {
         let place = self.place(project);
         let file = &project.files[place.file];
@@ -244,12 +252,12 @@ impl Session {
             }
             let frame = usize::try_from(place.frame as i64 + after * step).ok()?;
             let then = Frame::new(Some(script), lines, frame);
-            if !then.stage.objects.iter().any(|line| chosen.contains(line)) {
+            if !then.source_map.objects.iter().any(|line| chosen.contains(line)) {
                 return None;
             }
             let scene = picture_of(then.scene.clone()?, &now);
             let view = View { scene: &scene, boxes: then.boxes() };
-            let is_in = |object| then.stage.line_of(object).is_some_and(|line| chosen.contains(&line));
+            let is_in = |object| then.source_map.line_of(object).is_some_and(|line| chosen.contains(&line));
             let path = view.ghost(is_in).ok()?;
             (!path.is_empty()).then_some(Ghost { path, after: after as i32 })
         };
@@ -257,7 +265,7 @@ impl Session {
     }
 }
 
-/// The parameters of a material's clauses, as they stand in its line.
+/// Returns the parameters of a material's clauses, in the order of its line.
 fn clause_fields(line: &Line) -> Vec<FieldTable> {
     let mut fields: Vec<FieldTable> = Vec::new();
     for slot in tracks::slots(line) {

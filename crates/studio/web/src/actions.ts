@@ -1,4 +1,4 @@
-// What can be done by a key or a button, once: the key, the words for people, and what is asked for.
+// The actions of keys and buttons: for each its keys, its title, and the request to the server.
 
 import { animate, chosenKeys, copyKeys, hasKeys, pasteKeys, removeKeys, wish } from "./keys";
 import { ask, help, lines, playing, selection, state } from "./store";
@@ -36,12 +36,12 @@ export const actions = {
     run: () => ask({ ask: "duplicate", lines: selection.value }),
     enabled: any,
   },
-  removeKeys: { title: "Delete the chosen keys of the timeline", keys: ["Delete", "Backspace"], run: removeKeys, enabled: hasKeys },
+  removeKeys: { title: "Delete the selected keys of the timeline", keys: ["Delete", "Backspace"], run: removeKeys, enabled: hasKeys },
   remove: { title: "Delete", keys: ["Delete", "Backspace"], run: () => ask({ ask: "remove", lines: selection.value }), enabled: any },
   hide: { title: "Hide or show", keys: ["h"], run: () => ask({ ask: "hide", lines: selection.value }), enabled: any },
   group: { title: "Make a group", keys: ["Ctrl+g"], run: () => ask({ ask: "group", lines: selection.value }), enabled: any },
   ungroup: {
-    title: "Take a group apart",
+    title: "Ungroup the selection",
     keys: ["Ctrl+Shift+G"],
     run: () => ask({ ask: "ungroup", line: selection.value.at(-1) ?? -1 }),
     enabled: () => selection.value.length === 1 && lines.value[selection.value[0] ?? -1]?.role === "use",
@@ -50,7 +50,7 @@ export const actions = {
   later: { title: "Move down the list, in the list", keys: ["Alt+ArrowDown"], run: reorder(true), enabled: one },
   lock: { title: "Lock or unlock, in the picture", keys: ["l"], run: () => ask({ ask: "lock", lines: selection.value }), enabled: any },
   ground: { title: "Stand on the ground", keys: ["g"], run: () => ask({ ask: "ground", lines: selection.value }), enabled: any },
-  drop: { title: "Drop onto what is below", keys: ["d"], run: () => ask({ ask: "drop", lines: selection.value }), enabled: any },
+  drop: { title: "Drop onto the object below", keys: ["d"], run: () => ask({ ask: "drop", lines: selection.value }), enabled: any },
   left: { title: "Move left", keys: ["ArrowLeft"], run: nudge(-1, 0, 0), enabled: any },
   right: { title: "Move right", keys: ["ArrowRight"], run: nudge(1, 0, 0), enabled: any },
   back: { title: "Move back", keys: ["ArrowUp"], run: nudge(0, 0, -1), enabled: any },
@@ -58,7 +58,7 @@ export const actions = {
   up: { title: "Move up", keys: ["Shift+ArrowUp"], run: nudge(0, 1, 0), enabled: any },
   down: { title: "Move down", keys: ["Shift+ArrowDown"], run: nudge(0, -1, 0), enabled: any },
   none: {
-    title: "Select nothing",
+    title: "Clear the selection",
     keys: ["Escape"],
     run: () => {
       chosenKeys.value = [];
@@ -68,26 +68,26 @@ export const actions = {
   },
   play: { title: "Play or stop", keys: [" "], run: () => (playing.value = !playing.value), enabled: () => (state.value?.frames ?? 1) > 1 },
   key: {
-    title: "Set keys here, or take them away",
+    title: "Set or remove keys at this frame",
     keys: ["k"],
     run: () => wish({ do: "key", lines: selection.value }),
     enabled: any,
   },
   autoKey: {
-    title: "Set keys of all that is changed, or not",
+    title: "Turn auto-key on or off",
     keys: ["Shift+K"],
     run: () => wish({ do: "switch", what: "auto-key", on: !state.value?.time.autoKey }),
   },
-  animate: { title: "Make it an animation of 50 frames", keys: ["Shift+F"], run: animate, enabled: () => (state.value?.frames ?? 1) < 2 },
-  copyKeys: { title: "Copy the chosen keys", keys: ["Ctrl+c"], run: copyKeys, enabled: hasKeys },
+  animate: { title: "Make an animation of 50 frames", keys: ["Shift+F"], run: animate, enabled: () => (state.value?.frames ?? 1) < 2 },
+  copyKeys: { title: "Copy the selected keys", keys: ["Ctrl+c"], run: copyKeys, enabled: hasKeys },
   pasteKeys: { title: "Paste keys at this frame", keys: ["Ctrl+v"], run: pasteKeys, enabled: () => (state.value?.time.copied ?? 0) > 0 },
   path: {
-    title: "Show the way of what is selected",
+    title: "Show the motion path of the selection",
     keys: ["p"],
     run: () => wish({ do: "switch", what: "path", on: !state.value?.time.path }),
   },
   onion: {
-    title: "Outline what is selected at other frames",
+    title: "Outline the selection at other frames",
     keys: ["o"],
     run: () => wish({ do: "switch", what: "onion", on: !state.value?.time.onion }),
   },

@@ -1,4 +1,4 @@
-// A button that does an action.
+// A button for an action.
 
 import type { JSX } from "preact";
 

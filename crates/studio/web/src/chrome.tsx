@@ -1,4 +1,4 @@
-// What stands around the panels: the bar, what can be added, what comes out, and what must be told.
+// The parts around the panels: the bar, the palette, the output, and notices.
 
 import type { JSX } from "preact";
 
@@ -107,7 +107,7 @@ export function Palette(): JSX.Element {
               draggable
               title={
                 table.role === "camera"
-                  ? "The script's camera: click to see as you do now, or drag it onto what it is to look at from here"
+                  ? "The script's camera: click to use the current view, or drag it onto the object that it should look at"
                   : `${table.name}: click, or drag it into the picture`
               }
               onDragStart={(event) => event.dataTransfer?.setData("text/plain", table.name)}
@@ -128,7 +128,7 @@ export function Notices(): JSX.Element {
     <div class="notices" role="alert">
       {!connected.value && (
         <p>
-          The connection has ended. <a href="">Open the page again</a>, if <code>rayfold studio</code> still runs.
+          The connection was lost. <a href="">Open the page again</a>, if <code>rayfold studio</code> still runs.
         </p>
       )}
       {now?.saved === "conflict" && (
@@ -201,10 +201,10 @@ const POINTER = [
   ["Move along the ground", "drag an object"],
   ["Move up and down", "Shift and drag"],
   ["Move in steps", "Ctrl and drag"],
-  ["Move all keys of what changes", "Alt and drag"],
-  ["Look around", "drag beside all objects"],
+  ["Move all keys of the selection", "Alt and drag"],
+  ["Rotate the view", "drag the background"],
   ["Move the view", "drag with the right button"],
-  ["Go nearer or farther", "wheel"],
+  ["Zoom in or out", "wheel"],
   ["Select several", "Shift and click"],
   ["Rename, in the list", "F2 or double click"],
   ["Change the order, in the list", "Alt with ↑ or ↓"],

@@ -1,5 +1,5 @@
-// Beginning with another text, and keeping this one elsewhere: examples, an empty scene, a file that is chosen here; in
-// place of the script that is shown, or as a new script of the folder.
+// Loading another text and saving a copy: examples, an empty scene, or a chosen file. The text replaces the shown script
+// or becomes a new script of the folder.
 
 import { signal } from "@preact/signals";
 import type { JSX } from "preact";
@@ -7,7 +7,7 @@ import type { JSX } from "preact";
 import type { Source } from "./protocol";
 import { ask, canCreate, examples, files, notice, state } from "./store";
 
-/** Bytes of a file that is opened here: what fits into one message to the server. */
+/** The largest file in bytes that can be opened: it must fit into one message to the server. */
 const MOST = 1 << 20;
 
 /** Whether the dialog is open. */
@@ -63,20 +63,20 @@ export function FileDialog(): JSX.Element | null {
       }}
       onClose={() => (filing.value = false)}
     >
-      <h2 id="file-title">Open, begin, save as</h2>
+      <h2 id="file-title">Open, new, save as</h2>
       <fieldset>
         <legend>What</legend>
         {option("shown", `${shown}, as it stands`)}
         {option("empty", "An empty scene")}
         {examples.value.map((example) => option(example, `Example: ${example}`))}
-        {option("file", text.value ? `Your file ${text.value.name}` : "A file of yours")}
+        {option("file", text.value ? `Your file ${text.value.name}` : "A file on this computer")}
         <input type="file" accept=".txt,text/plain" aria-label="Choose a file" onChange={(event) => void choose(event.currentTarget.files?.[0])} />
       </fieldset>
       <div class="buttons">
         <button type="button" class="main" disabled={chosen.value === "shown"} onClick={() => load(null)}>
           Put it in place of {shown}
         </button>
-        <span class="note">Undo brings back what stood there.</span>
+        <span class="note">Undo restores the previous text.</span>
       </div>
       {canCreate.value ? (
         <form
@@ -92,7 +92,7 @@ export function FileDialog(): JSX.Element | null {
           <button disabled={name.value === ""}>Save as</button>
         </form>
       ) : (
-        <p class="note">One script was opened, and nothing beside it may be written; open a folder to add scripts.</p>
+        <p class="note">The studio was opened with a single script; open a folder to add scripts.</p>
       )}
       <div class="buttons">
         <a class="button" href={`script.txt?${now?.file ?? 0}`} download={shown}>

@@ -1,4 +1,4 @@
-// The parameters of what is selected, from the parser's tables: a new command needs nothing here.
+// The parameters of the selection, from the parser's tables: a new command needs no code here.
 
 import type { JSX } from "preact";
 
@@ -25,7 +25,7 @@ export function Inspector(): JSX.Element {
   const table = inspected ? commands.value.get(inspected.command) : undefined;
   const line = inspected ? lines.value[inspected.line] : undefined;
   const all = inspected && inspected.fields.length > 0 ? inspected.fields : (table?.fields ?? []);
-  // Behind the name of a material there are no numbers.
+  // After the name of a material there are no numbers.
   const fields = inspected?.material ? all.filter((field) => field.first < inspected.values.length - 1) : all;
   return (
     <section class="panel inspector" aria-labelledby="inspector-title">
@@ -47,7 +47,7 @@ export function Inspector(): JSX.Element {
       {count > 1 && <p class="note">{count} lines are selected; moving, dropping and hiding concern all of them.</p>}
       {inspected && fields.map((field) => <FieldRow key={`${inspected.line}:${field.first}`} field={field} inspected={inspected} />)}
       {inspected?.material && <MaterialRow name={inspected.material} />}
-      {!inspected && <p class="note">{count > 0 ? "What is selected has no numbers to set; see the script." : "Click something in the picture or in the list."}</p>}
+      {!inspected && <p class="note">{count > 0 ? "The selection has no numbers to set; see the script." : "Click something in the picture or in the list."}</p>}
     </section>
   );
 }
@@ -70,7 +70,7 @@ interface KeyProps {
   readonly label: string;
 }
 
-/** Sets keys of some numbers at the frame that is shown, or takes them away. */
+/** Sets or removes keys of some numbers at the shown frame. */
 function KeyButton({ inspected, numbers, label }: KeyProps): JSX.Element | null {
   const time = state.value?.time;
   if (!time || !inspected.canKey || (time.first === time.last && !numbers.some((at) => inspected.curves.includes(at)))) return null;
@@ -82,7 +82,7 @@ function KeyButton({ inspected, numbers, label }: KeyProps): JSX.Element | null 
       class={changes ? "key changes" : "key"}
       aria-pressed={is}
       aria-label={`Key of ${label}, frame ${time.number}`}
-      title={is ? "Take the key away" : "Set a key here"}
+      title={is ? "Remove the key" : "Set a key here"}
       onClick={() => wish({ do: "toggle", line: inspected.line, numbers })}
     >
       <span class="diamond" />

@@ -1,29 +1,29 @@
-// The keys that are chosen in the timeline, and what is done with them.
+// The selected keys of the timeline, and the edits of them.
 
 import { computed, signal } from "@preact/signals";
 
 import type { KeyPlace, Mode, TimeWish, Track } from "./protocol";
 import { ask, tracks } from "./store";
 
-/** How many frames an animation begins with. */
+/** The initial number of frames of an animation. */
 const FRAMES = 50;
 
 export const chosenKeys = signal<readonly KeyPlace[]>([]);
 
-/** Whether the player starts again at the end. */
+/** Whether playback loops. */
 export const looping = signal(true);
 
-/** By how many frames the chosen keys are being dragged. */
+/** The number of frames by which the selected keys are being dragged. */
 export const dragged = signal(0);
 
 export const nameOf = (key: KeyPlace): string => `${key.line}:${key.number}:${key.frame}`;
 
-/** The chosen keys as they are now, while they are dragged. */
+/** The current positions of the selected keys while they are dragged. */
 const here = computed(() => chosenKeys.value.map((key) => ({ ...key, frame: key.frame + dragged.value })));
 
 export const chosenNames = computed(() => new Set(here.value.map(nameOf)));
 
-/** The tracks of which a key is chosen. */
+/** The tracks with a selected key. */
 export const chosenTracks = computed((): readonly Track[] => {
   const named = new Set(chosenKeys.value.map((key) => `${key.line}:${key.number}`));
   return tracks.value.tracks.filter((track) => named.has(`${track.line}:${track.number}`));
@@ -76,7 +76,7 @@ export function releaseKeys(): void {
   dragged.value = 0;
 }
 
-/** One picture becomes an animation, in which what is changed gets keys. */
+/** Makes an animation of a single picture. Changes then set keys. */
 export function animate(): void {
   wish({ do: "frames", count: FRAMES });
   wish({ do: "switch", what: "auto-key", on: true });

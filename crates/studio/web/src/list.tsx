@@ -1,4 +1,4 @@
-// A list of rows of one height, of which only those in sight are made: a script may have a hundred thousand lines.
+// A list of rows of equal height. Only visible rows are rendered, because a script may have a hundred thousand lines.
 
 import { signal } from "@preact/signals";
 import type { ComponentChildren, HTMLAttributes, JSX } from "preact";
@@ -7,12 +7,12 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 interface Props extends Omit<HTMLAttributes<HTMLDivElement>, "children"> {
   readonly count: number;
   readonly height: number;
-  /** The row to keep in sight. */
+  /** The row that must stay visible. */
   readonly reveal: number | null;
   readonly children: (row: number) => ComponentChildren;
 }
 
-/** Rows that are made beyond those in sight. */
+/** The number of rows rendered beyond the visible ones. */
 const BEYOND = 6;
 
 export function List({ count, height, reveal, children, ...rest }: Props): JSX.Element {
@@ -34,7 +34,7 @@ export function List({ count, height, reveal, children, ...rest }: Props): JSX.E
     const look = (): void => {
       seen.value = { top: element.scrollTop, height: element.clientHeight };
     };
-    // A list that becomes lower, because another panel grows, keeps its row in sight.
+    // If the list shrinks because another panel grows, its row stays visible.
     const observer = new ResizeObserver(() => {
       bring();
       look();

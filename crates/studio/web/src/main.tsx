@@ -43,7 +43,7 @@ function Studio() {
   );
 }
 
-// Once a frame of the browser: more often nobody sees it, and the picture would wait for it.
+// Once per frame of the browser: more updates would be invisible and delay the picture.
 options.debounceRendering = (update) => requestAnimationFrame(update);
 render(<Studio />, document.body);
 listen();

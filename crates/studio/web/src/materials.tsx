@@ -1,4 +1,4 @@
-// Materials: those of the script and those to begin with, each as a small sphere that the tracer has drawn.
+// The materials of the script and the starter materials, each as a small sphere rendered by the tracer.
 
 import { computed } from "@preact/signals";
 import type { JSX } from "preact";
@@ -21,7 +21,7 @@ export function Materials(): JSX.Element {
   const now = state.value;
   const frame = moves && !playing.value ? (now?.time.number ?? 1) : 1;
   const given = wearers.value;
-  const how = given.length > 0 ? "give it to what is selected" : "select it";
+  const how = given.length > 0 ? "assign it to the selection" : "select it";
   return (
     <section class="panel materials" aria-labelledby="materials-title">
       <h2 id="materials-title">Materials</h2>
@@ -42,15 +42,15 @@ export function Materials(): JSX.Element {
         </div>
       )}
       <details open={found.length === 0}>
-        <summary>To begin with</summary>
-        <div class="spheres" role="group" aria-label="To begin with">
+        <summary>Starter materials</summary>
+        <div class="spheres" role="group" aria-label="Starter materials">
           {presets.value.map((name) => (
             <button
               type="button"
               key={name}
               class="sphere"
               disabled={given.length === 0}
-              title={given.length > 0 ? `${name}: give it to what is selected` : `${name}: select an object first`}
+              title={given.length > 0 ? `${name}: assign it to the selection` : `${name}: select an object first`}
               onClick={() => ask({ ask: "preset", lines: given, preset: name })}
             >
               <img src={`preset.png?${name}`} alt="" width={48} height={48} loading="lazy" />

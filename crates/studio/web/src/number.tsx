@@ -1,5 +1,5 @@
-// A field for a number. What is typed stays until it is done, whatever the server tells meanwhile; what is no number that
-// could stand there is told, and what holds comes back.
+// A field for a number. Typed text stays until it is committed, whatever the server sends meanwhile. An invalid number is
+// reported, and the current value is restored.
 
 import type { JSX } from "preact";
 import { useEffect, useRef } from "preact/hooks";
@@ -8,7 +8,7 @@ import { notice } from "./store";
 
 interface Props {
   readonly label: string;
-  /** What holds; nothing where the number is left out. */
+  /** The current value; `undefined` if the number is omitted. */
   readonly value: number | undefined;
   readonly least?: number;
   readonly most?: number;
@@ -28,7 +28,7 @@ export function NumberField({ label, value, least = -Number.MAX_VALUE, most = Nu
     const field = input.current;
     if (typing.current || !field || field.value === text) return;
     field.value = text;
-    // What was selected is no longer: what is typed next is to take its place, as it would have.
+    // The text is no longer selected. Select it again, so that the next typed text replaces it.
     if (document.activeElement === field) field.select();
   });
   return (

@@ -1,4 +1,4 @@
-// What there is to see: objects, groups, lights, cameras and materials of the script, by name.
+// The outline: objects, groups, lights, cameras and materials of the script, by name.
 
 import { computed, signal } from "@preact/signals";
 import type { JSX } from "preact";
@@ -15,7 +15,7 @@ const listed = computed(() =>
   lines.value.flatMap((line, at) => (line.role && line.role !== "setting" ? [at] : [])),
 );
 
-/** The lines that stand in the definition of a group. */
+/** The lines within the definition of a group. */
 const grouped = computed(() => {
   const inside = new Set<number>();
   let open = false;
@@ -30,7 +30,7 @@ const grouped = computed(() => {
 /** The line whose name is being written. */
 const renaming = signal<number | null>(null);
 
-/** Where a range of rows begins that is selected with the shift key. */
+/** The start of a range of rows that is selected with the shift key. */
 const anchor = signal(0);
 
 /** Gives a new field the focus; the same function each time, so that it is done once. */

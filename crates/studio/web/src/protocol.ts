@@ -1,4 +1,4 @@
-// What page and server say to each other: the types of `protocol.rs`. Points are in pixels of the picture, lines count
+// The messages between page and server: the types of `protocol.rs`. Points are in pixels of the picture. Lines count
 // from 0.
 
 export type Role = "object" | "light" | "use" | "group" | "material" | "camera" | "setting";
@@ -30,7 +30,7 @@ export interface Line {
   readonly command?: string;
   readonly role?: Role;
   readonly name?: string;
-  /** The name of a group or material that stands before the numbers. */
+  /** The name of a group or material before the numbers. */
   readonly subject?: string;
   readonly hidden?: boolean;
 }
@@ -49,7 +49,7 @@ export interface Handle {
   readonly label: string;
   readonly at: Point;
   readonly from: Point;
-  /** The way along which it goes, as the path of an SVG. */
+  /** The path along which it moves, as an SVG path. */
   readonly way?: string;
 }
 
@@ -66,23 +66,23 @@ export interface Inspected {
   readonly line: number;
   readonly command: string;
   readonly values: readonly (number | null)[];
-  /** Those that change, and those of them with a key just here. */
+  /** The numbers that are curves, and those of them with a key at the shown frame. */
   readonly curves: readonly number[];
   readonly keyed: readonly number[];
   readonly canKey: boolean;
-  /** The name that stands in the place of coefficients. */
+  /** The name of a material in place of coefficients. */
   readonly material: string | null;
   readonly subject: string;
-  /** The parameters of a material, which each has others of. */
+  /** The parameters of a material, which depend on its clauses. */
   readonly fields: readonly Field[];
 }
 
 export interface TimeState {
-  /** The number of the frame that is shown; the first and the last of its `Trace`. */
+  /** The number of the shown frame, and the first and the last frame number of its `Trace`. */
   readonly number: number;
   readonly first: number;
   readonly last: number;
-  /** Which of all frames has the first number, from 0. */
+  /** The index of the first number among all frames, from 0. */
   readonly start: number;
   readonly autoKey: boolean;
   readonly path: boolean;
@@ -92,7 +92,7 @@ export interface TimeState {
 
 export type Mode = "linear" | "smooth" | "step";
 
-/** A number that changes: keys are frames and values. */
+/** A number that changes. Its keys are frames and values. */
 export interface Track {
   readonly line: number;
   readonly number: number;
@@ -130,7 +130,7 @@ export type TimeWish =
   | { readonly do: "frames"; readonly count: number };
 
 export interface State {
-  /** How many wishes were heard when it stood so. */
+  /** The number of messages that the server had received. */
   readonly asked: number;
   readonly title: string;
   readonly fps: number;
@@ -138,7 +138,7 @@ export interface State {
   readonly frames: number;
   readonly file: number;
   readonly saved: "yes" | "soon" | "conflict" | "failed";
-  /** Why it cannot be written. */
+  /** The reason why the file cannot be written. */
   readonly failure: string;
   readonly canUndo: boolean;
   readonly canRedo: boolean;
@@ -147,14 +147,14 @@ export interface State {
   readonly faults: readonly Fault[];
   readonly handles: readonly Handle[];
   readonly grid: string;
-  /** The way of what is selected, and where its keys are. */
+  /** The motion path of the selection, and its keys. */
   readonly way: string;
   readonly marks: string;
-  /** Lines that cannot be taken hold of in the picture. */
+  /** The lines that cannot be dragged in the picture. */
   readonly locked: readonly number[];
   readonly time: TimeState;
   readonly free: boolean;
-  /** Number, width and height of the picture that was ordered last. */
+  /** Number, width and height of the picture that was requested last. */
   readonly picture: readonly [number, number, number] | null;
 }
 
@@ -169,7 +169,7 @@ export type Source =
   | { readonly what: "example"; readonly name: string }
   | { readonly what: "text"; readonly text: string };
 
-/** What is left out has not changed. */
+/** A message of the server. Omitted fields have not changed. */
 export interface Tell {
   readonly examples?: readonly string[];
   readonly canCreate?: boolean;
@@ -228,7 +228,7 @@ export type Ask =
   | { readonly ask: "resolve"; readonly "keep-mine": boolean };
 
 /**
- * Bytes before the pixels of a picture: number, width, height, microseconds, 1 if it stays as it is; then left, top, width and
- * height of the part that differs from the picture before, whose pixels follow; little-endian.
+ * Bytes before the pixels of a picture: number, width, height, microseconds, 1 if it is final; then left, top, width and
+ * height of the part that differs from the previous picture, whose pixels follow; little-endian.
  */
 export const PICTURE_HEADER = 36;

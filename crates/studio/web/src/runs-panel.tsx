@@ -1,5 +1,5 @@
-// What becomes of the animation: submitting it to a bucket with its cost before, the list of runs, and one run with its
-// frames, its faults and its GIF.
+// Runs in a bucket: submitting the animation after an estimate of its cost, the list of runs, and one run with its
+// frames, its errors and its GIF.
 
 import { signal } from "@preact/signals";
 import type { JSX } from "preact";
@@ -34,7 +34,7 @@ import { files } from "./store";
 /** Width and height of a frame in the grid, in pixels of the window. */
 const CELL = [168, 132] as const;
 
-/** What the dialog leaves free of the window's width, with its own edges. */
+/** The part of the window's width that the dialog does not use, including its borders. */
 const EDGES = 60;
 
 const name = signal("");
@@ -133,7 +133,7 @@ function Submit(): JSX.Element {
           )}
           <p>
             <button class="main" disabled={waiting.value || (gone.length > 0 && !mayDelete.value)}>
-              {waiting.value ? "Please wait" : now ? "Submit" : "What will it cost?"}
+              {waiting.value ? "Please wait" : now ? "Submit" : "Estimate the cost"}
             </button>
           </p>
         </form>
@@ -154,7 +154,7 @@ function Cost({ offer: { estimate, folder, upload, unchanged } }: { readonly off
         thread of this machine. To {folder}: {upload} {upload === 1 ? "file" : "files"} to upload, {unchanged} there already.
       </p>
       <table class="cost">
-        <caption>What it costs on AWS, in US dollars ({estimate.prices}; free allowances left out). On this machine it costs nothing.</caption>
+        <caption>Cost on AWS, in US dollars ({estimate.prices}; free allowances left out). On this machine it costs nothing.</caption>
         <thead>
           <tr>
             <th scope="col">For</th>
@@ -229,8 +229,8 @@ function All(): JSX.Element {
     <>
       <h2 id="runs-title">Runs{known?.bucket ? ` in ${known.bucket}` : ""}</h2>
       {known && known.bucket === null && <NoBucket />}
-      {!known && waiting.value && <p>Looking</p>}
-      {known && known.bucket !== null && known.runs.length === 0 && <p>There is none yet.</p>}
+      {!known && waiting.value && <p>Loading</p>}
+      {known && known.bucket !== null && known.runs.length === 0 && <p>There are no runs yet.</p>}
       <ul class="all">
         {known?.runs.map((summary) => (
           <li key={summary.run}>
@@ -253,7 +253,7 @@ function One({ name }: { readonly name: string }): JSX.Element {
   return (
     <>
       <h2 id="runs-title">{name}</h2>
-      {!now && <p>Looking</p>}
+      {!now && <p>Loading</p>}
       {now && <Standing run={now} />}
       {now && (now.faults.length > 0 || now.failed > 0) && <Faults run={now} />}
       {now?.gif && <Result run={now} gif={now.gif} />}
@@ -269,8 +269,8 @@ function Standing({ run: now }: { readonly run: Run }): JSX.Element {
       <p role="status" data-status={now.status} data-settled={now.settled}>
         {sending?.is === "uploading" ? `uploading: ${sending.done} of ${sending.total} scripts` : stand(now)}
       </p>
-      {sending?.is === "failed" && <p class="failed">The upload has failed: {sending.why}</p>}
-      {now.problem && <p class="failed">Nothing newer is known: {now.problem}</p>}
+      {sending?.is === "failed" && <p class="failed">The upload failed: {sending.why}</p>}
+      {now.problem && <p class="failed">No newer state is known: {now.problem}</p>}
       {now.total > 0 && <progress value={now.done} max={now.total} aria-label="Frames drawn" />}
     </div>
   );
@@ -283,7 +283,7 @@ function Result({ run: now, gif }: { readonly run: Run; readonly gif: NonNullabl
     <figure class="gif">
       <img src={source} alt={`The animation ${now.run}`} />
       <figcaption>
-        {gif.current ? "The finished GIF" : "The last GIF; a newer one is being made"}
+        {gif.current ? "The finished GIF" : "The previous GIF; a newer one is being made"}
         <span class="buttons">
           <a class="button" href={source} download={`${file}.gif`}>
             Download GIF ({size(gif.bytes)})
@@ -300,7 +300,7 @@ function Result({ run: now, gif }: { readonly run: Run; readonly gif: NonNullabl
 function Faults({ run: now }: { readonly run: Run }): JSX.Element {
   return (
     <section aria-labelledby="faults-title">
-      <h3 id="faults-title">What keeps it from being done</h3>
+      <h3 id="faults-title">Errors</h3>
       <ul class="run-faults">
         {now.faults.map((fault, at) => (
           <FaultRow key={`${at}:${fault.what}`} run={now.run} fault={fault} />
@@ -311,7 +311,7 @@ function Faults({ run: now }: { readonly run: Run }): JSX.Element {
         <button type="button" disabled={waiting.value} onClick={() => void retry(now.run)}>
           Retry all that failed
         </button>{" "}
-        What is a script's fault fails again: mend it, and submit it again; only what changed is drawn.
+        A script with an error fails again: fix it and submit again. Only changed scripts are rendered.
       </p>
     </section>
   );

@@ -1,5 +1,5 @@
-// Runs in a bucket, as signals: what is looked at, which is the address behind the # of the page, and what the server told
-// of it. Nothing is remembered beside that address: a page that is opened again shows the same run.
+// Runs in a bucket, as signals: the shown run, which is the fragment of the page's address, and the messages of the server
+// about it. The address is the only state: a page that is opened again shows the same run.
 
 import { computed, signal } from "@preact/signals";
 
@@ -55,14 +55,14 @@ export interface Run extends Summary {
   readonly frames: readonly Frame[];
 }
 
-/** What the server sends of a run: all frames, or those that changed with their places. */
+/** A message about a run: all frames, or the changed ones with their indices. */
 interface Told extends Omit<Run, "frames"> {
   readonly frames?: readonly Frame[];
   readonly changed?: readonly (readonly [number, Frame])[];
 }
 
 export interface List {
-  /** None where the server was started without one. */
+  /** `null` if the server was started without a bucket. */
   readonly bucket: string | null;
   readonly runs: readonly Summary[];
   readonly more: number;
@@ -107,10 +107,10 @@ export const list = signal<List | null>(null);
 export const run = signal<Run | null>(null);
 export const offer = signal<Offer | null>(null);
 export const refusal = signal<Refusal | null>(null);
-/** Whether an answer is awaited. */
+/** Whether a response is awaited. */
 export const waiting = signal(false);
 
-/** The name under which the project is submitted unless another is given. */
+/** The default name under which the project is submitted. */
 export const ownName = computed(() => (state.value?.title ?? "").replace(/\.txt$/, ""));
 
 let source: EventSource | null = null;
@@ -137,7 +137,7 @@ function viewOf(hash: string): View {
   }
 }
 
-/** What an address below `runs/` is, with a query. */
+/** Returns an address under `runs/` with a query. */
 export function resource(name: string, query: Readonly<Record<string, string | number | undefined>>): string {
   const pairs = Object.entries(query).flatMap(([key, value]) => (value === undefined ? [] : [[key, String(value)]]));
   return `runs/${name}?${new URLSearchParams(pairs)}`;
@@ -168,7 +168,7 @@ export async function fetchList(): Promise<void> {
   list.value = (await asked("runs/list")) as List | null;
 }
 
-/** What would be sent under a name, and what it would cost. */
+/** The scripts that would be uploaded under a name, and the cost. */
 export async function fetchOffer(name: string): Promise<void> {
   offer.value = null;
   offer.value = (await asked(resource("offer", { run: name }))) as Offer | null;
@@ -191,7 +191,7 @@ function hear(told: Told): void {
   run.value = { ...told, frames: all };
 }
 
-/** Shows what the address says. */
+/** Shows the run in the address. */
 function look(): void {
   const next = viewOf(location.hash);
   view.value = next;
@@ -202,7 +202,7 @@ function look(): void {
   offer.value = null;
   if (next.what === "list" || next.what === "submit") void fetchList();
   if (next.what === "run") {
-    // The browser connects again by itself, and is told all frames then.
+    // The browser reconnects automatically, and then receives all frames.
     source = new EventSource(resource("events", { run: next.run }));
     source.onmessage = (message: MessageEvent<string>) => hear(JSON.parse(message.data) as Told);
   }

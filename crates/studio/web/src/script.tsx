@@ -1,4 +1,4 @@
-// The script itself, line by line; what is written here is seen at once, and what is dragged is written here.
+// The script, line by line. Typed changes are rendered at once, and drags change the text here.
 
 import { computed } from "@preact/signals";
 import type { JSX } from "preact";
@@ -71,7 +71,7 @@ function Row({ at, line }: { readonly at: number; readonly line: Line | undefine
   useEffect(() => {
     const element = input.current;
     if (!element) return;
-    // What was typed since is overwritten neither by its own echo nor by what stood there before.
+    // Newer typed text is overwritten neither by its own echo nor by the previous text.
     const echo = sent.current.indexOf(text);
     if (echo >= 0) sent.current.splice(0, echo + 1);
     else if (sent.current.length === 0 && element.value !== text) element.value = text;

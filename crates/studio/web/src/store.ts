@@ -1,5 +1,5 @@
-// All that the page knows, as signals, and the connection that they come by. Nothing is decided here: what is done is
-// asked of the server, and what the server tells is shown.
+// The state of the page, as signals, and the connection that updates them. The page decides nothing: it sends requests to
+// the server and shows the replies.
 
 import { batch, computed, signal } from "@preact/signals";
 
@@ -7,11 +7,11 @@ import type { Ask, Command, FileState, Ghost, Line, Output, State, Tell, Tracks 
 
 export const connected = signal(true);
 export const tables = signal<readonly Command[]>([]);
-/** Scenes to begin with, by name. */
+/** The names of the example scenes. */
 export const examples = signal<readonly string[]>([]);
 /** Whether scripts can be added. */
 export const canCreate = signal(false);
-/** The names of materials to begin with. */
+/** The names of the starter materials. */
 export const presets = signal<readonly string[]>([]);
 export const files = signal<readonly FileState[]>([]);
 export const lines = signal<readonly Line[]>([]);
@@ -31,7 +31,7 @@ export const selection = computed(() => state.value?.selection ?? []);
 export const selected = computed(() => new Set(selection.value));
 export const commands = computed(() => new Map(tables.value.map((table) => [table.name, table])));
 
-/** Takes pictures as they come: their bytes with the header. */
+/** Receives pictures as bytes with their header. */
 type Show = (picture: ArrayBuffer) => void;
 
 let socket: WebSocket | null = null;
@@ -39,16 +39,16 @@ let show: Show = () => {};
 let hovering = false;
 let nextHover: Ask | null = null;
 let gestures = 0;
-/** How many wishes were sent. */
+/** The number of messages sent. */
 let sent = 0;
-/** What was selected last, and how many wishes had been sent with it. */
+/** The last selection, and the number of messages sent up to it. */
 let chosen: { readonly lines: readonly number[]; readonly sent: number } | null = null;
 
 export function onPicture(take: Show): void {
   show = take;
 }
 
-/** A number for a new gesture: what is set under it is one step of undo. */
+/** Returns the number of a new gesture. All changes with the same number are one undo step. */
 export function gesture(): number {
   gestures += 1;
   return gestures;
@@ -60,14 +60,14 @@ export function ask(wish: Ask): void {
   socket.send(JSON.stringify(wish));
 }
 
-/** Selects lines; shown at once, so that keys that are held go on from there. */
+/** Selects lines. The selection is shown at once, so that repeated keys continue from it. */
 export function select(lines: readonly number[]): void {
   if (state.value) state.value = { ...state.value, selection: lines };
   ask({ ask: "select", lines });
   chosen = { lines, sent };
 }
 
-/** Asks what is under the pointer; while one answer is awaited only the newest question waits. */
+/** Requests the object under the pointer. While a reply is awaited, only the newest request is kept. */
 export function hover(x: number, y: number): void {
   const wish: Ask = { ask: "hover", x, y };
   if (hovering) {
@@ -114,7 +114,7 @@ function hear(tell: Tell): void {
       lines.value = all;
     }
     if (tell.state) {
-      // What the server said before it heard of the last selection does not undo it.
+      // A state that was sent before the server received the last selection does not undo it.
       const isOld = chosen !== null && tell.state.asked < chosen.sent;
       state.value = isOld && chosen ? { ...tell.state, selection: chosen.lines } : tell.state;
     }

@@ -1,5 +1,5 @@
-// Frames and keys: the player, and a track for each number that changes. What a key does is decided by the server; here it
-// is only which are chosen and where the pointer is.
+// Frames and keys: the player, and a track for each number that changes. The server edits keys; this file only handles
+// their selection and the pointer.
 
 import type { JSX } from "preact";
 import { useEffect, useRef } from "preact/hooks";
@@ -13,7 +13,7 @@ import type { KeyPlace, Line, Mode, TimeState, Track } from "./protocol";
 import { ask, canCreate, files, lines, playing, select, selected, selection, state, tracks } from "./store";
 
 const ROW = 26;
-/** Rows that are seen at once. */
+/** The number of visible rows. */
 const SEEN = 6;
 const MODES: readonly Mode[] = ["linear", "smooth", "step"];
 
@@ -31,7 +31,7 @@ export function Timeline(): JSX.Element | null {
   );
 }
 
-/** Shows frames at their pace while it plays. */
+/** Shows frames at the frame rate during playback. */
 function usePlayer(fps: number): void {
   const isPlaying = playing.value;
   useEffect(() => {
@@ -39,7 +39,7 @@ function usePlayer(fps: number): void {
     const begin = performance.now();
     const now = state.value;
     const count = now?.frames ?? 1;
-    // At the end it begins anew.
+    // At the end it starts again.
     const from = now && now.frame + 1 < count ? now.frame : 0;
     let shown = from;
     let timer = 0;
@@ -87,7 +87,7 @@ function Player({ frame, frames, fps }: { readonly frame: number; readonly frame
       <output>
         frame {frame + 1} of {frames}
       </output>
-      <label title={canCreate.value ? "Kept in animation.json" : "As long as the studio runs; rayfold render takes it as --fps"}>
+      <label title={canCreate.value ? "Stored in animation.json" : "As long as the studio runs; rayfold render takes it as --fps"}>
         Frames a second{" "}
         <NumberField label="Frames a second" value={fps} least={0.01} most={1000} set={(asked) => wish({ do: "pace", fps: asked })} />
       </label>
@@ -102,7 +102,7 @@ function Tools({ time, frames }: { readonly time: TimeState; readonly frames: nu
     return (
       <div class="tools">
         <Button action={actions.animate} label="Animate" />
-        <span class="note">One picture. As an animation, what you drag at a later frame moves there.</span>
+        <span class="note">This is a single picture. In an animation, an object that you drag at a later frame moves there.</span>
       </div>
     );
   }
@@ -122,7 +122,7 @@ function Tools({ time, frames }: { readonly time: TimeState; readonly frames: nu
           <Toggle action={actions.onion} label="Onion skin" is={time.onion} />
         </>
       ) : (
-        <span class="note">Each script here is a frame of its own; keys are for one script of many frames.</span>
+        <span class="note">Each script here is a single frame; keys need one script with many frames.</span>
       )}
       {tracks.value.tracks.length > 0 && <Chosen chosen={chosenTracks.value} />}
       {tracks.value.tracks.length > 0 && <Button action={actions.pasteKeys} label={time.copied > 0 ? `Paste ${time.copied}` : "Paste"} />}
@@ -144,7 +144,7 @@ function Toggle({ action, label, is }: ToggleProps): JSX.Element {
   );
 }
 
-/** What can be done with the keys that are chosen. */
+/** The tools for the selected keys. */
 function Chosen({ chosen }: { readonly chosen: readonly Track[] }): JSX.Element {
   const [first] = chosen;
   const mode = first && chosen.every((track) => track.mode === first.mode) ? first.mode : "";
@@ -241,7 +241,7 @@ function Head({ time }: { readonly time: TimeState }): JSX.Element {
   return <span class="head" style={{ left: `${place(time, time.number)}%` }} />;
 }
 
-/** Frames that the ruler names: at most about ten. */
+/** The frames that the ruler labels: at most about ten. */
 function ticks(time: TimeState): readonly number[] {
   const count = time.last - time.first + 1;
   const steps = [1, 2, 5, 10, 20, 25, 50, 100, 200, 500, 1000, 10_000, 100_000];
@@ -299,7 +299,7 @@ function Row({ row, track, line, time, press }: RowProps): JSX.Element {
               aria-label={`Key of ${name}, ${track.label}, at frame ${key.frame}: ${track.keys[at]?.[1] ?? 0}`}
               onPointerDown={(event) => press(event, key)}
               onClick={(event) => {
-                // By the keyboard; the pointer has chosen already.
+                // By the keyboard. With the pointer, the key is selected already.
                 if (event.detail === 0) chosenKeys.value = [key];
               }}
               onKeyDown={(event) => keyed(event, keys, at)}
@@ -314,7 +314,7 @@ function Row({ row, track, line, time, press }: RowProps): JSX.Element {
   );
 }
 
-/** Goes to other keys, moves those that are chosen, and does with them what keys of the keyboard say. */
+/** Handles the keyboard: goes to other keys, and selects, moves and deletes keys. */
 function keyed(event: KeyboardEvent & { readonly currentTarget: HTMLElement }, keys: readonly KeyPlace[], at: number): void {
   const control = event.ctrlKey || event.metaKey;
   const element = event.currentTarget;

@@ -1,5 +1,5 @@
-// The picture, and over it what can be taken hold of. What a drag does is decided by the server; here it is only where
-// the pointer is.
+// The picture with its handles. The server applies a drag; this file only sends the positions of
+// the pointer.
 
 import type { JSX } from "preact";
 import { signal } from "@preact/signals";
@@ -9,23 +9,23 @@ import type { Handle, Point } from "./protocol";
 import { PICTURE_HEADER } from "./protocol";
 import { ask, ghosts, hover, hovered, hoverOutline, lines, onPicture, outline, selected, state } from "./store";
 
-/** How far an arrow key moves a handle, in pixels of the picture. */
+/** The distance by which an arrow key moves a handle, in pixels of the picture. */
 const KEY_STEP = 8;
 
-/** How fast the wheel goes nearer. */
+/** The zoom speed of the wheel. */
 const WHEEL = 0.0012;
 
-/** Milliseconds after the wheel's last turn at which the picture rests. */
+/** The milliseconds after the wheel's last turn until the picture is at rest. */
 const REST = 160;
 
-/** Moves that are told at once, and not once a frame: where the browser has them, what is dragged follows sooner. */
+/** Pointer moves that are sent at once instead of once per frame, if the browser supports it, so that drags have less delay. */
 const RAW = "onpointerrawupdate" in window;
 
-/** What the pointer does while its button is down. */
+/** The action of the pointer while its button is down. */
 interface Hold {
   readonly what: "drag" | "pan";
   last: Point;
-  /** Where the picture is: asking for it at each move would lay out the page anew. */
+  /** The position of the picture. Reading it at each move would force a new layout. */
   readonly box: DOMRect | undefined;
 }
 
@@ -67,7 +67,7 @@ export function Viewport(): JSX.Element {
       const [left, top, across, down] = [field(5), field(6), field(7), field(8)];
       const target = context.canvas;
       if (target.width !== width || target.height !== height) [target.width, target.height] = [width, height];
-      // Nothing follows where the picture is the one before.
+      // If the picture is unchanged, no pixels follow.
       if (across > 0) context.putImageData(new ImageData(new Uint8ClampedArray(picture, PICTURE_HEADER), across, down), left, top);
       ask({ ask: "shown" });
       target.dataset["picture"] = String(number);
@@ -125,7 +125,7 @@ export function Viewport(): JSX.Element {
   const release = (): void => {
     if (held.current) ask({ ask: "release" });
     held.current = null;
-    // It was that of what stood there before.
+    // The outline belonged to the previous object.
     hoverOutline.value = "";
   };
   const keyed = (event: KeyboardEvent, handle: Handle): void => {
@@ -145,7 +145,7 @@ export function Viewport(): JSX.Element {
     ask({ ask: "release" });
   };
 
-  // Pictures of an orthographic camera have the script's size, which need not fit.
+  // Pictures of an orthographic camera have the script's size, which may not fit the panel.
   const scale = Math.min(1 / devicePixelRatio, room.value[0] / width, room.value[1] / height);
   const shown = { width: `${width * scale}px`, height: `${height * scale}px` };
   const under = hovered.value === null ? null : (lines.value[hovered.value] ?? null);
@@ -155,7 +155,7 @@ export function Viewport(): JSX.Element {
       class={under ? "viewport over" : "viewport"}
       tabIndex={0}
       role="application"
-      aria-label="Viewport: drag objects to move them, drag beside them to look around"
+      aria-label="Viewport: drag objects to move them, drag the background to rotate the view"
       onPointerDown={(event) => press(event, null)}
       onPointerMove={move}
       onPointerUp={release}
@@ -188,7 +188,7 @@ export function Viewport(): JSX.Element {
           {picture && now?.handles.map((handle) => <HandleShape key={key(handle)} handle={handle} unit={1 / scale} press={press} keyed={keyed} />)}
         </svg>
       </div>
-      {now && !picture && <p class="hint">Nothing to see yet: drag a shape in from the left, or click one.</p>}
+      {now && !picture && <p class="hint">The scene is empty: drag a shape in from the left, or click one.</p>}
       {under && !held.current && !selected.value.has(hovered.value ?? -1) && (
         <p class="under">{under.name ?? under.subject ?? under.command}</p>
       )}

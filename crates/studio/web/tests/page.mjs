@@ -339,5 +339,5 @@ test("pictures keep up with a drag, and what was changed is written when the ser
   studio.server.kill("SIGTERM");
   assert.equal(await studio.ended, 0);
   assert.notEqual(readFileSync(studio.path, "utf8"), text);
-  await page.getByText("The connection has ended").waitFor();
+  await page.getByText("The connection was lost").waitFor();
 });

@@ -55,7 +55,7 @@ async function submit(page, name) {
   const isOpen = (await page.locator("dialog.runs").count()) > 0;
   await page.locator(isOpen ? "dialog.runs" : "header").getByRole("link", { name: "Submit", exact: true }).click();
   if (name) await page.getByLabel("Name of the run").fill(name);
-  await page.getByRole("button", { name: "What will it cost?" }).click();
+  await page.getByRole("button", { name: "Estimate the cost" }).click();
   await page.getByText("Making it, once").waitFor();
   await page.getByRole("button", { name: "Submit", exact: true }).click();
   await until(() => page.url().includes("#run="));
@@ -96,7 +96,7 @@ test("a run goes on without its page, and gives the GIF of the command line", as
   const bucket = await dev(t);
   const { page, context, path, folder, address, check, heard, listen } = await studio(t, bucket.exports, { from: join(scenes, "hello"), name: "hello" });
   await page.getByRole("link", { name: "Submit", exact: true }).click();
-  await page.getByRole("button", { name: "What will it cost?" }).click();
+  await page.getByRole("button", { name: "Estimate the cost" }).click();
   await page.getByText("50 frames of 512").waitFor();
   await page.getByText("To scripts/hello/: 51 files to upload, 0 there already").waitFor();
   await page.getByText("Making it, once").click();
@@ -195,7 +195,7 @@ test("what the bucket has and the page has not is deleted only when that is said
   rmSync(join(folder, "film", "other.txt"));
   const { page, path } = await studio(t, bucket.exports, { from: join(folder, "film"), name: "film" });
   await page.getByRole("link", { name: "Submit", exact: true }).click();
-  await page.getByRole("button", { name: "What will it cost?" }).click();
+  await page.getByRole("button", { name: "Estimate the cost" }).click();
   const agree = page.getByLabel(/Delete a script of the bucket that the page does not have: scripts\/film\/other.txt/);
   await agree.waitFor();
   const go = page.getByRole("button", { name: "Submit", exact: true });

@@ -331,7 +331,7 @@ test("axe finds nothing in timeline, groups and materials, light and dark", asyn
       const { page } = studio;
       await page.locator(".track .label").nth(1).click();
       await page.locator(".track.selected").first().waitFor();
-      await page.getByText("To begin with").click();
+      await page.getByText("Starter materials").click();
       await page.getByRole("button", { name: "chalk" }).scrollIntoViewIfNeeded();
       await studio.settled();
       await shot(page, `timeline-${scheme}`);
@@ -354,6 +354,6 @@ test("a script of one frame says how it becomes an animation, and a folder that 
   assert.equal(await number(one.page).count(), 0);
   one.check();
   const folder = await open(t, { from: join(scenes, "hello"), name: "hello" });
-  await folder.page.getByText("Each script here is a frame of its own").waitFor();
+  await folder.page.getByText("Each script here is a single frame").waitFor();
   folder.check();
 });

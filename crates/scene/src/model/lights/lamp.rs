@@ -1,4 +1,4 @@
-//! Lamps: lights at a place.
+//! Lamps: lights with a position.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative};
 
-/// A light at a place: a point, or a ball whose points all shine.
+/// A light with a position: a point, or a luminous ball.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lamp {
     color: DVec3,
@@ -17,11 +17,12 @@ pub struct Lamp {
 }
 
 impl Lamp {
-    /// A ball around `position` of the given `radius`, 0 for a point. With a `reach` greater than 0 the colour is what
-    /// arrives at that distance, and the light falls off with the square of the distance; with 0 it does not.
+    /// Makes a ball of the given `radius` around `position`; a radius of 0 makes a point. With a `reach` above 0,
+    /// brightness falls with the square of the distance, and `color` is the brightness at the distance `reach`. With
+    /// 0 there is no falloff.
     ///
     /// # Errors
-    /// When the radius or the reach is negative, or a number is not finite.
+    /// Fails if the radius or the reach is negative, or a number is not finite.
     pub fn new(color: DVec3, position: DVec3, radius: f64, reach: f64) -> Result<Self, InvalidValue> {
         finite(Parameter::LightColor, color)?;
         finite(Parameter::LampPosition, position)?;
@@ -30,22 +31,22 @@ impl Lamp {
         Ok(Self { color, position, radius, reach })
     }
 
-    /// Its colour, any finite numbers.
+    /// Returns the colour; any finite numbers.
     pub fn color(&self) -> DVec3 {
         self.color
     }
 
-    /// The middle of the ball.
+    /// Returns the centre of the ball.
     pub fn position(&self) -> DVec3 {
         self.position
     }
 
-    /// Of the ball; 0 for a point.
+    /// Returns the radius of the ball, which is 0 for a point.
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// The distance at which its colour arrives; 0 where it arrives at all distances alike.
+    /// Returns the distance at which the light has its given colour, or 0 without falloff.
     pub fn reach(&self) -> f64 {
         self.reach
     }

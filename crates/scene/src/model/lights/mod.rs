@@ -1,7 +1,7 @@
-//! Lights: what a surface is lit by.
+//! Lights, which illuminate surfaces.
 //!
-//! A light is a file: its checked constructor, and how a script writes it. Here stands only which there are; the
-//! compiler lists what a new one lacks.
+//! Each light has a file with its checking constructor and its syntax. This file only lists them; for a new light,
+//! the compiler reports the missing parts.
 
 mod lamp;
 mod sun;
@@ -14,17 +14,17 @@ pub use sun::DirectionalLight;
 
 use crate::form::write_line;
 
-/// Something that lights the scene.
+/// A light of the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {
     /// A light at infinity.
     Directional(DirectionalLight),
-    /// A light at a place.
+    /// A light with a position.
     Lamp(Lamp),
 }
 
 impl Light {
-    /// Its colour, any finite numbers.
+    /// Returns the colour; any finite numbers.
     pub fn color(&self) -> DVec3 {
         match self {
             Self::Directional(light) => light.color(),
@@ -32,7 +32,7 @@ impl Light {
         }
     }
 
-    /// As a line of a script.
+    /// Writes a line of a script.
     pub(crate) fn write(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {
             Self::Directional(light) => write_line(f, light, None),

@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite};
 
-/// A light at infinity.
+/// A directional light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DirectionalLight {
     color: DVec3,
@@ -16,20 +16,20 @@ pub struct DirectionalLight {
 }
 
 impl DirectionalLight {
-    /// `direction` is the one in which the light travels, of any length but zero.
+    /// Makes a light. `direction` is that in which the light travels, of any length but zero.
     ///
     /// # Errors
-    /// When the direction is zero or a number is not finite.
+    /// Fails if the direction is zero or a number is not finite.
     pub fn new(color: DVec3, direction: DVec3) -> Result<Self, InvalidValue> {
         finite(Parameter::LightColor, color)?;
         invalid::direction(Parameter::LightDirection, direction)?;
         Ok(Self { color, direction, angle: 0.0 })
     }
 
-    /// The same, spanning an angle in degrees as it is seen; 0 for a point.
+    /// Sets the apparent diameter in degrees; 0 for a point.
     ///
     /// # Errors
-    /// When the angle is not from 0 to below 180.
+    /// Fails if the angle is not from 0 to below 180.
     pub fn spanning(self, angle: f64) -> Result<Self, InvalidValue> {
         if (0.0..180.0).contains(&angle) {
             Ok(Self { angle, ..self })
@@ -38,18 +38,18 @@ impl DirectionalLight {
         }
     }
 
-    /// The angle that it spans, in degrees, from 0 to below 180: its points are the directions of a cone of half that
-    /// angle.
+    /// Returns the apparent diameter in degrees, from 0 to below 180. The light comes from all directions of a cone
+    /// with half that angle.
     pub fn angle(&self) -> f64 {
         self.angle
     }
 
-    /// Its colour, any finite numbers.
+    /// Returns the colour; any finite numbers.
     pub fn color(&self) -> DVec3 {
         self.color
     }
 
-    /// The direction in which it travels, of any length but zero.
+    /// Returns the direction in which the light travels, of any length but zero.
     pub fn direction(&self) -> DVec3 {
         self.direction
     }

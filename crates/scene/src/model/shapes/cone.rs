@@ -1,15 +1,15 @@
-//! Cones, also cut off.
+//! Cones and truncated cones.
 
 use std::fmt;
 
 use glam::DVec3;
 
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
+use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative};
 use crate::model::material::Material;
 use crate::model::surface;
 
-/// A round cone, or what is left when its tip is cut off; closed at both ends.
+/// A round cone or truncated cone, closed at both ends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cone {
     radii: [f64; 2],
@@ -18,10 +18,10 @@ pub struct Cone {
 }
 
 impl Cone {
-    /// From one end of its axis to the other, with a radius at each.
+    /// Makes a cone with a radius at each end of its axis.
     ///
     /// # Errors
-    /// When a radius is negative, both are zero, the ends are the same, or a number is not finite.
+    /// Fails if a radius is negative, both are zero, the ends are the same, or a number is not finite.
     pub fn new(radii: [f64; 2], ends: [DVec3; 2], material: Material) -> Result<Self, InvalidValue> {
         not_negative(Parameter::RadiusA, radii[0])?;
         not_negative(Parameter::RadiusB, radii[1])?;
@@ -36,17 +36,17 @@ impl Cone {
         Ok(Self { radii, ends, material })
     }
 
-    /// The radii at a and b, not negative, not both zero.
+    /// Returns the radii at a and b, not negative and not both zero.
     pub fn radii(&self) -> [f64; 2] {
         self.radii
     }
 
-    /// The ends a and b of its axis, which differ.
+    /// Returns the ends a and b of the axis, which differ.
     pub fn ends(&self) -> [DVec3; 2] {
         self.ends
     }
 
-    /// How its surface answers light.
+    /// Returns the material of the surface.
     pub fn material(&self) -> &Material {
         &self.material
     }
@@ -69,7 +69,7 @@ impl Scripted for Cone {
             surface::MIRROR,
         ],
     )
-    .with(&[Together::NotBothZero(0, 1), Together::Differ(2, 3)]);
+    .with(&[Constraint::NotBothZero(0, 1), Constraint::Differ(2, 3)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let radii = [numbers.number(), numbers.number()];

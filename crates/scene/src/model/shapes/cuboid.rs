@@ -1,4 +1,4 @@
-//! Boxes along the axes; cuboids in the code, where `Box` is another word.
+//! Boxes along the axes. The code says cuboid, because `Box` has another meaning in Rust.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use crate::model::invalid::{Faults, InvalidValue, Parameter, finite};
 use crate::model::material::Material;
 use crate::model::surface;
 
-/// An axis-aligned box, closed: its faces, edges and corners belong to it. One without thickness is a rectangle.
+/// An axis-aligned, closed box: its faces, edges and corners belong to it. A box without thickness is a rectangle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cuboid {
     corners: [DVec3; 2],
@@ -17,32 +17,32 @@ pub struct Cuboid {
 }
 
 impl Cuboid {
-    /// From any two opposite corners.
+    /// Makes a box from two opposite corners.
     ///
     /// # Errors
-    /// When a number is not finite.
+    /// Fails if a number is not finite.
     pub fn new(corners: [DVec3; 2], material: Material) -> Result<Self, InvalidValue> {
         finite(Parameter::Corner, corners[0])?;
         finite(Parameter::Corner, corners[1])?;
         Ok(Self { corners, material })
     }
 
-    /// The two corners as the script gave them.
+    /// Returns the two corners as in the script.
     pub fn corners(&self) -> &[DVec3; 2] {
         &self.corners
     }
 
-    /// The corner with the smallest coordinates.
+    /// Returns the corner with the smallest coordinates.
     pub fn min(&self) -> DVec3 {
         self.corners[0].min(self.corners[1])
     }
 
-    /// The corner with the largest coordinates.
+    /// Returns the corner with the largest coordinates.
     pub fn max(&self) -> DVec3 {
         self.corners[0].max(self.corners[1])
     }
 
-    /// How its surface answers light.
+    /// Returns the material of the surface.
     pub fn material(&self) -> &Material {
         &self.material
     }

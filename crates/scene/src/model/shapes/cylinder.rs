@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
+use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, positive};
 use crate::model::material::Material;
 use crate::model::surface;
@@ -18,10 +18,10 @@ pub struct Cylinder {
 }
 
 impl Cylinder {
-    /// From one end of its axis to the other.
+    /// Makes a cylinder from one end of its axis to the other.
     ///
     /// # Errors
-    /// When the radius is not positive, the ends are the same, or a number is not finite.
+    /// Fails if the radius is not positive, the ends are the same, or a number is not finite.
     pub fn new(radius: f64, ends: [DVec3; 2], material: Material) -> Result<Self, InvalidValue> {
         positive(Parameter::Radius, radius)?;
         finite(Parameter::AxisEnd, ends[0])?;
@@ -32,17 +32,17 @@ impl Cylinder {
         Ok(Self { radius, ends, material })
     }
 
-    /// Greater than zero.
+    /// Returns the radius, greater than 0.
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// The ends a and b of its axis, which differ.
+    /// Returns the ends a and b of the axis, which differ.
     pub fn ends(&self) -> [DVec3; 2] {
         self.ends
     }
 
-    /// How its surface answers light.
+    /// Returns the material of the surface.
     pub fn material(&self) -> &Material {
         &self.material
     }
@@ -64,7 +64,7 @@ impl Scripted for Cylinder {
             surface::MIRROR,
         ],
     )
-    .with(&[Together::Differ(1, 2)]);
+    .with(&[Constraint::Differ(1, 2)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let (radius, ends) = (numbers.number(), [numbers.vector(), numbers.vector()]);

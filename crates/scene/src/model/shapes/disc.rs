@@ -9,7 +9,7 @@ use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite, posit
 use crate::model::material::Material;
 use crate::model::surface;
 
-/// A flat, round disc, seen from both sides, with its rim.
+/// A flat, round, two-sided disc, including its rim.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disc {
     radius: f64,
@@ -19,10 +19,10 @@ pub struct Disc {
 }
 
 impl Disc {
-    /// Around `center`, square to `normal`, which has any length but zero.
+    /// Makes a disc around `center`, perpendicular to `normal`, which has any length but zero.
     ///
     /// # Errors
-    /// When the radius is not positive, the normal is zero, or a number is not finite.
+    /// Fails if the radius is not positive, the normal is zero, or a number is not finite.
     pub fn new(radius: f64, center: DVec3, normal: DVec3, material: Material) -> Result<Self, InvalidValue> {
         positive(Parameter::Radius, radius)?;
         finite(Parameter::Center, center)?;
@@ -30,22 +30,22 @@ impl Disc {
         Ok(Self { radius, center, normal, material })
     }
 
-    /// Greater than zero.
+    /// Returns the radius, greater than 0.
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// Its middle.
+    /// Returns the centre of the disc.
     pub fn center(&self) -> DVec3 {
         self.center
     }
 
-    /// Square to it, of any length but zero.
+    /// Returns the normal, of any length but zero.
     pub fn normal(&self) -> DVec3 {
         self.normal
     }
 
-    /// How its surface answers light.
+    /// Returns the material of the surface.
     pub fn material(&self) -> &Material {
         &self.material
     }

@@ -1,4 +1,4 @@
-//! Objects of a group, where a `Use` draws them.
+//! Instances: objects of a group as a `Use` draws them.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ pub(crate) const USE: Form = Form::new(
 )
 .with_subject(Subject::Refers(Names::Groups));
 
-/// Moves, turns and scales: p' = t + s·R·p.
+/// A placement that moves, rotates and scales: p' = t + s·R·p.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     translation: DVec3,
@@ -30,17 +30,17 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// A `rotation` is orthonormal, with determinant 1; the `scale` is greater than zero.
+    /// Makes a placement. `rotation` is orthonormal with determinant 1, and `scale` is greater than 0.
     ///
     /// # Errors
-    /// When the scale is not positive or a number is not finite.
+    /// Fails if the scale is not positive or a number is not finite.
     pub fn new(translation: DVec3, rotation: DMat3, scale: f64) -> Result<Self, InvalidValue> {
         finite(Parameter::Translation, translation)?;
         positive(Parameter::Scale, scale)?;
         Ok(Self { translation, rotation, scale })
     }
 
-    /// From the numbers of a [`USE`]; `None` where a scale of 0 hides the group.
+    /// Reads the numbers of a [`USE`]. Returns `None` if a scale of 0 hides the group.
     pub(crate) fn read(numbers: &mut Numbers<'_>) -> Result<Option<Self>, Faults> {
         let (translation, degrees) = (numbers.vector(), numbers.vector());
         let scale = not_negative(Parameter::Scale, numbers.optional_number().unwrap_or(1.0))?;
@@ -50,41 +50,41 @@ impl Placement {
         Ok(Some(Self::new(translation, turned(degrees), scale)?))
     }
 
-    /// t.
+    /// Returns the translation t.
     pub fn translation(&self) -> DVec3 {
         self.translation
     }
 
-    /// R.
+    /// Returns the rotation R.
     pub fn rotation(&self) -> DMat3 {
         self.rotation
     }
 
-    /// s, greater than zero.
+    /// Returns the scale s, greater than 0.
     pub fn scale(&self) -> f64 {
         self.scale
     }
 
-    /// Where a point of the group lies in the world.
+    /// Returns the position in the world of a point of the group.
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.translation + self.scale * (self.rotation * p)
     }
 
-    /// Where a point of the world lies in the group.
+    /// Returns the position in the group of a point of the world.
     pub fn local_point(&self, p: DVec3) -> DVec3 {
         (self.rotation.transpose() * (p - self.translation)) / self.scale
     }
 
-    /// This one within another: first this, then `outer`.
+    /// Combines two placements: first this one, then `outer`.
     ///
     /// # Errors
-    /// When a number leaves the range of those that are finite, or the scale vanishes.
+    /// Fails if a number overflows or the scale vanishes.
     pub fn within(&self, outer: &Self) -> Result<Self, InvalidValue> {
         Self::new(outer.point(self.translation), outer.rotation * self.rotation, outer.scale * self.scale)
     }
 }
 
-/// Rz·Ry·Rx for angles in degrees, right-handed; multiples of 90 are exact.
+/// Returns Rz·Ry·Rx for angles in degrees, right-handed. Multiples of 90 are exact.
 fn turned(degrees: DVec3) -> DMat3 {
     let [x, y, z] = degrees.to_array().map(cos_sin);
     let about_x = DMat3::from_cols_array(&[1.0, 0.0, 0.0, 0.0, x.0, x.1, 0.0, -x.1, x.0]);
@@ -93,9 +93,9 @@ fn turned(degrees: DVec3) -> DMat3 {
     about_z * about_y * about_x
 }
 
-/// Cosine and sine of an angle in degrees, the same on every machine.
+/// Returns cosine and sine of an angle in degrees, the same on every machine.
 fn cos_sin(degrees: f64) -> (f64, f64) {
-    // Both steps are exact: what is left is within 45 degrees of a multiple of 90.
+    // Both steps are exact, and the rest is within 45 degrees of a multiple of 90.
     let turn = degrees % 360.0;
     let quarters = (turn / 90.0).round();
     let (sin, cos) = libm::sincos((turn - 90.0 * quarters).to_radians());
@@ -107,36 +107,36 @@ fn cos_sin(degrees: f64) -> (f64, f64) {
     }
 }
 
-/// An object of a group, as one `Use` of it draws it. The numbers of the object are those of the group.
+/// An object of a group, as drawn by one `Use`. The object has the numbers of the group.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
-    /// Of the group, none of them an instance.
+    /// The objects of the group, none of which is an instance.
     objects: SharedSlice<Object>,
     index: usize,
     placement: Arc<Placement>,
 }
 
 impl Instance {
-    /// Object `index` of the group's `objects`, moved by `placement`.
+    /// Makes an instance of object `index` of the group's `objects`, placed by `placement`.
     ///
     /// # Panics
-    /// When there is no such object, or it is an instance itself.
+    /// Panics if there is no such object, or if it is an instance itself.
     pub fn new(objects: &SharedSlice<Object>, index: usize, placement: &Arc<Placement>) -> Self {
         assert!(!matches!(objects[index], Object::Instance(_)), "an instance of an instance");
         Self { objects: objects.clone(), index, placement: placement.clone() }
     }
 
-    /// The object, with the numbers that it has in its group; never an instance.
+    /// Returns the object with the numbers that it has in its group; never an instance.
     pub fn object(&self) -> &Object {
         &self.objects[self.index]
     }
 
-    /// From the group's coordinates to the world's.
+    /// Returns the placement from the group's coordinates to the world's.
     pub fn placement(&self) -> &Placement {
         &self.placement
     }
 
-    /// How its surface answers light; a pattern lies in the group's coordinates.
+    /// Returns the material of the surface. A pattern is in the group's coordinates.
     pub fn material(&self) -> &Material {
         self.object().material()
     }

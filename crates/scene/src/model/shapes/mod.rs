@@ -1,7 +1,7 @@
-//! Objects: what a ray can hit.
+//! Objects, which rays can hit.
 //!
-//! A shape is a file: its checked constructor, and how a script writes it. Here stands only which there are; the
-//! compiler lists what a new one lacks.
+//! Each shape has a file with its checking constructor and its syntax. This file only lists them; for a new shape,
+//! the compiler reports the missing parts.
 
 mod cone;
 mod cuboid;
@@ -28,35 +28,33 @@ pub use sphere::Sphere;
 pub use torus::Torus;
 pub use triangle::Triangle;
 
-use super::invalid::{Doubt, InvalidValue};
+use super::invalid::{InvalidValue, Lint};
 use super::material::Material;
 use crate::form::write_line;
 
-/// Something that a ray can hit.
+/// An object that a ray can hit.
+#[expect(missing_docs, reason = "the types have the documentation")]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Object {
-    /// A sphere.
     Sphere(Sphere),
-    /// A triangle.
     Triangle(Triangle),
-    /// An axis-aligned box.
+    /// A box whose edges are parallel to the axes.
     Cuboid(Cuboid),
-    /// A plane without end.
+    /// An infinite plane.
     Plane(Plane),
-    /// A flat, round disc.
     Disc(Disc),
-    /// A closed cylinder.
+    /// A cylinder that is closed at both ends.
     Cylinder(Cylinder),
-    /// A closed cone, also cut off.
+    /// A closed cone or truncated cone.
     Cone(Cone),
-    /// A ring.
+    /// A ring (torus).
     Torus(Torus),
     /// An object of a group, as it is drawn.
     Instance(Instance),
 }
 
 impl Object {
-    /// How its surface answers light.
+    /// Returns the material of the surface.
     pub fn material(&self) -> &Material {
         match self {
             Self::Sphere(o) => o.material(),
@@ -71,10 +69,10 @@ impl Object {
         }
     }
 
-    /// The same with every position moved by `place`, which scales all distances by `scale` and keeps directions.
+    /// Moves every position by `place`, which scales all distances by `scale` and keeps directions.
     ///
     /// # Errors
-    /// When a number leaves the range of those that are finite, or a length vanishes.
+    /// Fails if a number overflows or a length vanishes.
     pub fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
         match self {
             Self::Sphere(o) => o.placed(scale, place).map(Self::from),
@@ -89,10 +87,10 @@ impl Object {
         }
     }
 
-    /// What is hardly meant about it.
-    pub(crate) fn doubt(&self) -> Option<Doubt> {
+    /// Returns a valid property that is probably a mistake.
+    pub(crate) fn lint(&self) -> Option<Lint> {
         match self {
-            Self::Triangle(o) => o.is_degenerate().then_some(Doubt::DegenerateTriangle),
+            Self::Triangle(o) => o.is_degenerate().then_some(Lint::DegenerateTriangle),
             Self::Sphere(_)
             | Self::Cuboid(_)
             | Self::Plane(_)
@@ -104,7 +102,7 @@ impl Object {
         }
     }
 
-    /// As a line of a script; `surface` is the name of its material, if it has one.
+    /// Writes a line of a script. `surface` is the name of its material, if it has one.
     pub(crate) fn write(&self, f: &mut Formatter<'_>, surface: Option<&str>) -> fmt::Result {
         match self {
             Self::Sphere(o) => write_line(f, o, surface),

@@ -9,7 +9,7 @@ use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite};
 use crate::model::material::Material;
 use crate::model::surface;
 
-/// A plane without end, seen from both sides.
+/// An infinite, two-sided plane.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plane {
     point: DVec3,
@@ -18,27 +18,27 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// Through `point`, square to `normal`, which has any length but zero.
+    /// Makes a plane through `point`, perpendicular to `normal`, which has any length but zero.
     ///
     /// # Errors
-    /// When the normal is zero or a number is not finite.
+    /// Fails if the normal is zero or a number is not finite.
     pub fn new(point: DVec3, normal: DVec3, material: Material) -> Result<Self, InvalidValue> {
         finite(Parameter::PlanePoint, point)?;
         invalid::direction(Parameter::Normal, normal)?;
         Ok(Self { point, normal, material })
     }
 
-    /// A point of it.
+    /// Returns a point of the plane.
     pub fn point(&self) -> DVec3 {
         self.point
     }
 
-    /// Square to it, of any length but zero.
+    /// Returns the normal, of any length but zero.
     pub fn normal(&self) -> DVec3 {
         self.normal
     }
 
-    /// How its surface answers light.
+    /// Returns the material of the surface.
     pub fn material(&self) -> &Material {
         &self.material
     }

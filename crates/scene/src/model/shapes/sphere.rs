@@ -18,25 +18,27 @@ pub struct Sphere {
 }
 
 impl Sphere {
+    /// Makes a sphere.
+    ///
     /// # Errors
-    /// When the radius is not positive or a number is not finite.
+    /// Fails if the radius is not positive or a number is not finite.
     pub fn new(radius: f64, center: DVec3, material: Material) -> Result<Self, InvalidValue> {
         positive(Parameter::Radius, radius)?;
         finite(Parameter::Center, center)?;
         Ok(Self { radius, center, material })
     }
 
-    /// Greater than zero.
+    /// Returns the radius, greater than 0.
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// Its middle.
+    /// Returns the centre of the sphere.
     pub fn center(&self) -> DVec3 {
         self.center
     }
 
-    /// How its surface answers light.
+    /// Returns the material of the surface.
     pub fn material(&self) -> &Material {
         &self.material
     }

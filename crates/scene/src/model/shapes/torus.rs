@@ -4,12 +4,12 @@ use std::fmt;
 
 use glam::DVec3;
 
-use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Together, Values};
+use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite, positive};
 use crate::model::material::Material;
 use crate::model::surface;
 
-/// A ring: all that is as far as its thickness from a circle.
+/// A ring: all points whose distance from a circle is at most its thickness.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Torus {
     radius: f64,
@@ -20,11 +20,11 @@ pub struct Torus {
 }
 
 impl Torus {
-    /// The circle has the `radius` R around `center` and is square to `normal`, which has any length but zero;
-    /// `thickness` r is the radius of the tube.
+    /// Makes a torus. The circle has the `radius` R around `center` and is perpendicular to `normal`, which has any
+    /// length but zero. `thickness` r is the radius of the tube.
     ///
     /// # Errors
-    /// When not 0 < r < R, the normal is zero, or a number is not finite.
+    /// Fails if not 0 < r < R, the normal is zero, or a number is not finite.
     pub fn new(
         radius: f64,
         thickness: f64,
@@ -42,27 +42,27 @@ impl Torus {
         Ok(Self { radius, thickness, center, normal, material })
     }
 
-    /// R, of the circle.
+    /// Returns the radius R of the circle.
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// r, of the tube around the circle: 0 < r < R.
+    /// Returns the radius r of the tube around the circle: 0 < r < R.
     pub fn thickness(&self) -> f64 {
         self.thickness
     }
 
-    /// Of the circle.
+    /// Returns the centre of the circle.
     pub fn center(&self) -> DVec3 {
         self.center
     }
 
-    /// Square to the circle, of any length but zero.
+    /// Returns the normal of the circle, of any length but zero.
     pub fn normal(&self) -> DVec3 {
         self.normal
     }
 
-    /// How its surface answers light.
+    /// Returns the material of the surface.
     pub fn material(&self) -> &Material {
         &self.material
     }
@@ -86,7 +86,7 @@ impl Scripted for Torus {
             surface::MIRROR,
         ],
     )
-    .with(&[Together::Greater(0, 1)]);
+    .with(&[Constraint::Greater(0, 1)]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let (radius, thickness) = (numbers.number(), numbers.number());

@@ -10,7 +10,7 @@ use crate::model::material::Material;
 use crate::model::surface;
 use crate::model::vector::to_unit_scale;
 
-/// A two-sided triangle; one of no area is allowed and never hit.
+/// A two-sided triangle. One without area is allowed and never hit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Triangle {
     vertices: [DVec3; 3],
@@ -18,8 +18,10 @@ pub struct Triangle {
 }
 
 impl Triangle {
+    /// Makes a triangle.
+    ///
     /// # Errors
-    /// When a number is not finite.
+    /// Fails if a number is not finite.
     pub fn new(vertices: [DVec3; 3], material: Material) -> Result<Self, InvalidValue> {
         finite(Parameter::Vertex, vertices[0])?;
         finite(Parameter::Vertex, vertices[1])?;
@@ -27,11 +29,11 @@ impl Triangle {
         Ok(Self { vertices, material })
     }
 
-    /// Whether it has no area: its vertices lie on a line or coincide, decided exactly.
+    /// Returns whether the triangle has no area, that is, its vertices are collinear or coincide. The test is exact.
     pub fn is_degenerate(&self) -> bool {
         let [u, v, w] = self.vertices;
-        // Each axis gets a power of two of its own, which keeps points on a line on a line, so that the products of
-        // the predicate neither overflow nor vanish.
+        // Each axis is scaled by its own power of two, which keeps collinear points collinear, so that the products
+        // of the predicate neither overflow nor underflow.
         let scale = u.abs().max(v.abs()).max(w.abs()).map(to_unit_scale);
         let [u, v, w] = [u, v, w].map(|p| p * scale);
         let area = |x: fn(DVec3) -> DVec2| {
@@ -41,12 +43,12 @@ impl Triangle {
         area(|p| p.truncate()) == 0.0 && area(|p| p.zy()) == 0.0 && area(|p| p.xz()) == 0.0
     }
 
-    /// u, v, w in the order of the script.
+    /// Returns u, v, w in the order of the script.
     pub fn vertices(&self) -> &[DVec3; 3] {
         &self.vertices
     }
 
-    /// How its surface answers light.
+    /// Returns the material of the surface.
     pub fn material(&self) -> &Material {
         &self.material
     }

@@ -1,4 +1,4 @@
-//! What is seen: the scene of the viewport, what lies under a point of it, and from where it is looked at.
+//! The viewport: its scene, the object under a point of it, and its camera.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -13,27 +13,27 @@ use crate::extent;
 use crate::line::Line;
 use crate::pictures::Motion;
 use crate::project::Project;
-use crate::protocol::{Navigation, Standpoint, Tell};
+use crate::protocol::{Navigation, ServerMessage, ViewPreset};
 use crate::silhouette::View;
 use crate::view::{Bounds, Orbit, Projection};
 
-/// Pixels of a picture, at most.
+/// The largest number of pixels of a picture.
 pub(super) const PIXELS: u64 = 8 << 20;
 
-/// Lines of the grid in each direction from the middle.
+/// The number of grid lines in each direction from the middle.
 const GRID: i32 = 10;
 
-/// Pieces of the horizon all around.
+/// The number of pieces of the whole horizon.
 const HORIZON: i32 = 72;
 
-/// How far away the horizon is, in widths of the grid from its middle.
+/// The distance of the horizon from the middle of the grid, in widths of the grid.
 const FAR: f64 = 1e6;
 
-/// What lies so many pixels away is not in the picture.
+/// A point at least this many pixels away is not in the picture.
 const BEYOND: f64 = 1e5;
 
 impl Session {
-    /// What the viewport shows.
+    /// Returns the scene in the viewport.
     pub(super) fn scene(&self, project: &Project) -> Option<Scene> {
         let mut scene = self.shown(project).scene.clone()?;
         let (width, height) = (f64::from(self.size.0), f64::from(self.size.1));
@@ -53,17 +53,17 @@ impl Session {
         Some(scene)
     }
 
-    /// What becomes of it while its shutter is open.
+    /// Returns the motion of the scene while its shutter is open.
     pub(super) fn motion(&self, project: &Project, scene: &Scene) -> Option<Motion> {
         let place = self.place(project);
         let script = project.files[place.file].script.as_ref().filter(|_| scene.shutter.open() > 0.0)?;
         Some(Motion { script: Arc::clone(script), frame: place.frame, is_free: self.free.is_some() })
     }
 
-    /// The same, if its objects are those of the lines.
+    /// Returns the scene if its objects are those of the lines.
     pub(super) fn sound_scene(&self, project: &Project) -> Option<Scene> {
         let is_sound = project.files[self.place(project).file].is_sound();
-        let count = self.shown(project).stage.object_count();
+        let count = self.shown(project).source_map.object_count();
         self.scene(project).filter(|scene| is_sound && scene.objects.len() == count)
     }
 
@@ -71,46 +71,45 @@ impl Session {
         let shown = self.shown(project);
         let lamps = || {
             let lines = self.file_lines(project);
-            let lights = shown.stage.lights.iter().filter_map(|&line| lines.get(line));
+            let lights = shown.source_map.lights.iter().filter_map(|&line| lines.get(line));
             edits::places(lights.collect::<Vec<_>>(), shown.time)
         };
         shown.bounds().or_else(lamps).unwrap_or(Bounds { low: DVec3::splat(-1.0), high: DVec3::splat(1.0) })
     }
 
-    /// Where what is selected is.
+    /// Returns the bounds of the selection.
     fn selected_bounds(&self, project: &Project) -> Option<Bounds> {
         let (shown, chosen) = (self.shown(project), self.chosen());
         let objects = self.sound_scene(project).and_then(|scene| {
-            let own = scene
-                .objects
-                .iter()
-                .enumerate()
-                .filter(|(at, _)| shown.stage.line_of(*at).is_some_and(|line| chosen.contains(&line)));
+            let own =
+                scene.objects.iter().enumerate().filter(|(at, _)| {
+                    shown.source_map.line_of(*at).is_some_and(|line| chosen.contains(&line))
+                });
             extent::bounds(own.map(|(_, object)| object))
         });
-        let lights = shown.stage.lights.iter().filter(|line| chosen.contains(*line));
+        let lights = shown.source_map.lights.iter().filter(|line| chosen.contains(*line));
         let lights = lights.filter_map(|&line| self.line(project, line));
         objects.or_else(|| edits::places(lights.collect::<Vec<_>>(), shown.time))
     }
 
-    /// What is selected, to be looked up.
+    /// Returns the selected lines as a set.
     pub(super) fn chosen(&self) -> HashSet<usize> {
         self.selection.iter().copied().collect()
     }
 
-    /// Where lights without a place are shown.
+    /// Returns the point where lights without a position are shown.
     pub(super) fn around(&self, project: &Project) -> DVec3 {
         self.free.map_or_else(|| self.bounds(project).center(), |orbit| orbit.target)
     }
 
-    /// What a pixel spans in the middle of the scene, as a power of ten.
+    /// Returns the extent of a pixel in the middle of the scene, as a power of ten.
     pub(super) fn step(&self, project: &Project) -> f64 {
         let pixel = self.scene(project).map(|scene| Projection::new(&scene).pixel_at(self.around(project)));
         let pixel = pixel.filter(|pixel| pixel.is_normal()).unwrap_or(0.01);
         10f64.powi(pixel.log10().floor().clamp(-12.0, 12.0) as i32)
     }
 
-    /// The line of the object under a point of the picture, and where it was hit.
+    /// Returns the line of the object under a point of the picture, and the point that was hit.
     pub(super) fn pick(&self, project: &Project, x: f64, y: f64) -> Option<(usize, DVec3)> {
         let shown = self.shown(project);
         let scene = self.sound_scene(project)?;
@@ -120,23 +119,23 @@ impl Session {
         let view = View { scene: &scene, boxes: shown.boxes() };
         let found = if inside { view.pick(column, row).ok().flatten()? } else { return None };
         let (origin, direction) = Projection::new(&scene).ray(DVec2::new(column + 0.5, row + 0.5));
-        let line = shown.stage.line_of(found.object)?;
+        let line = shown.source_map.line_of(found.object)?;
         (!self.is_locked(project, line)).then(|| (line, origin + found.distance * direction))
     }
 
-    /// The outline of some lines' objects.
+    /// Returns the outline of the objects of some lines.
     fn outline_of(&self, project: &Project, is_in: impl Fn(usize) -> bool) -> Option<String> {
         let shown = self.shown(project);
-        if !shown.stage.objects.iter().any(|&line| is_in(line)) {
+        if !shown.source_map.objects.iter().any(|&line| is_in(line)) {
             return None;
         }
         let scene = self.sound_scene(project)?;
         let view = View { scene: &scene, boxes: shown.boxes() };
-        view.outline(|object| shown.stage.line_of(object).is_some_and(&is_in)).ok()
+        view.outline(|object| shown.source_map.line_of(object).is_some_and(&is_in)).ok()
     }
 
-    /// What is under the pointer now, and its outline, if that is something else than before.
-    pub(super) fn hover(&mut self, project: &Project, x: f64, y: f64, tell: &mut Tell) {
+    /// Adds the line under the pointer to the reply, and its outline if that has changed.
+    pub(super) fn hover(&mut self, project: &Project, x: f64, y: f64, tell: &mut ServerMessage) {
         let line = self.pick(project, x, y).map(|(line, _)| line);
         tell.hovered = Some(line);
         if line != self.hovered {
@@ -147,7 +146,7 @@ impl Session {
         }
     }
 
-    pub(super) fn outline(&self, project: &Project, tell: &mut Tell) {
+    pub(super) fn outline(&self, project: &Project, tell: &mut ServerMessage) {
         let chosen = self.chosen();
         let path = self.outline_of(project, |line| chosen.contains(&line));
         tell.outline = Some(path.unwrap_or_default());
@@ -168,22 +167,22 @@ impl Session {
         self.free = Some(orbit);
     }
 
-    /// A free camera where one looks from now.
+    /// Returns the free camera, or one at the current view.
     pub(super) fn orbit(&self, project: &Project) -> Option<Orbit> {
         let scene = self.scene(project)?;
         Some(self.free.unwrap_or_else(|| Orbit::from_camera(&scene.camera, self.bounds(project))))
     }
 
-    pub(super) fn look(&mut self, project: &Project, at: Standpoint) {
+    pub(super) fn look(&mut self, project: &Project, at: ViewPreset) {
         let bounds = self.bounds(project);
         let quarter = std::f64::consts::FRAC_PI_2;
         self.free = match at {
-            Standpoint::Script => None,
-            Standpoint::Free => self.orbit(project),
-            Standpoint::Front => Some(Orbit::at(bounds, 0.0, 0.0)),
-            Standpoint::Side => Some(Orbit::at(bounds, quarter, 0.0)),
-            Standpoint::Top => Some(Orbit::at(bounds, 0.0, quarter)),
-            Standpoint::Selection => {
+            ViewPreset::Script => None,
+            ViewPreset::Free => self.orbit(project),
+            ViewPreset::Front => Some(Orbit::at(bounds, 0.0, 0.0)),
+            ViewPreset::Side => Some(Orbit::at(bounds, quarter, 0.0)),
+            ViewPreset::Top => Some(Orbit::at(bounds, 0.0, quarter)),
+            ViewPreset::Selection => {
                 let what = self.selected_bounds(project).unwrap_or(bounds);
                 let from = self.orbit(project);
                 from.map(|from| Orbit { half_fov: from.half_fov, ..Orbit::at(what, from.yaw, from.pitch) })
@@ -191,7 +190,7 @@ impl Session {
         };
     }
 
-    /// Looks from here at what is seen there, if that is something.
+    /// Turns the camera to the object under a point, if there is one.
     pub(super) fn aim(&mut self, project: &Project, at: Option<DVec2>) {
         let target = at.and_then(|at| self.pick(project, at.x, at.y)).map(|(_, point)| point);
         self.free = self.orbit(project).map(|orbit| match target {
@@ -200,20 +199,20 @@ impl Session {
         });
     }
 
-    pub(super) fn keep_camera(&mut self, project: &mut Project, tell: &mut Tell) -> Change {
+    pub(super) fn keep_camera(&mut self, project: &mut Project, tell: &mut ServerMessage) -> Change {
         let shown = self.shown(project);
         let Some(scene) = &shown.scene else { return Change::Nothing };
         let aspect = f64::from(scene.screen.width()) / f64::from(scene.screen.height());
         let Some(Ok(camera)) = self.free.map(|orbit| orbit.camera(aspect)) else { return Change::Nothing };
-        let stage = &shown.stage;
+        let source_map = &shown.source_map;
         let lines = self.file_lines(project);
         let numbers = camera_numbers(&camera, self.step(project));
-        let old = stage.camera.filter(|&at| lines[at].command() == Some(Command::Camera));
+        let old = source_map.camera.filter(|&at| lines[at].command() == Some(Command::Camera));
         let splice = match old {
             Some(at) => lines[at].with_numbers(0, &numbers).map(|line| edits::set(at, line)),
             None => {
                 let line = Line::new(Command::Camera.name()).with_numbers(0, &numbers);
-                let at = stage.camera.or(stage.screen).map_or(0, |at| at + 1);
+                let at = source_map.camera.or(source_map.screen).map_or(0, |at| at + 1);
                 line.map(|line| Splice { at, removed: 0, inserted: vec![line] })
             }
         };
@@ -223,19 +222,19 @@ impl Session {
     }
 }
 
-/// A scene of another frame as it is seen now.
+/// Returns the scene of another frame with the current camera and screen.
 pub(super) fn picture_of(scene: Scene, now: &Scene) -> Scene {
     Scene { screen: now.screen, camera: now.camera, ..scene }
 }
 
-/// A size of a picture, smaller than asked for where that is too large.
+/// Returns a screen of this size, or a smaller one if it would be too large.
 fn fitted(width: f64, height: f64) -> Option<Screen> {
     let scale = (PIXELS as f64 / (width * height)).sqrt().min(1.0);
     let side = |side: f64| (side * scale).round().max(1.0) as u32;
     Screen::new(side(width), side(height)).ok()
 }
 
-/// The numbers of `Camera`, rounded to what can be seen.
+/// Returns the numbers of `Camera`, rounded to a visible precision.
 fn camera_numbers(camera: &Pinhole, step: f64) -> Vec<f64> {
     let decimals = |step: f64| (-step.log10()).ceil().clamp(0.0, 12.0) as usize;
     let round = |x: f64, decimals: usize| format!("{x:.decimals$}").parse().unwrap_or(x);
@@ -251,7 +250,7 @@ fn camera_numbers(camera: &Pinhole, step: f64) -> Vec<f64> {
     numbers
 }
 
-/// Lines on the height 0 around a scene, and the horizon.
+/// Returns grid lines on the height 0 around a scene, and the horizon.
 pub(super) fn grid_path(projection: &Projection, bounds: Bounds) -> String {
     let step = 10f64.powf((bounds.radius() / 4.0).log10().round());
     let reach = step * f64::from(GRID);
@@ -261,7 +260,7 @@ pub(super) fn grid_path(projection: &Projection, bounds: Bounds) -> String {
     for line in -GRID..=GRID {
         let off = step * f64::from(line);
         for flip in [false, true] {
-            // In pieces: one that goes behind the eye is left out.
+            // In pieces: one that reaches behind the eye is left out.
             for piece in -GRID..GRID {
                 let (from, to) = (step * f64::from(piece), step * f64::from(piece + 1));
                 let ends = if flip { (at(off, from), at(off, to)) } else { (at(from, off), at(to, off)) };

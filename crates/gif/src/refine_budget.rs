@@ -1,12 +1,12 @@
-//! How many of the pixels that stay may be drawn anew.
+//! The budget for redrawing static pixels.
 //!
-//! A pixel that keeps its colour from frame to frame may be seen a little wrong, and a later palette may have a better
-//! colour for it. To draw it again makes the picture better, but also makes it flicker. So there is an allowance, of pixels
-//! and of visible difference. It grows with each frame, by more if more of the frame changes. The tiles with the largest
-//! error are drawn first.
+//! A pixel that keeps its colour from frame to frame may be seen slightly wrong, and a later palette may have a
+//! better colour for it. Redrawing it makes the picture better, but also makes it flicker. So there is a budget, of
+//! pixels and of visible difference. It grows with each frame, and by more if more of the frame changes. The tiles
+//! with the largest error are redrawn first.
 //!
-//! A frame is prepared before the previous one has been drawn, that is, before it is known how much that one used. So a
-//! frame gets a [`Loan`], and pays back what it did not use.
+//! A frame is prepared before the previous one has been drawn, hence before it is known how much that one used. So a
+//! frame reserves a part of the budget with a [`Reservation`], and returns what it did not use.
 
 use std::io;
 
@@ -14,34 +14,34 @@ use crate::colour;
 use crate::error::Error;
 use crate::state::{StateReader, StateWriter, damaged};
 
-/// An amount of allowance, relative to the pixels that stay: what part of them, and what CIE 1976 difference in the mean of
-/// all of them.
-struct Grant {
+/// An amount of the budget, relative to the static pixels: a share of them, and the CIE 1976 difference in the mean
+/// over all of them.
+struct BudgetShare {
     pixels: f64,
     difference: f64,
 }
-/// At the start. With what comes later, the mean difference stays below 0.05 over the first 11 frames.
-const AT_FIRST: Grant = Grant { pixels: 0.1, difference: 0.13 };
-/// Added with each frame of which a fair part changes.
-const EACH_FRAME: Grant = Grant { pixels: 0.2, difference: 0.03 };
-/// A frame adds that in full if one of its pixels in so many changes, else proportionally less.
+/// The budget at the start. With the later additions, the mean difference stays below 0.05 over the first 11 frames.
+const AT_FIRST: BudgetShare = BudgetShare { pixels: 0.1, difference: 0.13 };
+/// The addition per frame if a fair part of it changes.
+const EACH_FRAME: BudgetShare = BudgetShare { pixels: 0.2, difference: 0.03 };
+/// A frame adds the full amount if at least one in this many of its pixels changes, else proportionally less.
 const FOR_CHANGES: f64 = 8.0;
-/// A loan may be so many times what is left: only a part of the pixels it allows is drawn, and only that is paid. One large
+/// A reservation may exceed the remaining budget by this factor, because only a part of it is used. One large
 /// improvement costs fewer bytes than many small ones.
 const AHEAD: f64 = 4.0;
-/// If fewer than one pixel in so many stay, none is drawn anew: they stay by chance, as in noise, or not for long.
+/// No pixel is redrawn if fewer than one in this many are static: those stay by chance, as in noise, or not for long.
 const FEW_STAY: f64 = 16.0;
-/// The part of a loan that is taken off until it is known what was drawn.
+/// The part of a reservation that is subtracted until it is known what was drawn.
 const LENT: f64 = 0.5;
-/// Errors are counted in steps, 2 to this power for each doubling.
+/// Errors are counted in logarithmic steps: 2 to this power per doubling.
 const FINENESS: u32 = 3;
 const STEPS: usize = 128;
 
-/// Pixels that stay as they were in the frame before.
+/// Pixels with the same colour as in the frame before.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StaticPixels {
     pixels: u64,
-    /// How many are seen with an error of each step.
+    /// The number of pixels seen with an error of each step.
     errors: [u64; STEPS],
 }
 
@@ -55,7 +55,7 @@ impl StaticPixels {
         self.pixels += pixels as u64;
     }
 
-    /// Counts pixels to be refined, given their mean error.
+    /// Counts pixels that can be refined, given their mean error.
     pub(crate) fn count_wrong(&mut self, pixels: u64, error: f32) {
         self.pixels += pixels;
         self.errors[step(error)] += pixels;
@@ -70,7 +70,7 @@ impl StaticPixels {
     }
 }
 
-/// Pixels that stay and were drawn anew.
+/// Static pixels that were redrawn.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Redrawn {
     pixels: u64,
@@ -78,23 +78,24 @@ pub(crate) struct Redrawn {
 }
 
 impl Redrawn {
-    /// Counts one whose colour changed by a squared error, of which `levels` is the part of the sRGB levels.
+    /// Counts a pixel whose colour changed by a squared error. `levels` is the part of the error
+    /// from the sRGB levels.
     pub(crate) fn count(&mut self, error: f32, levels: u32) {
         self.pixels += 1;
         self.difference += difference(error - levels as f32);
     }
 }
 
-/// What is left of it.
+/// The budget that is left.
 #[derive(Debug)]
-pub(crate) struct Allowance {
+pub(crate) struct RefineBudget {
     share: f64,
     difference: f64,
-    /// How many frames in a row refined nothing outside of what changed, plus one.
+    /// The number of frames in a row that refined nothing outside of the changed area, plus one.
     pub(crate) waited: usize,
 }
 
-impl Allowance {
+impl RefineBudget {
     pub(crate) fn new() -> Self {
         Self { share: AT_FIRST.pixels, difference: AT_FIRST.difference, waited: 1 }
     }
@@ -107,8 +108,7 @@ impl Allowance {
 
     pub(crate) fn read(state: &mut StateReader<'_>) -> Result<Self, Error> {
         let (share, difference, waited) = (state.f64()?, state.f64()?, state.u64()?);
-        let waited =
-            u32::try_from(waited).map_err(|_| damaged("it has waited for longer than there can be"))?;
+        let waited = u32::try_from(waited).map_err(|_| damaged("it has waited for too many frames"))?;
         Ok(Self { share, difference, waited: waited as usize })
     }
 
@@ -116,11 +116,12 @@ impl Allowance {
         self.share > 0.01 && self.difference > 0.01
     }
 
-    /// Lends what the next frame may use, before the previous one has paid. `of`: pixels of the whole frame.
-    pub(crate) fn lend(&mut self, still: &StaticPixels, of: usize) -> Loan {
+    /// Reserves a part of the budget for the next frame, before the previous one has committed. `of`: the pixels
+    /// of the whole frame.
+    pub(crate) fn reserve(&mut self, still: &StaticPixels, of: usize) -> Reservation {
         let pixels = still.pixels as f64;
         if pixels * FEW_STAY < of as f64 {
-            return Loan { pixels, share: 0.0, difference: 0.0, least_error: f32::INFINITY };
+            return Reservation { pixels, share: 0.0, difference: 0.0, least_error: f32::INFINITY };
         }
         let most = [self.share * pixels * AHEAD, self.difference * pixels * AHEAD];
         let (mut asked, mut least_error) = ([0.0; 2], 0.0);
@@ -136,41 +137,41 @@ impl Allowance {
         let [share, difference] = asked.map(|sum| LENT * sum / pixels.max(1.0));
         self.share -= share;
         self.difference -= difference;
-        Loan { pixels, share, difference, least_error }
+        Reservation { pixels, share, difference, least_error }
     }
 
-    /// Takes back a loan of which nothing is used.
-    pub(crate) fn give_back(&mut self, loan: &Loan) {
-        self.share += loan.share;
-        self.difference += loan.difference;
+    /// Releases a reservation of which nothing was used.
+    pub(crate) fn release(&mut self, reservation: &Reservation) {
+        self.share += reservation.share;
+        self.difference += reservation.difference;
     }
 
-    /// Takes back what was not used of a loan, and adds what a frame of which a part `changed` adds.
-    pub(crate) fn pay(&mut self, loan: &Loan, redrawn: &[Redrawn], changed: f64) {
-        if loan.least_error == f32::INFINITY {
+    /// Returns the unused part of a reservation, and adds the growth of a frame of which the part `changed` changed.
+    pub(crate) fn commit(&mut self, reservation: &Reservation, redrawn: &[Redrawn], changed: f64) {
+        if reservation.least_error == f32::INFINITY {
             return;
         }
         let more = (changed * FOR_CHANGES).min(1.0);
-        let pixels = loan.pixels.max(1.0);
-        self.share += EACH_FRAME.pixels * more + loan.share
+        let pixels = reservation.pixels.max(1.0);
+        self.share += EACH_FRAME.pixels * more + reservation.share
             - redrawn.iter().map(|r| r.pixels).sum::<u64>() as f64 / pixels;
-        self.difference += EACH_FRAME.difference * more + loan.difference
+        self.difference += EACH_FRAME.difference * more + reservation.difference
             - redrawn.iter().map(|r| r.difference).sum::<f64>() / pixels;
     }
 }
 
-/// What a frame may use of the allowance.
+/// The part of the budget that a frame may use.
 #[derive(Debug)]
-pub(crate) struct Loan {
-    /// How many stay.
+pub(crate) struct Reservation {
+    /// The number of static pixels.
     pixels: f64,
     share: f64,
     difference: f64,
-    /// The error from which a tile's pixels that stay may be drawn anew.
+    /// The least error at which the static pixels of a tile may be redrawn.
     pub(crate) least_error: f32,
 }
 
-impl Loan {
+impl Reservation {
     pub(crate) fn write(&self, state: &mut StateWriter) -> io::Result<()> {
         state.f64(self.pixels)?;
         state.f64(self.share)?;
@@ -184,23 +185,23 @@ impl Loan {
     }
 }
 
-/// The CIE 1976 difference of a squared error of which L\*a\*b\* makes up half.
+/// Returns the CIE 1976 difference for a squared error of which L\*a\*b\* makes up half.
 fn visible(error: f32) -> f64 {
     difference(error / 2.0)
 }
 
-/// The CIE 1976 difference of the part of a squared error that L\*a\*b\* makes up.
+/// Returns the CIE 1976 difference for the part of a squared error that is due to L\*a\*b\*.
 fn difference(lab: f32) -> f64 {
     f64::from((lab.max(0.0) / (colour::LAB_WEIGHT * colour::LAB_WEIGHT)).sqrt())
 }
 
-/// Errors from 1 up in steps of equal ratio: the exponent and the first bits of the number.
+/// Returns the step of an error from 1 up. Steps have equal ratios: the exponent and the first bits of the number.
 fn step(error: f32) -> usize {
     let first = 1.0_f32.to_bits() >> (23 - FINENESS);
     ((error.to_bits() >> (23 - FINENESS)).saturating_sub(first) as usize).min(STEPS - 1)
 }
 
-/// The least error of a step.
+/// Returns the least error of a step.
 fn from(step: usize) -> f32 {
     f32::from_bits(1.0_f32.to_bits() + ((step as u32) << (23 - FINENESS)))
 }
@@ -221,7 +222,7 @@ mod tests {
     fn the_largest_errors_come_first_and_no_more_than_allowed() {
         let mut still = StaticPixels::none();
         (0..1_000).for_each(|k| still.count_wrong(1, 2.0 + k as f32 * 0.01));
-        let least = Allowance::new().lend(&still, still.pixels as usize).least_error;
+        let least = RefineBudget::new().reserve(&still, still.pixels as usize).least_error;
         let drawn = (0..1_000).filter(|&k| 2.0 + k as f32 * 0.01 >= least).count();
         let most = 1_000.0 * AHEAD * AT_FIRST.pixels;
         assert!((100..=most as usize).contains(&drawn), "{drawn} of 1000 from {least}");
@@ -229,28 +230,28 @@ mod tests {
 
     #[test]
     fn in_the_long_run_no_more_is_drawn_than_granted() {
-        let mut allowance = Allowance::new();
+        let mut budget = RefineBudget::new();
         let (frames, mut sum) = (200, 0.0);
-        let mut unpaid: Option<(Loan, Redrawn)> = None;
+        let mut uncommitted: Option<(Reservation, Redrawn)> = None;
         for frame in 0..frames {
             let errors = (0..1_000_u32).map(|k| 2.0 + (k * 37 + frame * 101) as f32 % 97.0);
             let mut still = StaticPixels::none();
-            if allowance.is_left() {
+            if budget.is_left() {
                 errors.clone().for_each(|error| still.count_wrong(1, error));
             } else {
                 still.count(1_000);
             }
-            let loan = allowance.lend(&still, still.pixels as usize);
+            let reservation = budget.reserve(&still, still.pixels as usize);
             let mut redrawn = Redrawn::default();
             if still.errors.iter().any(|&count| count > 0) {
                 errors
-                    .filter(|&error| error >= loan.least_error)
+                    .filter(|&error| error >= reservation.least_error)
                     .for_each(|error| redrawn.count(error, error as u32 / 2));
             }
             sum += redrawn.difference / 1_000.0;
-            // As a frame pays only when the next one has its loan.
-            if let Some((loan, redrawn)) = unpaid.replace((loan, redrawn)) {
-                allowance.pay(&loan, &[redrawn], 1.0);
+            // As in the encoder: a frame commits after the next one has reserved.
+            if let Some((reservation, redrawn)) = uncommitted.replace((reservation, redrawn)) {
+                budget.commit(&reservation, &[redrawn], 1.0);
             }
         }
         let granted = AT_FIRST.difference * AHEAD + EACH_FRAME.difference * f64::from(frames);
@@ -261,36 +262,36 @@ mod tests {
     fn what_is_used_up_comes_back_slowly() {
         let mut still = StaticPixels::none();
         (0..100).for_each(|_| still.count_wrong(1, 50.0));
-        let mut allowance = Allowance::new();
+        let mut budget = RefineBudget::new();
         let mut all = Redrawn::default();
         (0..100).for_each(|_| all.count(50.0, 25));
-        let loan = allowance.lend(&still, still.pixels as usize);
-        allowance.pay(&loan, &[all], 1.0);
-        assert!(allowance.lend(&still, still.pixels as usize).least_error > 50.0);
+        let reservation = budget.reserve(&still, still.pixels as usize);
+        budget.commit(&reservation, &[all], 1.0);
+        assert!(budget.reserve(&still, still.pixels as usize).least_error > 50.0);
     }
 
     #[test]
     fn where_few_stay_nothing_is_drawn_anew() {
         let mut still = StaticPixels::none();
         (0..100).for_each(|k| still.count_wrong(1, if k < 20 { 50.0 } else { 3.0 }));
-        let mut allowance = Allowance::new();
-        let loan = allowance.lend(&still, 10_000);
-        assert!(loan.least_error > from(STEPS));
-        allowance.pay(&loan, &[], 1.0);
-        assert_eq!((allowance.share, allowance.difference), (AT_FIRST.pixels, AT_FIRST.difference));
-        assert!(allowance.lend(&still, 1_000).least_error <= 50.0);
+        let mut budget = RefineBudget::new();
+        let reservation = budget.reserve(&still, 10_000);
+        assert!(reservation.least_error > from(STEPS));
+        budget.commit(&reservation, &[], 1.0);
+        assert_eq!((budget.share, budget.difference), (AT_FIRST.pixels, AT_FIRST.difference));
+        assert!(budget.reserve(&still, 1_000).least_error <= 50.0);
     }
 
     #[test]
     fn what_was_not_used_comes_back_at_once() {
         let mut still = StaticPixels::none();
         (0..100).for_each(|k| still.count_wrong(1, if k < 20 { 50.0 } else { 3.0 }));
-        let mut allowance = Allowance::new();
-        let first = allowance.lend(&still, still.pixels as usize);
-        let meanwhile = allowance.lend(&still, still.pixels as usize);
-        allowance.pay(&first, &[], 0.0);
-        allowance.pay(&meanwhile, &[], 0.0);
-        let later = allowance.lend(&still, still.pixels as usize);
+        let mut budget = RefineBudget::new();
+        let first = budget.reserve(&still, still.pixels as usize);
+        let meanwhile = budget.reserve(&still, still.pixels as usize);
+        budget.commit(&first, &[], 0.0);
+        budget.commit(&meanwhile, &[], 0.0);
+        let later = budget.reserve(&still, still.pixels as usize);
         assert!(meanwhile.least_error > first.least_error);
         assert_eq!(later.least_error, first.least_error);
     }

@@ -1,7 +1,7 @@
-//! What stands before S3's protocol: each request gets an id and is told where it came from, what asks for more than there
-//! is is refused (`gate`), browsers' questions are answered (`cors`), and every answer names the id and the time.
+//! The service of a connection, which wraps S3's protocol. Each request gets an id and its origin. `gate` refuses
+//! requests for unsupported features, and `cors` answers preflights. Every response carries the id and the time.
 //!
-//! A panic is answered, too: bytes from strangers pass through code that is not ours.
+//! A panic is answered, too, because the bytes of unknown clients pass through third-party code.
 
 use std::net::IpAddr;
 use std::panic::AssertUnwindSafe;
@@ -28,34 +28,34 @@ use crate::{cors, limits, replies};
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-amz-request-id");
 
-/// How long, and how much of, a refused body is read.
+/// The time and the number of bytes for which a refused body is still read.
 const DRAIN: Duration = Duration::from_secs(1);
-const MOST_DRAINED: usize = 1024 * 1024;
+const MAX_DRAINED: usize = 1024 * 1024;
 
 static NEXT: AtomicU64 = AtomicU64::new(1);
 
-/// Where a request came from.
+/// The origin of a request.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Origin {
-    /// The client's address.
+    /// The IP address of the client.
     pub(crate) source: String,
-    /// The request's id.
+    /// The id of the request.
     pub(crate) request: String,
 }
 
-/// The rules of a bucket, by its name.
+/// A function that returns the CORS rules of a bucket, given its name.
 pub(crate) type Rules = Arc<dyn Fn(&str) -> Vec<CorsRule> + Send + Sync>;
 
 /// The service of one connection.
 #[derive(Clone)]
-pub(crate) struct Front {
+pub(crate) struct ConnectionService {
     pub(crate) service: S3Service,
-    /// Asked for a bucket's rules for pages of other sites.
+    /// Returns a bucket's rules for pages of other sites.
     pub(crate) rules: Rules,
     pub(crate) peer: IpAddr,
 }
 
-impl Service<Request<Incoming>> for Front {
+impl Service<Request<Incoming>> for ConnectionService {
     type Response = Response<Body>;
     type Error = HttpError;
     type Future = std::pin::Pin<Box<dyn Future<Output = Result<Self::Response, Self::Error>> + Send>>;
@@ -64,7 +64,7 @@ impl Service<Request<Incoming>> for Front {
         let id = format!("{:016X}", NEXT.fetch_add(1, Ordering::Relaxed));
         let header = HeaderValue::from_str(&id);
         request.extensions_mut().insert(Origin { source: self.peer.to_string(), request: id });
-        // A client that waits to be told to send its body may take the connection for used up by a refusal, or not.
+        // A client that sent `Expect` may or may not keep the connection after a refusal.
         let waits = request.headers().contains_key(EXPECT);
         let this = self.clone();
         Box::pin(async move {
@@ -79,7 +79,7 @@ impl Service<Request<Incoming>> for Front {
             if let Ok(header) = header {
                 response.headers_mut().insert(REQUEST_ID, header);
             }
-            // Hyper's own stands still when the clock is set back, and clients set theirs by it to sign.
+            // Hyper's own date stops if the clock is set back, and clients set theirs by it to sign.
             if let Some(now) = date(SystemTime::now()) {
                 response.headers_mut().insert(DATE, now);
             }
@@ -88,8 +88,8 @@ impl Service<Request<Incoming>> for Front {
     }
 }
 
-impl Front {
-    /// The answer of S3's protocol, or of what stands before it.
+impl ConnectionService {
+    /// Returns the response of S3's protocol, or of a check before it.
     async fn answer(&self, mut request: Request<Body>) -> Result<Response<Body>, HttpError> {
         if is_for_sts(request.method(), request.uri(), request.headers()) {
             return in_sts_shape(self.service.call(request).await?).await;
@@ -128,26 +128,26 @@ impl Front {
         Ok(response)
     }
 
-    /// A bucket's rules for pages of other sites.
+    /// Returns a bucket's rules for pages of other sites.
     fn rules(&self, bucket: Option<String>) -> Vec<CorsRule> {
         bucket.map(|name| (self.rules)(&name)).unwrap_or_default()
     }
 }
 
-/// An error as an answer.
+/// Turns an error into a response.
 fn refusal(error: S3Error) -> Result<Response<Body>, HttpError> {
     error.to_http_response().map_err(|error| HttpError::new(Box::new(error)))
 }
 
-/// Reads a short body that nobody wants, so that its sender comes to read the answer.
+/// Reads a short body and discards it, so that its sender gets to read the response.
 async fn drain(request: Request<Body>) {
     if !request.headers().contains_key(EXPECT) {
         let _ =
-            timeout(DRAIN, http_body_util::Limited::new(request.into_body(), MOST_DRAINED).collect()).await;
+            timeout(DRAIN, http_body_util::Limited::new(request.into_body(), MAX_DRAINED).collect()).await;
     }
 }
 
-/// As a header has it.
+/// Formats a time for a header.
 fn date(time: SystemTime) -> Option<HeaderValue> {
     let mut text = Vec::new();
     Timestamp::from(time).format(TimestampFormat::HttpDate, &mut text).ok()?;

@@ -1,7 +1,7 @@
-//! Which lines of a script a frame is made of: the line of each object that the tracer numbers, of the lights, and of
-//! what is set.
+//! The map from a frame to lines of its script: the line of each of the tracer's objects, of the lights,
+//! and of the settings.
 //!
-//! A group that is used is as many objects of the tracer as it draws, and one line: that of its `Use`.
+//! A used group is as many of the tracer's objects as it draws, but one line: that of its `Use`.
 
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
@@ -12,68 +12,68 @@ use crate::line::Line;
 use crate::tables::{Role, role};
 use crate::values::Values;
 
-/// The number of a `Use` that scales; 0 hides what it draws.
+/// The index of the scale of a `Use`; the scale 0 hides the group.
 const SCALE: usize = 6;
 
 /// The lines of a frame, from 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Stage {
-    /// Those of its objects and of the groups that it uses, in the tracer's order.
+pub(crate) struct SourceMap {
+    /// The lines of its objects and of the groups that it uses, in the tracer's order.
     pub(crate) objects: Vec<usize>,
-    /// How many objects of the tracer there are up to each of these lines, and with it.
+    /// For each of these lines, the number of the tracer's objects up to and including it.
     drawn: Vec<usize>,
-    /// Those of its lights.
+    /// The lines of its lights.
     pub(crate) lights: Vec<usize>,
-    /// That of its camera; none where there is only the camera that holds until one is set.
+    /// The line of its camera; `None` if it has the default camera.
     pub(crate) camera: Option<usize>,
-    /// That of its size.
+    /// The line of its size.
     pub(crate) screen: Option<usize>,
-    /// That of its background.
+    /// The line of its background.
     pub(crate) background: Option<usize>,
-    /// That of the `Clear` that it begins with.
+    /// The line of the `Clear` with which it begins.
     cleared: Option<usize>,
-    /// That of its numbers of frames.
+    /// The line of its frame numbers.
     pub(crate) frames: Option<usize>,
-    /// That of its `Trace`; where it is missing new lines go to the end.
+    /// The line of its `Trace`. If it is missing, new lines go to the end.
     pub(crate) trace: Option<usize>,
-    /// From `Group` to `End`, up to its `Trace`.
+    /// The groups up to its `Trace`, each from `Group` to `End`.
     groups: Vec<RangeInclusive<usize>>,
 }
 
-/// Groups as they are read.
+/// The groups read so far.
 #[derive(Default)]
 struct Groups {
-    /// How many objects each draws.
+    /// The number of objects that each group draws.
     drawn: HashMap<String, usize>,
     open: Option<(usize, String, usize)>,
 }
 
-impl Stage {
-    /// The lines of frame `frame` of a script, counted from 0, as it is at a time. Beyond the last `Trace`: what stands at the
-    /// end.
+impl SourceMap {
+    /// Makes the map of frame `frame` of a script, counted from 0, at a time. Beyond the last `Trace` it is the
+    /// state at the end.
     pub(crate) fn of(lines: &[Line], frame: usize, time: f64) -> Self {
-        let mut stage = Self::default();
+        let mut source_map = Self::default();
         let mut groups = Groups::default();
         let (mut before, mut count) = (0usize, 1usize);
         for (number, line) in lines.iter().enumerate() {
             let Some(command) = line.command() else { continue };
             match (command, role(command)) {
                 (Command::Clear, _) => {
-                    stage.objects.clear();
-                    stage.drawn.clear();
-                    stage.lights.clear();
-                    stage.background = None;
-                    stage.cleared = Some(number);
+                    source_map.objects.clear();
+                    source_map.drawn.clear();
+                    source_map.lights.clear();
+                    source_map.background = None;
+                    source_map.cleared = Some(number);
                 }
                 (Command::Trace, _) => {
                     if frame < before.saturating_add(count) {
-                        stage.trace = Some(number);
+                        source_map.trace = Some(number);
                         break;
                     }
                     before += count;
                 }
                 (Command::Frames, _) => {
-                    stage.frames = Some(number);
+                    source_map.frames = Some(number);
                     count = frames(line).unwrap_or(1);
                 }
                 (Command::Group, _) => {
@@ -82,26 +82,26 @@ impl Stage {
                 (Command::End, _) => {
                     if let Some((start, name, drawn)) = groups.open.take() {
                         groups.drawn.insert(name, drawn);
-                        stage.groups.push(start..=number);
+                        source_map.groups.push(start..=number);
                     }
                 }
                 (Command::Use, _) => {
                     let hides = Values::of(line, time).and_then(|values| values.number(SCALE)) == Some(0.0);
                     let drawn = line.subject().and_then(|name| groups.drawn.get(name)).copied().unwrap_or(0);
-                    stage.draw(&mut groups, number, if hides { 0 } else { drawn });
+                    source_map.draw(&mut groups, number, if hides { 0 } else { drawn });
                 }
-                (Command::Screen, _) => stage.screen = Some(number),
-                (Command::Background, _) => stage.background = Some(number),
-                (_, Role::Object) => stage.draw(&mut groups, number, 1),
-                (_, Role::Light) => stage.lights.push(number),
-                (_, Role::Camera) => stage.camera = Some(number),
+                (Command::Screen, _) => source_map.screen = Some(number),
+                (Command::Background, _) => source_map.background = Some(number),
+                (_, Role::Object) => source_map.draw(&mut groups, number, 1),
+                (_, Role::Light) => source_map.lights.push(number),
+                (_, Role::Camera) => source_map.camera = Some(number),
                 (_, Role::Use | Role::Material | Role::Group | Role::Setting) => {}
             }
         }
-        stage
+        source_map
     }
 
-    /// An object, or what a group draws, in the group that is open or in the picture.
+    /// Adds an object or a used group, to the open group or to the picture.
     fn draw(&mut self, groups: &mut Groups, line: usize, count: usize) {
         match &mut groups.open {
             Some((_, _, drawn)) => *drawn = drawn.saturating_add(count),
@@ -112,23 +112,23 @@ impl Stage {
         }
     }
 
-    /// How many objects the tracer has.
+    /// Returns the number of the tracer's objects.
     pub(crate) fn object_count(&self) -> usize {
         self.drawn.last().copied().unwrap_or(0)
     }
 
-    /// The line of an object of the tracer.
+    /// Returns the line of one of the tracer's objects.
     pub(crate) fn line_of(&self, object: usize) -> Option<usize> {
         self.objects.get(self.drawn.partition_point(|&end| end <= object)).copied()
     }
 
-    /// Whether a line stands in the definition of a group.
+    /// Returns whether a line is in the definition of a group.
     pub(crate) fn is_in_group(&self, line: usize) -> bool {
         let at = self.groups.partition_point(|group| *group.end() < line);
         self.groups.get(at).is_some_and(|group| group.contains(&line))
     }
 
-    /// Where a new object or light of this frame goes: behind what it has, in front of its `Trace`.
+    /// Returns the line for a new object or light of this frame: after its existing ones and before its `Trace`.
     pub(crate) fn end(&self, lines: &[Line]) -> usize {
         let groups = self.groups.last().map(|group| group.end());
         let set = self.camera.iter().chain(&self.screen).chain(&self.background).chain(&self.cleared);
@@ -141,7 +141,7 @@ impl Stage {
     }
 }
 
-/// How many frames a `Trace` is behind a `Frames`.
+/// Returns the number of frames of a `Trace` after a `Frames` line.
 fn frames(line: &Line) -> Option<usize> {
     let values = Values::of(line, 1.0)?;
     let whole =
@@ -166,18 +166,18 @@ mod tests {
         let script = rayfold_scene::parse("a", text.as_bytes(), &Default::default()).script.unwrap();
         let expected: [&[usize]; 4] = [&[1], &[1, 5], &[9], &[9]];
         for (frame, objects) in expected.into_iter().enumerate() {
-            let stage = Stage::of(&lines, frame, 1.0);
-            assert_eq!(stage.objects, objects);
+            let source_map = SourceMap::of(&lines, frame, 1.0);
+            assert_eq!(source_map.objects, objects);
             assert_eq!(script.frame(frame).unwrap().objects.len(), objects.len());
         }
-        let last = Stage::of(&lines, 3, 1.0);
+        let last = SourceMap::of(&lines, 3, 1.0);
         assert_eq!(
             (last.camera, last.screen, last.lights.len(), last.trace),
             (Some(8), Some(0), 0, Some(11))
         );
         assert_eq!(last.end(&lines), 10);
         let lines = Line::split(b"Screen 2 2\nTrace\nClear\nTrace");
-        assert_eq!(Stage::of(&lines, 1, 1.0).end(&lines), 3, "what stands before a `Clear` is gone");
+        assert_eq!(SourceMap::of(&lines, 1, 1.0).end(&lines), 3, "what stands before a `Clear` is gone");
     }
 
     #[test]
@@ -190,16 +190,17 @@ mod tests {
         assert_eq!(script.frame_count(), 7);
         for frame in 0..7 {
             let time = script.frame_number(frame).unwrap();
-            let stage = Stage::of(&lines, frame, time);
-            assert_eq!(stage.object_count(), script.frame(frame).unwrap().objects.len(), "{frame}");
-            assert_eq!(stage.trace, Some(if frame < 3 { 14 } else { 17 }));
-            assert_eq!(stage.frames, Some(if frame < 3 { 13 } else { 15 }));
+            let source_map = SourceMap::of(&lines, frame, time);
+            assert_eq!(source_map.object_count(), script.frame(frame).unwrap().objects.len(), "{frame}");
+            assert_eq!(source_map.trace, Some(if frame < 3 { 14 } else { 17 }));
+            assert_eq!(source_map.frames, Some(if frame < 3 { 13 } else { 15 }));
         }
-        let stage = Stage::of(&lines, 0, 1.0);
-        let seen: Vec<_> = (0..stage.object_count()).map(|object| stage.line_of(object).unwrap()).collect();
+        let source_map = SourceMap::of(&lines, 0, 1.0);
+        let seen: Vec<_> =
+            (0..source_map.object_count()).map(|object| source_map.line_of(object).unwrap()).collect();
         assert_eq!(seen, [10, 11, 11, 11, 12, 12]);
-        assert_eq!(stage.line_of(6), None);
-        let inside: Vec<_> = (0..lines.len()).filter(|&line| stage.is_in_group(line)).collect();
+        assert_eq!(source_map.line_of(6), None);
+        let inside: Vec<_> = (0..lines.len()).filter(|&line| source_map.is_in_group(line)).collect();
         assert_eq!(inside, (1..10).collect::<Vec<_>>());
     }
 }

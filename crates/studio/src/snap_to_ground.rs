@@ -1,6 +1,7 @@
-//! Objects onto the ground, and onto what is below them.
+//! Dropping objects onto the ground, and onto the objects below them.
 //!
-//! Where an object ends the tracer says: rays from below find its underside, rays from there what it would meet.
+//! The tracer finds the surfaces: rays from below find the underside of an object, and rays from there
+//! the surface below it.
 
 use glam::DVec3;
 use rayfold_scene::{Object, Scene};
@@ -11,28 +12,29 @@ use crate::document::Splice;
 use crate::edits::{moved, set};
 use crate::extent::{bounds, reach};
 use crate::line::Line;
-use crate::stage::Stage;
+use crate::source_map::SourceMap;
 use crate::values::{Keying, tidy};
 
-/// Rays a side, odd so that the middle is looked at, too.
+/// The number of rays per side, odd so that the middle is tested, too.
 const SIDE: usize = 33;
 
-/// How often the neighbourhood of the place that is met first is looked at again, each time this much finer.
+/// The number of times that the area around the first contact is searched again, each time at a finer scale.
 const ROUNDS: usize = 4;
 const FINER: f64 = 8.0;
 
-/// How far above an underside rays begin, in sizes of the object, so that they meet what it lies on.
+/// The distance above an underside at which rays start, in sizes of the object, so that they hit
+/// a surface in contact.
 const LIFT: f64 = 1e-6;
 
-/// Objects fall together until one of them rests on what is below, or on the height 0 where nothing is.
+/// Drops objects together until one of them rests on an object below, or on the height 0 if there is none.
 pub(crate) fn drop_down(
     lines: &[Line],
-    stage: &Stage,
+    source_map: &SourceMap,
     scene: &Scene,
     which: &[usize],
     keying: Keying,
 ) -> Vec<Splice> {
-    let is_chosen = |object: usize| stage.line_of(object).is_some_and(|line| which.contains(&line));
+    let is_chosen = |object: usize| source_map.line_of(object).is_some_and(|line| which.contains(&line));
     let (own, others): (Vec<_>, Vec<_>) =
         scene.objects.iter().cloned().enumerate().partition(|(object, _)| is_chosen(*object));
     let plain = |objects: Vec<(usize, Object)>| objects.into_iter().map(|(_, object)| object).collect();
@@ -40,17 +42,17 @@ pub(crate) fn drop_down(
     down(lines, which, fall, keying)
 }
 
-/// Objects stand on the height 0 with their lowest point, each for itself.
+/// Moves each object so that its lowest point is at the height 0.
 pub(crate) fn to_ground(
     lines: &[Line],
-    stage: &Stage,
+    source_map: &SourceMap,
     scene: &Scene,
     which: &[usize],
     keying: Keying,
 ) -> Vec<Splice> {
     let mut splices = Vec::new();
     for &line in which {
-        let own = scene.objects.iter().enumerate().filter(|(at, _)| stage.line_of(*at) == Some(line));
+        let own = scene.objects.iter().enumerate().filter(|(at, _)| source_map.line_of(*at) == Some(line));
         let lowest = own.filter_map(|(_, object)| Some(-reach(object, DVec3::NEG_Y)?)).reduce(f64::min);
         splices.extend(lowest.map(|lowest| down(lines, &[line], lowest, keying)).unwrap_or_default());
     }
@@ -62,7 +64,7 @@ fn down(lines: &[Line], which: &[usize], by: f64, keying: Keying) -> Vec<Splice>
     chosen.filter_map(|(at, line)| Some(set(at, moved(line, DVec3::NEG_Y * tidy(by), keying)?))).collect()
 }
 
-/// How far some objects fall before they meet others or the height 0; less than 0 where they are below it.
+/// Returns the distance that objects fall until they touch others or the height 0. Negative if they are below it.
 fn fall(scene: &Scene, own: Vec<Object>, others: Vec<Object>) -> Option<f64> {
     let around = bounds(&own)?;
     let size = around.high - around.low;
@@ -71,7 +73,7 @@ fn fall(scene: &Scene, own: Vec<Object>, others: Vec<Object>) -> Option<f64> {
     below.objects = others.into();
     let mut middle = around.center();
     let mut half = 0.5 * size.max(DVec3::splat(1e-9 * size.length()));
-    // Where nothing is below.
+    // The distance if no object is below.
     let ground = around.low.y;
     let mut least: Option<f64> = None;
     for _ in 0..ROUNDS {
@@ -84,7 +86,7 @@ fn fall(scene: &Scene, own: Vec<Object>, others: Vec<Object>) -> Option<f64> {
     Some(least.unwrap_or(ground))
 }
 
-/// The least distance between undersides and what is below them, over a square, and where it is.
+/// Returns the smallest distance between undersides and the surfaces below them within a square, and its position.
 fn nearest(own: &Scene, below: &Scene, middle: DVec3, half: DVec3, low: f64) -> Option<(Option<f64>, DVec3)> {
     let step = |at: usize| at as f64 / ((SIDE - 1) as f64 / 2.0) - 1.0;
     let starts: Vec<DVec3> = (0..SIDE * SIDE)
@@ -116,14 +118,14 @@ mod tests {
 
     const STILL: Keying = Keying { time: 1.0, first: 1.0, auto: false, whole: false };
 
-    type Act = fn(&[Line], &Stage, &Scene, &[usize], Keying) -> Vec<Splice>;
+    type Act = fn(&[Line], &SourceMap, &Scene, &[usize], Keying) -> Vec<Splice>;
 
     fn after(text: &str, which: &[usize], act: Act) -> String {
         let lines = Line::split(text.as_bytes());
         let parsed = rayfold_scene::parse("a", text.as_bytes(), &Default::default());
         let scene = parsed.script.unwrap_or_else(|| panic!("{:?}", parsed.diagnostics)).frame(0).unwrap();
         let mut document = Document::new(text.as_bytes());
-        for splice in act(&lines, &Stage::of(&lines, 0, 1.0), &scene, which, STILL) {
+        for splice in act(&lines, &SourceMap::of(&lines, 0, 1.0), &scene, which, STILL) {
             document.apply(splice, None);
         }
         String::from_utf8(document.bytes()).unwrap()

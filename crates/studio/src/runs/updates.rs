@@ -1,4 +1,4 @@
-//! What the page is told of runs, made of manifests: values only.
+//! The data about runs for the page, computed from manifests. Contains values only.
 
 use rayfold_client::{Watch, obstacles};
 use rayfold_pipeline::Clock;
@@ -8,129 +8,129 @@ use rayfold_pipeline::store::Store;
 use rayfold_scene::Diagnostic;
 use serde::Serialize;
 
-use super::sending::SendingTell;
+use super::sending::UploadProgress;
 
-/// Faults that are told one by one.
+/// The largest number of errors that are listed.
 const FAULTS: usize = 100;
 
 /// A run in a list.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Summary {
-    /// Its name, which is its address.
+    /// The name of the run, which is its address.
     pub(super) run: String,
-    /// A word: that of the manifest, or why there is none.
+    /// A word: the status of the manifest, or the reason why there is none.
     pub(super) status: String,
-    /// Frames drawn.
+    /// The number of rendered frames.
     pub(super) done: u64,
-    /// Frames that cannot be drawn.
+    /// The number of frames that failed.
     pub(super) failed: u64,
-    /// Of so many.
+    /// The number of all frames.
     pub(super) total: u64,
     /// There are scripts that the functions have not seen.
     pub(super) behind: bool,
-    /// Nothing more will happen by itself.
+    /// Nothing more will happen unless a script changes.
     pub(super) settled: bool,
-    /// The GIF that there is.
-    pub(super) gif: Option<GifTell>,
+    /// The existing GIF, if there is one.
+    pub(super) gif: Option<GifInfo>,
 }
 
 /// A GIF in the bucket.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct GifTell {
-    /// Its size.
+pub(super) struct GifInfo {
+    /// The size of the file.
     pub(super) bytes: u64,
-    /// What it is, so that another is another address.
+    /// The version, so that another GIF has another address.
     pub(super) version: String,
-    /// It shows the newest scripts.
+    /// The GIF shows the newest scripts.
     pub(super) current: bool,
 }
 
-/// A run as a whole; of the frames only what has changed since the last time.
+/// An update of a run. Contains only the frames that changed since the last update.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct RunTell {
+pub(super) struct RunUpdate {
     #[serde(flatten)]
     pub(super) state: RunState,
-    /// All frames.
+    /// All frames, in the first update.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) frames: Option<Vec<FrameTell>>,
-    /// Frames that are other than they were, with their places from 0.
+    pub(super) frames: Option<Vec<FrameUpdate>>,
+    /// The changed frames with their indices from 0.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(super) changed: Vec<(usize, FrameTell)>,
+    pub(super) changed: Vec<(usize, FrameUpdate)>,
 }
 
-/// How a run stands, without its frames.
+/// The state of a run without its frames.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct RunState {
     #[serde(flatten)]
     pub(super) summary: Summary,
-    /// What keeps it from being done.
-    pub(super) faults: Vec<FaultTell>,
-    /// Faults that are not told.
+    /// The errors that keep it from being done.
+    pub(super) faults: Vec<FaultInfo>,
+    /// The number of errors that are not listed.
     pub(super) more_faults: usize,
-    /// How far its upload is, if this program sends it.
-    pub(super) sending: Option<SendingTell>,
-    /// Why nothing newer is known.
+    /// The progress of the upload, if this program uploads it.
+    pub(super) sending: Option<UploadProgress>,
+    /// The reason why nothing newer is known.
     pub(super) problem: Option<String>,
 }
 
-/// A frame.
+/// The state of a frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct FrameTell {
-    /// Its script.
+pub(super) struct FrameUpdate {
+    /// The name of its script.
     pub(super) script: ScriptName,
-    /// The script's version.
+    /// The version of the script.
     pub(super) version: String,
-    /// Which of the script's frames.
+    /// The number of the frame within the script.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) part: Part,
-    /// Where it stands.
-    pub(super) state: Stand,
-    /// The renderer's version, of one that is drawn.
+    /// The status of the frame.
+    pub(super) state: FrameStatus,
+    /// The pixel version of the renderer, if the frame is rendered.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) pixels: Option<u32>,
 }
 
-/// Where a frame stands.
+/// The status of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Stand {
-    /// It is awaited.
+pub(super) enum FrameStatus {
+    /// The frame is awaited.
     Pending,
-    /// It is drawn.
+    /// The frame is rendered.
     Done,
-    /// It cannot be drawn.
+    /// The frame cannot be rendered.
     Failed,
 }
 
-/// Something that keeps a run from being done.
+/// An error that keeps a run from being done.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct FaultTell {
-    /// What is faulty, for people.
+pub(super) struct FaultInfo {
+    /// The faulty object, for messages.
     pub(super) what: String,
-    /// Its script, if it is a frame.
+    /// The script, if the object is a frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) script: Option<ScriptName>,
-    /// Which of the script's frames.
+    /// The number of the frame within the script.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) part: Part,
-    /// Line and column from 1, where a line is at fault.
+    /// Line and column from 1, if a line has an error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) place: Option<(usize, usize)>,
-    /// What is wrong.
+    /// The description of the problem.
     pub(super) message: String,
-    /// What would be right.
+    /// The correction that would help.
     pub(super) help: String,
 }
 
-/// A run as it was seen last.
+/// Returns the summary of a run as of the last poll.
 pub(super) fn summary<S: Store, C: Clock>(watch: &Watch<'_, S, C>) -> Summary {
-    let gif = watch.gif().map(|gif| GifTell {
+    let gif = watch.gif().map(|gif| GifInfo {
         bytes: gif.size,
         version: gif.etag.to_string(),
         current: watch.is_current(),
@@ -149,19 +149,19 @@ pub(super) fn summary<S: Store, C: Clock>(watch: &Watch<'_, S, C>) -> Summary {
         let head = &manifest.head;
         summary.status = head.status.to_string();
         (summary.done, summary.failed) = (head.done, head.failed);
-        // Frames of scripts that have not been uploaded yet are awaited too.
+        // Frames of scripts that have not been uploaded yet are awaited, too.
         summary.total = head.total + head.missing() - head.pending;
     }
     summary
 }
 
-/// Everything that keeps it from being done, as far as it is told, and how much is not.
-pub(super) fn faults(manifest: &Manifest) -> (Vec<FaultTell>, usize) {
-    let mut all: Vec<FaultTell> = manifest
+/// Returns the listed errors that keep a run from being done, and the number of the others.
+pub(super) fn faults(manifest: &Manifest) -> (Vec<FaultInfo>, usize) {
+    let mut all: Vec<FaultInfo> = manifest
         .head
         .rejected
         .iter()
-        .map(|rejected| FaultTell::of_nothing_drawn(rejected.key.clone(), rejected.problem.clone()))
+        .map(|rejected| FaultInfo::of_nothing_drawn(rejected.key.clone(), rejected.problem.clone()))
         .collect();
     let failed = manifest.frames.iter().filter_map(|frame| match &frame.state {
         FrameState::Failed(fault) => Some((frame, fault.reason.as_ref())),
@@ -169,7 +169,7 @@ pub(super) fn faults(manifest: &Manifest) -> (Vec<FaultTell>, usize) {
     });
     let mut failed: std::collections::VecDeque<_> = failed.collect();
     for obstacle in obstacles(manifest) {
-        // The frames among the obstacles come in their order.
+        // The frames among the obstacles are in order.
         let frame = failed
             .front()
             .filter(|(frame, _)| rayfold_client::frame_name(frame) == obstacle.what)
@@ -184,55 +184,55 @@ pub(super) fn faults(manifest: &Manifest) -> (Vec<FaultTell>, usize) {
     (all, more)
 }
 
-fn of_reason(what: String, frame: Option<&Frame>, reason: Option<&Reason>) -> Vec<FaultTell> {
-    let about = |what: String, message: String| FaultTell {
+fn of_reason(what: String, frame: Option<&Frame>, reason: Option<&Reason>) -> Vec<FaultInfo> {
+    let about = |what: String, message: String| FaultInfo {
         script: frame.map(|frame| frame.script.clone()),
         part: frame.and_then(|frame| frame.part),
-        ..FaultTell::of_nothing_drawn(what, message)
+        ..FaultInfo::of_nothing_drawn(what, message)
     };
     let Some(reason) = reason else { return vec![about(what, "no reason is known yet".into())] };
     if reason.diagnostics.is_empty() {
         return vec![about(what, reason.message.clone())];
     }
-    let told = |diagnostic: &Diagnostic| {
+    let of_diagnostic = |diagnostic: &Diagnostic| {
         let Diagnostic { line, column, message, expected, help, .. } = diagnostic;
-        FaultTell {
+        FaultInfo {
             place: Some((*line, *column)),
             help: help.clone().or_else(|| expected.clone()).unwrap_or_default(),
             ..about(what.clone(), message.clone())
         }
     };
-    let mut faults: Vec<_> = reason.diagnostics.iter().map(told).collect();
+    let mut faults: Vec<_> = reason.diagnostics.iter().map(of_diagnostic).collect();
     if reason.omitted > 0 {
         faults.push(about(what.clone(), format!("and {} more", reason.omitted)));
     }
     faults
 }
 
-impl FaultTell {
+impl FaultInfo {
     fn of_nothing_drawn(what: String, message: String) -> Self {
         Self { what, script: None, part: None, place: None, message, help: String::new() }
     }
 }
 
-impl FrameTell {
+impl FrameUpdate {
     pub(super) fn of(frame: &Frame) -> Self {
         let (state, pixels) = match frame.state {
-            FrameState::Pending => (Stand::Pending, None),
-            FrameState::Done { pixels } => (Stand::Done, Some(pixels)),
-            FrameState::Failed(_) => (Stand::Failed, None),
+            FrameState::Pending => (FrameStatus::Pending, None),
+            FrameState::Done { pixels } => (FrameStatus::Done, Some(pixels)),
+            FrameState::Failed(_) => (FrameStatus::Failed, None),
         };
         let version = frame.version.to_string();
         Self { script: frame.script.clone(), version, part: frame.part, state, pixels }
     }
 }
 
-impl RunTell {
-    /// What is new since the last time; `None` where nothing is.
+impl RunUpdate {
+    /// Returns the changes since the last update, or `None` if there are none.
     pub(super) fn since(
-        last: &mut Option<(RunState, Vec<FrameTell>)>,
+        last: &mut Option<(RunState, Vec<FrameUpdate>)>,
         state: RunState,
-        frames: Vec<FrameTell>,
+        frames: Vec<FrameUpdate>,
     ) -> Option<Self> {
         let tell = match last {
             Some((old, known)) if known.len() == frames.len() => {
@@ -269,12 +269,12 @@ mod tests {
         RunState { summary, faults: vec![], more_faults: 0, sending: None, problem: None }
     }
 
-    fn frames(drawn: &[bool]) -> Vec<FrameTell> {
-        let frame = |(at, drawn): (usize, &bool)| FrameTell {
+    fn frames(drawn: &[bool]) -> Vec<FrameUpdate> {
+        let frame = |(at, drawn): (usize, &bool)| FrameUpdate {
             script: ScriptName::new(&format!("{at}")).unwrap(),
             version: "v".into(),
             part: None,
-            state: if *drawn { Stand::Done } else { Stand::Pending },
+            state: if *drawn { FrameStatus::Done } else { FrameStatus::Pending },
             pixels: drawn.then_some(1),
         };
         drawn.iter().enumerate().map(frame).collect()
@@ -283,7 +283,7 @@ mod tests {
     #[test]
     fn only_what_changes_is_told_again() {
         let mut last = None;
-        let mut tell = |done, drawn: &[bool]| RunTell::since(&mut last, state(done), frames(drawn));
+        let mut tell = |done, drawn: &[bool]| RunUpdate::since(&mut last, state(done), frames(drawn));
         let first = tell(0, &[false; 3]).unwrap();
         assert_eq!((first.frames.map(|frames| frames.len()), first.changed.len()), (Some(3), 0));
         assert!(tell(0, &[false; 3]).is_none());

@@ -1,9 +1,9 @@
-//! What the page is told: how everything stands, and which lines have changed.
+//! The replies to the page: the state, and the changed lines.
 
 use rayfold_scene::{Command, Scene};
 
 use super::hold::Held;
-use super::sight::grid_path;
+use super::viewport::grid_path;
 use super::{Answer, Change, Session};
 use crate::document::Splice;
 use crate::edits;
@@ -11,14 +11,14 @@ use crate::handles::handles;
 use crate::line::Line;
 use crate::pictures::Wanted;
 use crate::project::Project;
-use crate::protocol::{FaultState, FileState, LineState, LinesChanged, State, Tell};
+use crate::protocol::{FaultState, FileState, LineState, LinesChanged, ServerMessage, State};
 use crate::tables::role;
 use crate::values::Values;
 use crate::view::Projection;
 
 impl Session {
-    pub(super) fn answer(&mut self, project: &Project, mut tell: Tell, change: Change) -> Answer {
-        // An outline is that of a picture: with another one it is drawn anew, or goes while things move.
+    pub(super) fn answer(&mut self, project: &Project, mut tell: ServerMessage, change: Change) -> Answer {
+        // An outline belongs to a picture. With another picture it is recomputed, or removed while the picture moves.
         match change {
             Change::Still if tell.outline.is_none() => self.outline(project, &mut tell),
             Change::Moving if tell.outline.is_none() => tell.outline = Some(String::new()),
@@ -48,7 +48,7 @@ impl Session {
             }
         };
         if change != Change::Nothing {
-            // What was outlined may look otherwise now.
+            // The outline of the object under the pointer may have changed.
             self.hovered = None;
         }
         tell.tracks = self.new_tracks(project);
@@ -70,12 +70,12 @@ impl Session {
             if !matches!(self.held, Some(Held::Turn(_)))
                 && let Some(&line) = self.selection.last()
                 && let Some(values) = lines.get(line).and_then(|text| Values::of(text, now.time))
-                && !now.stage.is_in_group(line)
+                && !now.source_map.is_in_group(line)
                 && !self.is_locked(project, line)
             {
                 shown = handles(line, &values, &projection, around);
             }
-            (way, marks) = self.motion_path(project, &projection, &now.stage);
+            (way, marks) = self.motion_path(project, &projection, &now.source_map);
             if self.free.is_some() {
                 grid = grid_path(&projection, self.bounds(project));
             }
@@ -122,13 +122,13 @@ impl Session {
         self.file_lines(project).iter().map(line_state).collect()
     }
 
-    /// What is selected, locked and copied stays with its lines.
-    pub(super) fn told(&mut self, splices: Vec<Splice>, tell: &mut Tell) {
+    /// Adds changes of lines to the reply. Moves the selection, the locks and the copied keys along with their lines.
+    pub(super) fn send_splices(&mut self, splices: Vec<Splice>, tell: &mut ServerMessage) {
         let file = self.shown_file;
         if splices.iter().any(|splice| splice.removed != splice.inserted.len())
             && !matches!(self.held, Some(Held::Turn(_)))
         {
-            // What is held stands elsewhere now.
+            // The held object may have another line now.
             self.held = None;
         }
         for splice in &splices {
@@ -154,7 +154,7 @@ impl Session {
     }
 }
 
-/// Where a line is after a change; `None` if it has gone.
+/// Returns the index of a line after a change, or `None` if it was removed.
 fn after(splice: &Splice, line: usize) -> Option<usize> {
     let (end, inserted) = (splice.at + splice.removed, splice.inserted.len());
     if line < splice.at || line < end && inserted == splice.removed {

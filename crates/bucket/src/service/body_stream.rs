@@ -1,8 +1,8 @@
-//! A body on its way out: the bytes of a range, block by block, out of rows and files.
+//! Sending a body: the bytes of a range, block by block, from rows and files.
 //!
-//! The next block is read while the one before is sent; memory does not grow with the body. A body, or a part of one, that is
-//! sent whole is compared with its checksum: its last block is sent only when they match. Of a range of a file only the file's
-//! length is compared (rows have checksums of the storage's own).
+//! The next block is read while the one before is sent, so memory does not grow with the body. A body, or a part of
+//! one, that is sent whole is compared with its checksum, and its last block is sent only if they match. For a range
+//! of a file, only the length of the file is compared. (Rows have checksums of the storage.)
 
 use std::collections::VecDeque;
 use std::fmt::Display;
@@ -26,12 +26,12 @@ use crate::error::report;
 use crate::records::{Body, Layout, LayoutPart, Object, find};
 use crate::storage::{BodyId, Pins, Snapshot, Storage, Table, View};
 
-/// What is read at a time.
+/// The number of bytes that are read at a time.
 const BLOCK_BYTES: u64 = 256 * 1024;
 
-/// An object whose bytes stay while they are read.
+/// An object whose bytes stay available while they are read.
 pub(super) struct Held {
-    /// Bucket and key.
+    /// The bucket and the key.
     name: String,
     pub(super) object: Object,
     pub(super) layout: Option<Layout>,
@@ -40,7 +40,7 @@ pub(super) struct Held {
 }
 
 impl Service {
-    /// The object as it is now, with its bytes held.
+    /// Returns the current object, with its bytes held.
     pub(super) fn held(&self, bucket: &str, key: &str) -> Answer<Held> {
         let mut pins: Option<Pins> = None;
         let mut pinned = None;
@@ -48,7 +48,8 @@ impl Service {
             let snapshot = self.snapshot()?;
             let object = self.object(&snapshot, bucket, key)?;
             let layout = layout(&snapshot, &object)?;
-            // The first look says what to pin, the second one that it was still there then.
+            // The first read says which files to pin. The second proves that they still existed
+            // when they were pinned.
             let files = files(&object, layout.as_ref());
             if files.is_empty() || pinned == Some(object.body) {
                 let name = format!("{bucket}/{key}");
@@ -59,7 +60,7 @@ impl Service {
         }
     }
 
-    /// The object's parts, if it was uploaded in parts.
+    /// Returns the object's parts, if it was uploaded in parts.
     pub(super) fn layout(&self, snapshot: &Snapshot, object: &Object) -> Answer<Option<Layout>> {
         layout(snapshot, object)
     }
@@ -84,8 +85,8 @@ fn files(object: &Object, layout: Option<&Layout>) -> Vec<BodyId> {
 }
 
 impl Held {
-    /// The bytes of a range, which must lie within the object.
-    pub(super) fn bytes(self, storage: &Storage, range: Range<u64>) -> Answer<Outgest> {
+    /// Returns the bytes of a range, which must lie within the object.
+    pub(super) fn bytes(self, storage: &Storage, range: Range<u64>) -> Answer<BodyStream> {
         let Self { name, object, layout, snapshot, pins } = self;
         let damaged = |what: String| BodyDamaged { object: name.clone(), what }.refuse();
         let whole =
@@ -127,17 +128,17 @@ impl Held {
             }
             start += part.size;
         }
-        // So that what is missing at once is an answer, not an end in the middle.
+        // So a missing file is reported in the response rather than by a broken connection.
         if let Some(Piece::File(file)) = pieces.front_mut() {
             file.open().map_err(damaged)?;
         }
-        Ok(Outgest { name, pieces, reading: None, left: range.end - range.start, _pins: pins })
+        Ok(BodyStream { name, pieces, reading: None, left: range.end - range.start, _pins: pins })
     }
 }
 
-/// See the module.
-pub(super) struct Outgest {
-    /// Bucket and key.
+/// A stream of a body's bytes, see the module.
+pub(super) struct BodyStream {
+    /// The bucket and the key.
     name: String,
     pieces: VecDeque<Piece>,
     reading: Option<JoinHandle<Result<Block, String>>>,
@@ -145,7 +146,7 @@ pub(super) struct Outgest {
     _pins: Option<Pins>,
 }
 
-/// Bytes, and what comes after them.
+/// The bytes of a block, and the piece that follows them.
 type Block = (Bytes, Option<Piece>);
 
 enum Piece {
@@ -153,19 +154,19 @@ enum Piece {
     File(Box<FilePiece>),
 }
 
-/// What is still to be read of a file.
+/// The rest of a file that is to be read.
 struct FilePiece {
     path: PathBuf,
     file: Option<File>,
-    /// Of the file.
+    /// The size of the file.
     size: u64,
     rest: Range<u64>,
-    /// Where all of it is sent.
+    /// The comparison with the checksum, if all of the file is sent.
     comparison: Option<Comparison>,
 }
 
 impl FilePiece {
-    /// The file, of the right length.
+    /// Returns the file, after checking its length.
     fn open(&mut self) -> Result<&File, String> {
         let wrong = |what: &dyn Display| format!("{}: {what}", self.path.display());
         let file = match self.file.take() {
@@ -182,7 +183,7 @@ impl FilePiece {
         Ok(self.file.insert(file))
     }
 
-    /// The first block, and what comes after it.
+    /// Returns the first block, and the piece that follows it.
     fn read(mut self: Box<Self>) -> Result<Block, String> {
         let Range { start, end } = self.rest;
         let stop = end.min(start + BLOCK_BYTES);
@@ -216,13 +217,13 @@ impl Piece {
     }
 }
 
-impl Outgest {
-    /// Starts to read the next block.
+impl BodyStream {
+    /// Starts reading the next block.
     fn advance(&mut self) {
         self.reading = self.pieces.pop_front().map(|piece| tokio::task::spawn_blocking(|| piece.read()));
     }
 
-    /// Ends with an error: the connection breaks off, so that nobody takes what was sent for the whole.
+    /// Ends with an error. The connection breaks, so that the client does not take the bytes sent for the whole.
     fn fail(&mut self, what: String) -> StdError {
         (self.left, self.reading) = (0, None);
         self.pieces.clear();
@@ -232,7 +233,7 @@ impl Outgest {
     }
 }
 
-impl Stream for Outgest {
+impl Stream for BodyStream {
     type Item = Result<Bytes, StdError>;
 
     fn poll_next(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Self::Item>> {
@@ -271,7 +272,7 @@ impl Stream for Outgest {
     }
 }
 
-impl ByteStream for Outgest {
+impl ByteStream for BodyStream {
     fn remaining_length(&self) -> RemainingLength {
         usize::try_from(self.left).map_or_else(|_| RemainingLength::unknown(), RemainingLength::new_exact)
     }
@@ -288,12 +289,12 @@ mod tests {
 
     use super::*;
 
-    /// A client must see that bytes are missing, not take the beginning for the whole.
+    /// A client must notice that bytes are missing, and not take the beginning for the whole.
     #[tokio::test]
     async fn a_body_that_lost_bytes_ends_with_an_error() {
         for (left, whole) in [(5, false), (2, true)] {
             let pieces = VecDeque::from([Piece::Bytes(Bytes::from_static(b"ab"))]);
-            let body = Outgest { name: "films/a".into(), pieces, reading: None, left, _pins: None };
+            let body = BodyStream { name: "films/a".into(), pieces, reading: None, left, _pins: None };
             let ends: Vec<bool> = body.map(|piece| piece.is_ok()).collect().await;
             assert_eq!(ends, if whole { vec![true] } else { vec![true, false] });
         }

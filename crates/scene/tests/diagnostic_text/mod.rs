@@ -1,4 +1,4 @@
-//! What people read about a script, word for word.
+//! Checks of the diagnostics of a script, word for word.
 
 use expect_test::Expect;
 use rayfold_scene::{Limits, parse};

@@ -1,7 +1,8 @@
-//! Angles about the axes, as circles in the picture that are turned by their handles.
+//! Angles about the axes, as circles in the picture with handles.
 //!
-//! Angles are those of a `Use`: first about x, then about y, then about z, of the world. So a change of the last turns about
-//! the world's z, and one of those before about an axis that those behind it have turned.
+//! The angles are those of a `Use`: first about x, then about y, then about z, of the world. So a change of
+//! the last angle rotates about the world's z axis, and a change of an earlier one about an axis that the
+//! later ones have rotated.
 
 use std::fmt::Write;
 
@@ -9,25 +10,26 @@ use glam::{DMat3, DVec2, DVec3};
 
 use crate::view::Projection;
 
-/// Degrees that a turn goes on by, at least.
+/// The smallest step of an angle, in degrees.
 pub(crate) const STEP: f64 = 1.0;
 
-/// The same, where it snaps.
+/// The step of an angle that snaps, in degrees.
 pub(crate) const SNAP: f64 = 15.0;
 
-/// Radius of the circles, in lengths of an arrow.
+/// The radius of the circles, in lengths of an arrow.
 pub(crate) const RADIUS: f64 = 0.8;
 
-/// How far to the right, and up, the handle of a scale lies, in lengths of an arrow.
+/// The distance of a scale's handle to the right and upwards, in lengths of an arrow.
 pub(crate) const SCALE: f64 = 0.75;
 
-/// Pieces of a circle.
+/// The number of line segments of a circle.
 const PIECES: u32 = 48;
 
-/// A plane that is seen more slanted than this sine is turned in by the picture alone.
+/// The sine of the smallest angle between a pointer's ray and the plane of rotation at which the rotation follows the
+/// plane. At smaller angles, it follows the angle in the picture.
 const SLANTED: f64 = 0.15;
 
-/// The axis about which a change of angle `axis` turns, and a direction square to it that turns with it.
+/// Returns the axis about which a change of angle `axis` rotates, and a perpendicular direction that rotates with it.
 pub(crate) fn frame(degrees: DVec3, axis: usize) -> (DVec3, DVec3) {
     let [x, y, z] = degrees.to_array().map(f64::to_radians);
     let about_z = DMat3::from_rotation_z(z);
@@ -39,7 +41,7 @@ pub(crate) fn frame(degrees: DVec3, axis: usize) -> (DVec3, DVec3) {
     }
 }
 
-/// The circle that the handle of an angle goes along, as the path of an SVG; without what is behind the eye.
+/// Returns the circle along which the handle of an angle moves, as an SVG path, without the part behind the eye.
 pub(crate) fn circle(
     projection: &Projection,
     center: DVec3,
@@ -55,7 +57,7 @@ pub(crate) fn circle(
         let (sin, cos) = (std::f64::consts::TAU * f64::from(piece) / f64::from(PIECES)).sin_cos();
         let point = projection.point(center + radius * (cos * reference + sin * across));
         if let Some(at) = point {
-            // Writing to a text cannot fail.
+            // Writing to a string cannot fail.
             let _ = write!(path, "{}{:.1} {:.1}", if is_open { 'L' } else { 'M' }, at.x, at.y);
         }
         is_open = point.is_some();
@@ -63,7 +65,8 @@ pub(crate) fn circle(
     path
 }
 
-/// Degrees that the pointer turns about an axis, from above -180 to 180; `None` where it is just at the axis.
+/// Returns the degrees by which the pointer rotates about an axis, above -180 and up to 180, or `None` if it
+/// is at the axis.
 pub(crate) fn angle(
     projection: &Projection,
     center: DVec3,
@@ -87,7 +90,7 @@ pub(crate) fn angle(
         _ => {
             let middle = projection.point(center)?;
             let (from, to) = (from - middle, to - middle);
-            // Rows go down: what is counterclockwise is negative.
+            // Rows count downwards, so counterclockwise is negative.
             let seen = -from.perp_dot(to).atan2(from.dot(to));
             if about.dot(toward) < 0.0 { -seen } else { seen }
         }
@@ -95,7 +98,7 @@ pub(crate) fn angle(
     radians.is_finite().then(|| radians.to_degrees())
 }
 
-/// The angle that is the same but for whole turns and nearest to what it was.
+/// Returns the angle that differs by whole turns and is nearest to the previous one.
 pub(crate) fn nearest_turn(angle: f64, before: f64) -> f64 {
     angle + 360.0 * ((before - angle) / 360.0).round()
 }
@@ -106,7 +109,7 @@ mod tests {
 
     use super::*;
 
-    /// Where the tracer's group has a point of it at these angles.
+    /// Returns the position of a point after the tracer's group has rotated it by these angles.
     fn placed(degrees: DVec3, point: DVec3) -> DVec3 {
         let text = format!(
             "Screen 2 2\nGroup a\nSphere 1 0 0 0 1 1 1 0 0 0\nEnd\nUse a 0 0 0 {} {} {}\nTrace",
