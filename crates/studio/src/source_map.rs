@@ -70,7 +70,7 @@ impl SourceMap {
                         source_map.trace = Some(number);
                         break;
                     }
-                    before += count;
+                    before = before.saturating_add(count);
                 }
                 (Command::Frames, _) => {
                     source_map.frames = Some(number);
@@ -151,7 +151,7 @@ fn frames(line: &Line) -> Option<usize> {
         (Some(last), None) => (1.0, last),
         (None, _) => return None,
     };
-    (first <= last).then_some((last - first) as usize + 1)
+    (first <= last).then_some(((last - first) as usize).saturating_add(1))
 }
 
 #[cfg(test)]
@@ -178,6 +178,12 @@ mod tests {
         assert_eq!(last.end(&lines), 10);
         let lines = Line::split(b"Screen 2 2\nTrace\nClear\nTrace");
         assert_eq!(SourceMap::of(&lines, 1, 1.0).end(&lines), 3, "what stands before a `Clear` is gone");
+    }
+
+    #[test]
+    fn a_count_of_frames_beyond_all_numbers_is_no_overflow() {
+        let lines = Line::split(b"Frames 1 1e300\nTrace\nFrames 1 1e300\nTrace\nTrace");
+        assert_eq!(lines.iter().filter_map(frames).collect::<Vec<_>>(), [usize::MAX; 2]);
     }
 
     #[test]

@@ -41,7 +41,9 @@ impl Pixel {
         self.count += channels[0].len() as u32;
     }
 
-    /// Adds as many of the same [`quantised`] colour.
+    /// Adds `count` samples of the same [`quantised`] colour.
+    // By itself, so that it is compiled alike whatever parts of the tracer surround it.
+    #[inline(never)]
     pub(crate) fn add_equal(&mut self, color: [u32; CHANNELS], count: u32) {
         for ((sum, squares), level) in self.sum.iter_mut().zip(&mut self.squares).zip(color) {
             let level = u64::from(level);
