@@ -1,7 +1,7 @@
 //! `rayfold-bench outlines`: dots at the outlines of bodies, as a person sees them, and pixels off at needles.
 //!
 //! `f32` places an outline some 0.0002 pixels off, which nobody sees. What is seen is a dot: a pixel that has nothing to do with any
-//! pixel around it in the exact picture. So what is counted is a pixel of `auto` that is more than [`SEEN`] levels from each of the
+//! pixel around it in the exact picture. So what is counted is a pixel of `auto` that is more than `SEEN` levels from each of the
 //! nine pixels that the `f64` kernels draw around it. Everything random comes from the seed of the scene.
 
 mod families;
