@@ -1,4 +1,4 @@
-//! Expiry of unfinished uploads a week after they were begun, like the lifecycle rule of the bucket on AWS.
+//! Expiry of unfinished uploads a week after they were begun. On AWS a lifecycle rule of the bucket deletes them after a day.
 
 use std::time::Duration;
 
