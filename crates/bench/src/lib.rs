@@ -18,6 +18,7 @@ pub mod fingerprints;
 #[cfg(feature = "bucket")]
 pub mod footprint;
 pub mod gif;
+pub mod growth;
 pub mod hard_cases;
 pub mod measure;
 pub mod metamorphic;

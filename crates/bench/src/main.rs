@@ -2,8 +2,8 @@
 
 use clap::{Parser, Subcommand};
 use rayfold_bench::{
-    accuracy, coincident, fingerprints, gif, measure, metamorphic, needs, outlines, parsing, sampling, speed,
-    studio,
+    accuracy, coincident, fingerprints, gif, growth, measure, metamorphic, needs, outlines, parsing,
+    sampling, speed, studio,
 };
 #[cfg(feature = "bucket")]
 use rayfold_bench::{cold_start, explore, footprint, pipeline, scale, simulate};
@@ -42,6 +42,8 @@ enum Measurement {
     Footprint(footprint::Args),
     /// A line for each of many pictures, by which the program before a change is compared with the one after
     Fingerprints(fingerprints::Args),
+    /// Processor time against the number of objects where a tree helps least
+    Growth(growth::Args),
     /// Run a program and print what it took
     #[command(hide = true)]
     Measure(measure::Args),
@@ -81,6 +83,7 @@ fn main() -> anyhow::Result<()> {
         Measurement::Footprint(args) => footprint::run(&args),
         Measurement::Gif(args) => gif::run(&args),
         Measurement::Fingerprints(args) => fingerprints::run(&args),
+        Measurement::Growth(args) => growth::run(&args),
         Measurement::Measure(args) => measure::run(&args),
         Measurement::Metamorphic(args) => metamorphic::run(&args),
         Measurement::Needs(args) => needs::run(&args),
