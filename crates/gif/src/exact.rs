@@ -187,7 +187,7 @@ pub(crate) fn draw(
                 if last.0 != now {
                     last = (now, colours.find(now).ok());
                 }
-                // A pixel that is seen right may be drawn or left: whichever continues the string.
+                // A pixel that is seen right may be drawn or left. The choice is what continues the string.
                 let right = transparent.filter(|_| now == seen[x]);
                 let index = last.1;
                 match (right, index) {

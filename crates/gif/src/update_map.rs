@@ -44,7 +44,7 @@ const GROWN_BY: usize = 6;
 pub(crate) enum PixelUpdate {
     /// The pixel is left as it is seen.
     Keep,
-    /// The pixel is left or drawn, whichever makes the file smaller.
+    /// The pixel is left or drawn; the choice makes the file smaller.
     Either,
     /// The pixel is static but seen wrong: it is drawn with a colour that is much better, else left.
     Refine,

@@ -2,7 +2,7 @@
 //!
 //! A step knows no shape. It is handed some [`Items`] of a kind and asks the kind which of them its rays meet first
 //! ([`Tests`]), or which of its points they keep a sun's light from ([`Obstructs`]). All tests take what is on an edge, or
-//! within the rounding error of it, for a hit, as closed sets do. Everything is `inline(always)`: see ARCHITECTURE.md.
+//! within the rounding error of it, for a hit, as closed sets do. Everything is `inline(always)`: see docs/tracer.md.
 
 use std::ops::Range;
 
